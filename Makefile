@@ -1,0 +1,53 @@
+# Two commands do everything on a machine with git, make, Python 3.12 and pip:
+#   make demo    the main job: model -> gRPC server -> ROS 2 package -> node that drives a simulated robot
+#   make test    every test
+# Both make .venv from the lock if it is not there. PYTHON=... chooses the interpreter.
+
+VENV := .venv
+BIN := $(VENV)/bin
+# The marker is younger than the lock and the project file when the environment is up to date.
+READY := $(VENV)/.ready
+PROTO := proto/robosc_api/v1/synthesis.proto
+
+.PHONY: demo test lint format bindings lock benchmark environment clean help
+
+help:
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
+
+environment: $(READY) ## make .venv from the lock
+
+$(READY): requirements.lock pyproject.toml deploy/make_environment.sh
+	sh deploy/make_environment.sh $(VENV)
+	@touch $(READY)
+
+demo: $(READY) ## run the line follower from model to moving robot
+	$(BIN)/python deploy/demo/demo.py
+
+test: $(READY) ## run every test
+	$(BIN)/python -m pytest -n 2 --dist loadgroup $(TESTS)
+
+lint: $(READY) ## formatter, linter, types, import contracts, bindings
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+format: $(READY) ## format and mend what can be mended by itself
+	$(BIN)/ruff check --fix-only .
+	$(BIN)/ruff format .
+
+bindings: $(READY) ## regenerate the gRPC bindings
+	$(BIN)/python -m grpc_tools.protoc -Iproto --python_out=proto --pyi_out=proto --grpc_python_out=proto \
+	  robosc_api/v1/synthesis.proto
+
+lock: $(READY) ## choose new versions and write requirements.lock
+	$(BIN)/pip-compile --quiet --upgrade --strip-extras --allow-unsafe --generate-hashes --all-build-deps \
+	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host \
+	  --extra server --extra client --extra ros2 --extra bridge --extra dev \
+	  --output-file requirements.lock pyproject.toml
+
+benchmark: $(READY) ## print the tables of tests/benchmarks
+	$(BIN)/python tests/benchmarks/run.py
+
+clean: ## remove the environment and everything generated
+	rm -rf $(VENV) out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

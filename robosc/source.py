@@ -1,0 +1,77 @@
+"""Source texts and places in them: what every diagnostic points at."""
+
+import hashlib
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True, slots=True)
+class SourceFile:
+    """One text of a bundle.
+
+    Attributes:
+        name: The name a user knows the file by; never opened again once the text is here.
+        text: The decoded text.
+    """
+
+    name: str
+    text: str
+
+    @property
+    def sha256(self) -> str:
+        """Hexadecimal SHA-256 of the text's UTF-8 bytes."""
+        return hashlib.sha256(self.text.encode("utf-8")).hexdigest()
+
+    def line(self, number: int) -> str:
+        """The text of line `number` (from 1) without its line end; empty past the end."""
+        lines = self.text.split("\n", number)
+        return lines[number - 1].rstrip("\r") if 0 < number <= len(lines) else ""
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Location:
+    """A stretch of text on one line of one file.
+
+    Attributes:
+        file: Name of the source file.
+        line: Line, from 1.
+        column: Column in characters (code points), from 1.
+        length: Characters covered, at least 1.
+    """
+
+    file: str
+    line: int
+    column: int
+    length: int = field(default=1)
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}"
+
+
+@dataclass(frozen=True, slots=True)
+class Bundle:
+    """All texts of one run: the model and the libraries it may import from.
+
+    Attributes:
+        main: The file with the robot (or the library that is being checked).
+        libraries: Other files, sorted by name.
+        searched: Where libraries were looked for, in words for an error message.
+    """
+
+    main: SourceFile
+    libraries: tuple[SourceFile, ...] = ()
+    searched: tuple[str, ...] = ()
+
+    @property
+    def files(self) -> tuple[SourceFile, ...]:
+        """Every file, the main one first."""
+        return (self.main, *self.libraries)
+
+    def file(self, name: str) -> SourceFile | None:
+        """The file called `name`, or None."""
+        return next((file for file in self.files if file.name == name), None)
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 over the sorted list of `name`, NUL, file SHA-256, newline of every file."""
+        listing = "".join(f"{file.name}\0{file.sha256}\n" for file in sorted(self.files, key=lambda f: f.name))
+        return hashlib.sha256(listing.encode("utf-8")).hexdigest()

@@ -1,0 +1,59 @@
+"""A global state of a system, as a flat tuple: the interchange form of every explicit algorithm."""
+
+from dataclasses import dataclass
+
+from robosc.automata.structure import System
+from robosc.expressions import Type, Value, domain
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """What one place of a state tuple holds: an automaton's location, or one of its variables.
+
+    Attributes:
+        automaton: Name of the automaton.
+        variable: Name of the variable, or None for the location.
+    """
+
+    automaton: str
+    variable: str | None = None
+
+    def __str__(self) -> str:
+        return self.automaton if self.variable is None else f"{self.automaton}.{self.variable}"
+
+
+def subjects(system: System) -> tuple[Subject, ...]:
+    """The places of a state tuple: for each automaton its location, then its variables."""
+    return tuple(
+        subject
+        for automaton in system.automata
+        for subject in (
+            Subject(automaton.name),
+            *(Subject(automaton.name, variable.name) for variable in automaton.variables),
+        )
+    )
+
+
+def subject_domain(system: System, subject: Subject) -> tuple[Value, ...] | range:
+    """All values of one place, in order."""
+    automaton = system.automaton(subject.automaton)
+    if subject.variable is None:
+        return automaton.locations
+    return domain(subject_type(system, subject))
+
+
+def subject_type(system: System, subject: Subject) -> Type:
+    """The type of a variable's place (KeyError for a location's)."""
+    for variable in system.automaton(subject.automaton).variables:
+        if variable.name == subject.variable:
+            return variable.type
+    raise KeyError(str(subject))
+
+
+def initial_state(system: System) -> tuple[Value, ...]:
+    """The initial state, in the order of `subjects`."""
+    return tuple(
+        value
+        for automaton in system.automata
+        for value in (automaton.initial, *(variable.initial for variable in automaton.variables))
+    )

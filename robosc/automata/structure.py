@@ -1,0 +1,137 @@
+"""Extended finite automata: what synthesis, verification and exploration work on.
+
+Definitions after Ouedraogo, Kumar, Malik and Akesson, "Nonblocking and safe control of discrete-event
+systems modeled as extended finite automata", IEEE T-ASE 8(3), 2011, pp. 560-569. Automata synchronise
+on shared events; guards may read the locations and variables of every automaton.
+
+This structure knows nothing of RoboSC: a component is an automaton like any other. In expressions,
+`VariableRead(component=A, variable=v)` is variable v of automaton A, `StateTest(A, l)` tells whether
+A is in location l, and `Received(path)` is the event's input of that path.
+"""
+
+from dataclasses import dataclass
+
+from robosc.expressions import TRUE, Expression, PathStep, Type, Value
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A named occurrence. The supervisor may disable controllable events only."""
+
+    name: str
+    is_controllable: bool
+
+
+@dataclass(frozen=True, slots=True)
+class DiscreteVariable:
+    """A variable that edges of its automaton assign; its type is finite."""
+
+    name: str
+    type: Type
+    initial: Value
+
+
+@dataclass(frozen=True, slots=True)
+class InputVariable:
+    """A part of the data that one occurrence of an event carries, chosen by the environment.
+
+    Attributes:
+        event: The event that carries it.
+        path: The `Received` path that reads it.
+        type: A finite type.
+        may_be_unknown: Whether the environment may also leave it out (an element of an array). Elements
+            of one array that differ only in the last index: a later one is known only if every
+            earlier one is.
+    """
+
+    event: str
+    path: tuple[PathStep, ...]
+    type: Type
+    may_be_unknown: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Assignment:
+    """`variable := expression` of an edge, reading the state before the transition.
+
+    If the expression is unknown the variable keeps its value; if it leaves the variable's range, a
+    controllable event is disabled and for an uncontrollable one the state is bad.
+    """
+
+    variable: str
+    expression: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """An arc of an automaton; it takes part when its guard is true."""
+
+    source: str
+    event: str
+    target: str
+    guard: Expression = TRUE
+    updates: tuple[Assignment, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Automaton:
+    """A plant.
+
+    Attributes:
+        name: Unique; a component's name, or e.g. `service calibrate`, which no identifier can be.
+        locations: Names, at least one.
+        initial: The initial location.
+        marked: Marked locations.
+        alphabet: Events it takes part in; one without an edge is blocked.
+        variables: Its variables.
+        edges: Its arcs. Two edges of one location may both take part only for an uncontrollable event.
+    """
+
+    name: str
+    locations: tuple[str, ...]
+    initial: str
+    marked: frozenset[str]
+    alphabet: frozenset[str]
+    edges: tuple[Edge, ...]
+    variables: tuple[DiscreteVariable, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class EventCondition:
+    """A state-event requirement: `event` only where `condition` is true."""
+
+    event: str
+    condition: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class System:
+    """Plants and requirements of one synthesis problem, in source order.
+
+    Attributes:
+        name: What it is called.
+        events: All events.
+        automata: The plants; their synchronous composition is the uncontrolled system.
+        inputs: Received data that updates read.
+        conditions: Requirements on events; several on one event must all be true.
+    """
+
+    name: str
+    events: tuple[Event, ...]
+    automata: tuple[Automaton, ...]
+    inputs: tuple[InputVariable, ...] = ()
+    conditions: tuple[EventCondition, ...] = ()
+
+    def automaton(self, name: str) -> Automaton:
+        """The automaton called `name` (KeyError if there is none)."""
+        for automaton in self.automata:
+            if automaton.name == name:
+                return automaton
+        raise KeyError(name)
+
+    def event(self, name: str) -> Event:
+        """The event called `name` (KeyError if there is none)."""
+        for event in self.events:
+            if event.name == name:
+                return event
+        raise KeyError(name)

@@ -1,0 +1,157 @@
+"""The two borders of the executor: the controlled system below it, the middleware beside it.
+
+A `ControlledSystem` is the supervisor as code: `robosc.execution.interpreter` interprets a
+`Supervisor`, a target generates a class with the same methods. The `Executor` adds what semantics
+part 3 says about time: batches, silent steps, decisions, release, safe stop, log. `Middleware` is what
+it needs of ROS, a bridge or a test.
+
+This package's modules other than `interpreter` import nothing of RoboSC but each other and run on
+Python 3.8 and later: generated packages carry copies of them.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Dict, NamedTuple, Optional, Protocol, Tuple  # noqa: UP035  # Python 3.8
+
+
+class CommunicationInfo(NamedTuple):
+    """What the executor must know of a message, service or action.
+
+    Attributes:
+        name: Its name in the model.
+        component: The component that declares it.
+        kind: `incoming message`, `outgoing message`, `service` or `action`.
+        identifier: Topic, service or action name.
+        package: ROS package of its interface, or None if it is not linked.
+        interface: Type name of its interface, or None.
+        requirement_count: Number of requirements on its request.
+        conjunct_count: Number of top-level conjuncts of those requirements, all counted on.
+    """
+
+    name: str
+    component: str
+    kind: str
+    identifier: str
+    package: Optional[str]
+    interface: Optional[str]
+    requirement_count: int
+    conjunct_count: int
+
+
+class Description(NamedTuple):
+    """The static part of a controlled system; all tuples in source order.
+
+    Attributes:
+        name: The robot's name.
+        deployment: `controller` or `layer`.
+        bundle_sha256: Digest of the model's files.
+        communications: Every communication.
+        resets: Reset events of services and actions.
+        taus: Tau events that can change something.
+        silent_bound: More silent steps than this in a row can only be a run that does not end.
+    """
+
+    name: str
+    deployment: str
+    bundle_sha256: str
+    communications: Tuple[CommunicationInfo, ...]
+    resets: Tuple[str, ...]
+    taus: Tuple[str, ...]
+    silent_bound: int
+
+
+class Reading(NamedTuple):
+    """Received data after conversion (enum rules, ranges), before anything changes.
+
+    Attributes:
+        values: One value (None: unknown) for each datum that updates on the event read, as the system wants them.
+        data: The same by name (`value.front`), for the log.
+        unknown: What was unknown, in words: an enum that fell to its default past an unknown rule, an
+            integer that was clamped. Empty: nothing was.
+        enum_unknown: Whether an enum fell to its default although an earlier rule was unknown.
+    """
+
+    values: Any
+    data: Dict[str, Any]
+    unknown: Tuple[str, ...]
+    enum_unknown: bool
+
+
+class ControlledSystem(Protocol):
+    """Plants, requirements and supervisor of one robot, with their current state."""
+
+    description: Description
+
+    def restart(self) -> None:
+        """Back to the initial state."""
+
+    def enabled(self, event: str) -> bool:
+        """Whether a controllable event is allowed now: by plants, ranges, requirements and supervisor.
+
+        A tau that would change nothing in the current state is not enabled.
+        """
+
+    def read(self, event: str, data: Any) -> Reading:
+        """Convert what came with an uncontrollable event; changes nothing, never raises for any data."""
+
+    def step(self, event: str, reading: Optional[Reading] = None) -> Optional[Tuple[str, ...]]:
+        """Take an event: move and update, all at once.
+
+        Returns:
+            The updates that were skipped because their value is unknown, in words (mostly empty), or None if
+            the state cannot accept the event; then nothing has changed.
+        """
+
+    def provide(self, communication: str) -> Tuple[bool, Any]:
+        """Data for a request in the current state: (is known, data).
+
+        Data is a dict of properties (nested dicts), a plain value, or None for the middleware's default.
+        """
+
+    def requirements(self, communication: str) -> Tuple[bool, ...]:
+        """For each requirement on a communication's request, in source order: whether it holds now."""
+
+    def conjuncts(self, communication: str) -> Tuple[bool, ...]:
+        """For each top-level conjunct of those requirements: whether it holds now."""
+
+    def location(self, communication: str) -> str:
+        """Location of a service's or action's plant."""
+
+    def state(self) -> Dict[str, Dict[str, Any]]:
+        """{component: {"state": s, "variables": {v: value}}} for every component with a behaviour."""
+
+    def signature(self) -> Any:
+        """A hashable value that tells states apart, as cheaply as possible."""
+
+
+class Middleware(Protocol):
+    """What an executor asks of the world; replies come back through the executor's methods, later."""
+
+    def prepare(self, communication: str, data: Any) -> Any:
+        """The middleware's message for a request, from the model's data (None: the default message).
+
+        Raises:
+            DataDoesNotFit: A value does not fit its field; the request is then not issued.
+        """
+
+    def is_default(self, communication: str, message: Any) -> bool:
+        """Whether a prepared message is the all-default one (its header apart)."""
+
+    def publish(self, communication: str, message: Any) -> None:
+        """Send an incoming message's prepared message."""
+
+    def publish_default(self, identifier: str) -> None:
+        """Send the all-default message on an identifier that several communications may share."""
+
+    def call(self, communication: str, request_id: int, message: Any) -> None:
+        """Call a service without waiting; one of the executor's `on_reply`, `on_call_failed` follows."""
+
+    def send_goal(self, communication: str, goal_id: int, message: Any) -> None:
+        """Send an action's goal without waiting; `on_goal_accepted` or `on_goal_ended` follows."""
+
+    def cancel_goal(self, communication: str, goal_id: int) -> None:
+        """Ask the server to cancel an accepted goal."""
+
+
+class DataDoesNotFit(Exception):
+    """A value does not fit the middleware's field."""

@@ -1,0 +1,335 @@
+"""The checked model: what a robot is once every name is bound and every type is known.
+
+Frozen values that travel inside the supervisor file, therefore msgspec structures with constrained
+names. Everything is listed in *source order*: the order of the robot file's text, an imported
+component standing where it is imported.
+"""
+
+from enum import StrEnum
+from typing import Annotated
+
+import msgspec
+
+from robosc.expressions import Expression, Name, ScopedName, Type, Unary, Value
+
+Identifier = Annotated[str, msgspec.Meta(min_length=1, max_length=255)]
+"""The name of a topic, service or action; any text that fits, escaped wherever it is printed."""
+
+EventName = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z_][A-Za-z_0-9]*\.[A-Za-z_][A-Za-z_0-9]*\Z", max_length=511)]
+"""`<communication>.<kind>` or `<Component>.tau_<n>`."""
+
+
+class CommunicationKind(StrEnum):
+    """The four ways in which a component speaks; direction as the component sees it."""
+
+    INCOMING_MESSAGE = "incoming message"
+    OUTGOING_MESSAGE = "outgoing message"
+    SERVICE = "service"
+    ACTION = "action"
+
+
+class EventKind(StrEnum):
+    """What happens on a communication."""
+
+    REQUEST = "request"
+    RESPONSE = "response"
+    FEEDBACK = "feedback"
+    ERROR = "error"
+    CANCEL = "cancel"
+    RESET = "reset"
+
+
+EVENT_KINDS: dict[CommunicationKind, tuple[EventKind, ...]] = {
+    CommunicationKind.INCOMING_MESSAGE: (EventKind.REQUEST,),
+    CommunicationKind.OUTGOING_MESSAGE: (EventKind.RESPONSE,),
+    CommunicationKind.SERVICE: (EventKind.REQUEST, EventKind.RESPONSE, EventKind.ERROR, EventKind.RESET),
+    CommunicationKind.ACTION: (
+        EventKind.REQUEST,
+        EventKind.RESPONSE,
+        EventKind.FEEDBACK,
+        EventKind.ERROR,
+        EventKind.CANCEL,
+        EventKind.RESET,
+    ),
+}
+"""The events of each kind of communication (semantics part 1)."""
+
+CONTROLLABLE_KINDS = frozenset({EventKind.REQUEST, EventKind.CANCEL, EventKind.RESET})
+"""The kinds that a supervisor may disable. (As a layer, cancel is the caller's: see `to_automata`.)"""
+
+
+class Deployment(StrEnum):
+    """Where a supervisor stands: it decides itself, or it filters an existing controller."""
+
+    CONTROLLER = "controller"
+    LAYER = "layer"
+
+
+class Property(msgspec.Struct, frozen=True):
+    """A named part of an object."""
+
+    name: Name
+    type: Type
+
+
+class ObjectDefinition(msgspec.Struct, frozen=True):
+    """A record type of the robot (`Twist`) or of a library (`Library.Twist`)."""
+
+    name: ScopedName
+    properties: tuple[Property, ...]
+
+
+class EnumRule(msgspec.Struct, frozen=True):
+    """If `condition` (over `Received` data of the source type) is true, the enum has `value`."""
+
+    condition: Expression
+    value: Name
+
+
+class EnumDefinition(msgspec.Struct, frozen=True):
+    """How a received datum becomes one of finitely many names: the first true rule, else `default`."""
+
+    name: ScopedName
+    source: Type
+    values: tuple[Name, ...]
+    rules: tuple[EnumRule, ...]
+    default: Name
+
+
+class Interface(msgspec.Struct, frozen=True):
+    """A middleware type: `Twist` from the ROS package `geometry_msgs`."""
+
+    type: Name
+    package: Name
+
+
+class Communication(msgspec.Struct, frozen=True):
+    """A message, service or action.
+
+    Attributes:
+        name: Its name, unique in the robot.
+        component: The component that declares it.
+        kind: What it is.
+        identifier: Topic, service or action name.
+        request: Type of what the robot's controller sends (incoming message, service, action).
+        response: Type of what comes back (outgoing message, service, action).
+        feedback: Type of an action's feedback.
+        interface: The middleware type, if linked.
+    """
+
+    name: Name
+    component: Name
+    kind: CommunicationKind
+    identifier: Identifier
+    request: Type | None = None
+    response: Type | None = None
+    feedback: Type | None = None
+    interface: Interface | None = None
+
+    def event(self, kind: EventKind) -> str:
+        """The event's name, e.g. `move.request`."""
+        return f"{self.name}.{kind}"
+
+    @property
+    def events(self) -> tuple[str, ...]:
+        """Its events, in the order of `EVENT_KINDS`."""
+        return tuple(self.event(kind) for kind in EVENT_KINDS[self.kind])
+
+    def received_type(self, kind: EventKind) -> Type | None:
+        """Type of the data that an event of `kind` carries to the controller, or None."""
+        return {EventKind.RESPONSE: self.response, EventKind.FEEDBACK: self.feedback}.get(kind)
+
+
+class Variable(msgspec.Struct, frozen=True):
+    """A variable of a behaviour.
+
+    Attributes:
+        name: Its name, unique among the behaviour's states and variables.
+        type: Boolean, integer, double, string or enum.
+        initial: The value it starts at.
+        is_synthesis: Whether it takes part in synthesis (language A.6); else it is code-only.
+    """
+
+    name: Name
+    type: Type
+    initial: Value
+    is_synthesis: bool
+
+
+class State(msgspec.Struct, frozen=True):
+    """A state of a behaviour: a location of the component's automaton."""
+
+    name: Name
+    is_initial: bool
+    is_marked: bool
+
+
+class Update(msgspec.Struct, frozen=True):
+    """`variable := expression`, reading the state before the event."""
+
+    variable: Name
+    expression: Expression
+
+
+class Transition(msgspec.Struct, frozen=True):
+    """A transition of a behaviour.
+
+    Attributes:
+        source: The state it stands in, or None if it stands in every state.
+        event: Event name.
+        guard: Condition of a tau transition, or None.
+        updates: Assignments, all at once.
+        target: State gone to, or None to stay.
+    """
+
+    source: Name | None
+    event: EventName
+    guard: Expression | None
+    updates: tuple[Update, ...]
+    target: Name | None
+
+
+class Behaviour(msgspec.Struct, frozen=True):
+    """The automaton of a component as written."""
+
+    variables: tuple[Variable, ...]
+    states: tuple[State, ...]
+    transitions: tuple[Transition, ...]
+
+    @property
+    def initial(self) -> str:
+        """Name of the initial state."""
+        return next(state.name for state in self.states if state.is_initial)
+
+
+class Component(msgspec.Struct, frozen=True):
+    """A part of the robot; imported ones carry their local name."""
+
+    name: Name
+    behaviour: Behaviour | None = None
+
+
+class RequirementForm(StrEnum):
+    """`R needs E` or `E disables R`."""
+
+    NEEDS = "needs"
+    DISABLES = "disables"
+
+
+class Requirement(msgspec.Struct, frozen=True):
+    """A state-event requirement on the requests of some communications, as written."""
+
+    communications: tuple[Name, ...]
+    form: RequirementForm
+    expression: Expression
+
+    @property
+    def condition(self) -> Expression:
+        """What must be true for a request: E, or `not E` for `disables`."""
+        return self.expression if self.form is RequirementForm.NEEDS else Unary("not", self.expression)
+
+
+class ObjectValue(msgspec.Struct, frozen=True, tag_field="node", tag="object"):
+    """Data given property by property; a missing property keeps the middleware's default."""
+
+    properties: tuple[tuple[Name, "ProvidedValue"], ...]
+
+
+ProvidedValue = ObjectValue | Expression
+
+
+class Provide(msgspec.Struct, frozen=True):
+    """Data for a request: the first statement of a communication whose condition is true."""
+
+    communication: Name
+    value: ProvidedValue
+    condition: Expression | None
+
+
+class Model(msgspec.Struct, frozen=True):
+    """A checked robot."""
+
+    name: Name
+    components: tuple[Component, ...]
+    communications: tuple[Communication, ...]
+    enums: tuple[EnumDefinition, ...]
+    objects: tuple[ObjectDefinition, ...]
+    requirements: tuple[Requirement, ...]
+    provides: tuple[Provide, ...]
+
+    def component(self, name: str) -> Component:
+        """The component called `name` (KeyError if there is none)."""
+        return _named(self.components, name)
+
+    def communication(self, name: str) -> Communication:
+        """The communication called `name` (KeyError if there is none)."""
+        return _named(self.communications, name)
+
+    def enum(self, name: str) -> EnumDefinition:
+        """The enum called `name` (KeyError if there is none)."""
+        return _named(self.enums, name)
+
+    def object(self, name: str) -> ObjectDefinition:
+        """The object type called `name` (KeyError if there is none)."""
+        return _named(self.objects, name)
+
+    def requirements_on(self, communication: str) -> tuple[Requirement, ...]:
+        """The requirements on one communication, in source order."""
+        return tuple(item for item in self.requirements if communication in item.communications)
+
+    def provides_for(self, communication: str) -> tuple[Provide, ...]:
+        """The provide statements of one communication, in source order."""
+        return tuple(item for item in self.provides if item.communication == communication)
+
+    @property
+    def taus(self) -> tuple[str, ...]:
+        """The tau events, in source order."""
+        return tuple(
+            transition.event
+            for component in self.components
+            if component.behaviour
+            for transition in component.behaviour.transitions
+            if is_tau(transition.event)
+        )
+
+
+def is_tau(event: str) -> bool:
+    """Whether an event of the model is a tau event (`<Component>.tau_<n>`)."""
+    return event.rpartition(".")[2].startswith("tau_")
+
+
+def _named[Item: Component | Communication | EnumDefinition | ObjectDefinition](
+    items: tuple[Item, ...], name: str
+) -> Item:
+    for item in items:
+        if item.name == name:
+            return item
+    raise KeyError(name)
+
+
+__all__ = [
+    "CONTROLLABLE_KINDS",
+    "EVENT_KINDS",
+    "Behaviour",
+    "Communication",
+    "CommunicationKind",
+    "Component",
+    "Deployment",
+    "EnumDefinition",
+    "EnumRule",
+    "EventKind",
+    "Interface",
+    "Model",
+    "ObjectDefinition",
+    "ObjectValue",
+    "Property",
+    "Provide",
+    "ProvidedValue",
+    "Requirement",
+    "RequirementForm",
+    "State",
+    "Transition",
+    "Update",
+    "Variable",
+    "is_tau",
+]

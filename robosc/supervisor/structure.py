@@ -1,0 +1,111 @@
+"""The supervisor: one frozen value that holds all that a target or an executor needs.
+
+It is the checked model, the conditions that synthesis adds to controllable events, and the
+certificate of what was checked. Its JSON form (`robosc.supervisor.codec`) is untrusted input.
+"""
+
+from typing import Annotated, Literal
+
+import msgspec
+
+from robosc.expressions import Name
+from robosc.model.structure import Deployment, EventName, Model
+
+FORMAT = "robosc-supervisor"
+FORMAT_VERSION = 1
+
+Digest = Annotated[str, msgspec.Meta(pattern=r"^[0-9a-f]{64}\Z")]
+Count = Annotated[int, msgspec.Meta(ge=0)]
+AutomatonName = Annotated[
+    str, msgspec.Meta(pattern=r"^((service|action|message) )?[A-Za-z_][A-Za-z_0-9]*\Z", max_length=270)
+]
+
+
+class DecisionNode(msgspec.Struct, frozen=True):
+    """A test of one automaton's location or variable.
+
+    Attributes:
+        automaton: Name of the automaton (a component, or `service s`, `action a`).
+        variable: Its variable, or None for its location.
+        starts: Ascending indices into the subject's domain, the first 0: where each branch begins.
+        children: The branch taken from each start up to the next: 0 false, 1 true, n + 2 for node n.
+            A node's children are smaller than its own number, so a diagram has no cycle.
+    """
+
+    automaton: AutomatonName
+    variable: Name | None
+    starts: tuple[Count, ...]
+    children: tuple[Count, ...]
+
+
+class DecisionDiagram(msgspec.Struct, frozen=True):
+    """A state predicate as a shared, ordered decision diagram: its size is bounded where a formula's is not.
+
+    Attributes:
+        nodes: The nodes, children before parents.
+        root: 0 false, 1 true, n + 2 for node n.
+    """
+
+    nodes: tuple[DecisionNode, ...]
+    root: Count
+
+
+class AddedCondition(msgspec.Struct, frozen=True):
+    """What the supervisor adds to a controllable event, simplified against plant, requirements and reachability.
+
+    Events that are not listed get nothing added.
+    """
+
+    event: EventName
+    condition: DecisionDiagram
+
+
+CheckResult = Literal["passed", "not checked"]
+
+
+class Certificate(msgspec.Struct, frozen=True):
+    """What was checked about the supervisor, how, and for which model.
+
+    Attributes:
+        engine_version: Version of RoboSC that synthesized it.
+        bundle_sha256: SHA-256 of the canonical list of every file of the bundle.
+        deployment: The deployment it was made for.
+        method: How it was checked, in words.
+        safe: No reachable bad state, no request against a requirement.
+        controllable: No uncontrollable event that the plant enables is disabled.
+        nonblocking: From every reachable state a marked state stays reachable.
+        maximally_permissive: Nothing more is disabled than needed.
+        states: Reachable states of the controlled system, exact.
+        transitions: Transitions between them, or None where they were not counted.
+    """
+
+    engine_version: str
+    bundle_sha256: Digest
+    deployment: Deployment
+    method: str
+    safe: CheckResult
+    controllable: CheckResult
+    nonblocking: CheckResult
+    maximally_permissive: CheckResult
+    states: str
+    transitions: str | None
+
+
+class Supervisor(msgspec.Struct, frozen=True):
+    """A synthesized supervisor.
+
+    Attributes:
+        model: The checked model (plants, requirements, data).
+        deployment: What it was synthesized for.
+        added: The conditions that synthesis adds, in source order of their events.
+        certificate: What was checked.
+    """
+
+    model: Model
+    deployment: Deployment
+    added: tuple[AddedCondition, ...]
+    certificate: Certificate
+
+    def added_condition(self, event: str) -> DecisionDiagram | None:
+        """The condition added to an event, or None where nothing is added."""
+        return next((item.condition for item in self.added if item.event == event), None)

@@ -1,0 +1,461 @@
+"""Builds and checks the behaviour of a component."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+from robosc.errors import RelatedPlace
+from robosc.expressions import (
+    ArrayType,
+    Constant,
+    DoubleType,
+    EnumType,
+    EnumValue,
+    Expression,
+    NoneType,
+    ObjectType,
+    Type,
+    Value,
+    default_value,
+    type_text,
+)
+from robosc.language import syntax
+from robosc.model.expressions import ExpressionChecker, may_leave
+from robosc.model.findings import Findings
+from robosc.model.scope import ComponentNames, Scope
+from robosc.model.structure import (
+    Behaviour,
+    Communication,
+    CommunicationKind,
+    EventKind,
+    State,
+    Transition,
+    Update,
+    Variable,
+    is_tau,
+)
+from robosc.model.types import Types
+from robosc.model.units import Part, unique
+from robosc.source import Location
+
+_KINDS: dict[CommunicationKind, frozenset[EventKind]] = {
+    CommunicationKind.INCOMING_MESSAGE: frozenset({EventKind.REQUEST}),
+    CommunicationKind.OUTGOING_MESSAGE: frozenset({EventKind.RESPONSE}),
+    CommunicationKind.SERVICE: frozenset({EventKind.REQUEST, EventKind.RESPONSE, EventKind.ERROR}),
+    CommunicationKind.ACTION: frozenset(set(EventKind) - {EventKind.RESET}),
+}
+"""What a behaviour can react to."""
+
+_PREPOSITIONS = {
+    EventKind.REQUEST: "to",
+    EventKind.RESPONSE: "from",
+    EventKind.FEEDBACK: "from",
+    EventKind.ERROR: "from",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class BehaviourTree:
+    """A behaviour as written, sorted into its parts.
+
+    Attributes:
+        part: The component.
+        location: Where the behaviour begins.
+        variables: Its variables.
+        states: Its states.
+        transitions: Every transition in the order of the text, with the state it stands in.
+    """
+
+    part: Part
+    location: Location
+    variables: tuple[syntax.Variable, ...]
+    states: tuple[syntax.State, ...]
+    transitions: tuple[tuple[syntax.State | None, syntax.Transition], ...]
+
+
+def behaviour_tree(part: Part, findings: Findings) -> BehaviourTree | None:
+    """The behaviour of a component, or None; more than one is an error."""
+    found = [item for item in part.tree.items if isinstance(item, syntax.Behaviour)]
+    if not found:
+        return None
+    for other in found[1:]:
+        findings.error(
+            "multiple-behaviours",
+            f"the component '{part.tree.name.text}' has more than one behaviour",
+            other.location,
+            "Merge them into one behaviour, or make a component of each.",
+            RelatedPlace("the first behaviour stands here", found[0].location),
+        )
+    items = found[0].items
+    transitions: list[tuple[syntax.State | None, syntax.Transition]] = []
+    for item in items:
+        if isinstance(item, syntax.State):
+            transitions += [(item, transition) for transition in item.transitions]
+        elif not isinstance(item, syntax.Variable):
+            transitions.append((None, item))
+    return BehaviourTree(
+        part,
+        found[0].location,
+        tuple(item for item in items if isinstance(item, syntax.Variable)),
+        tuple(item for item in items if isinstance(item, syntax.State)),
+        tuple(transitions),
+    )
+
+
+def component_names(part: Part, tree: BehaviourTree | None, types: Types, findings: Findings) -> ComponentNames:
+    """What can be read of a component; reports names that are given twice and types no variable can have."""
+    if tree is None:
+        return ComponentNames(part.name, frozenset(), {})
+    _unique_names(tree, findings)
+    variables: dict[str, Type | None] = {}
+    for variable in tree.variables:
+        variables.setdefault(variable.name.text, _variable_type(variable, part, types, findings))
+    return ComponentNames(part.name, frozenset(state.name.text for state in tree.states), variables)
+
+
+def _unique_names(tree: BehaviourTree, findings: Findings) -> None:
+    unique([state.name for state in tree.states], "duplicate-state", "state", findings)
+    unique([variable.name for variable in tree.variables], "duplicate-variable", "variable", findings)
+    states = {state.name.text.casefold(): state.name for state in tree.states}
+    for variable in tree.variables:
+        state = states.get(variable.name.text.casefold())
+        if state is not None:
+            findings.error(
+                "duplicate-variable",
+                f"'{variable.name.text}' is the name of a state too",
+                variable.name.location,
+                "Rename the variable or the state.",
+                RelatedPlace("the state stands here", state.location),
+            )
+
+
+def _variable_type(variable: syntax.Variable, part: Part, types: Types, findings: Findings) -> Type | None:
+    if isinstance(variable.type, syntax.ArrayType):
+        # A sharper word than 'arrays only inside objects': no variable can hold one at all.
+        _no_object_variable(variable, findings)
+        return None
+    found = types.resolve(variable.type, part.unit)
+    if isinstance(found, ObjectType | ArrayType | NoneType):
+        _no_object_variable(variable, findings)
+        return None
+    return found
+
+
+def _no_object_variable(variable: syntax.Variable, findings: Findings) -> None:
+    findings.error(
+        "object-variable",
+        f"the variable '{variable.name.text}' cannot hold an object, an array or nothing",
+        variable.type.location,
+        "Make a variable of each property that is needed.",
+    )
+
+
+class BehaviourBuilder:
+    """Builds one behaviour.
+
+    Args:
+        tree: The behaviour as written.
+        scope: Names in it.
+        communications: Every communication of the robot by name.
+        defaults: For each enum type the default value of an uninitialised variable.
+        findings: Where faults are reported.
+        unknown_communication: Called for a name that no communication has.
+    """
+
+    def __init__(
+        self,
+        tree: BehaviourTree,
+        scope: Scope,
+        communications: Mapping[str, Communication],
+        defaults: Mapping[str, str],
+        findings: Findings,
+        unknown_communication: Callable[[syntax.Name], None],
+    ) -> None:
+        self._tree = tree
+        self._scope = scope
+        self._communications = communications
+        self._defaults = defaults
+        self._findings = findings
+        self._unknown_communication = unknown_communication
+        self._taus = 0
+
+    def build(self) -> Behaviour:
+        """The behaviour, as far as it is sound; every variable still counted as code-only."""
+        states = self._states()
+        variables = tuple(self._variables())
+        transitions = tuple(self._transitions())
+        behaviour = Behaviour(variables, states, transitions)
+        self._check_graph(behaviour)
+        self._check_determinism()
+        return behaviour
+
+    # States and variables
+
+    def _states(self) -> tuple[State, ...]:
+        initial = [state for state in self._tree.states if state.is_initial]
+        component = self._tree.part.tree.name.text
+        if not initial:
+            self._findings.error(
+                "no-initial-state",
+                f"the behaviour of '{component}' has no initial state",
+                self._tree.location,
+                "Write 'initial' before one of its states.",
+            )
+        for other in initial[1:]:
+            self._findings.error(
+                "multiple-initial-states",
+                f"the behaviour of '{component}' has more than one initial state",
+                other.name.location,
+                "Keep 'initial' before one state only.",
+                RelatedPlace("the first initial state stands here", initial[0].name.location),
+            )
+        return tuple(State(state.name.text, state.is_initial, state.is_marked) for state in self._tree.states)
+
+    def _variables(self) -> Iterator[Variable]:
+        for tree in self._tree.variables:
+            type_ = self._scope.own.variables.get(tree.name.text) if self._scope.own else None
+            if type_ is not None:
+                yield Variable(tree.name.text, type_, self._initial(tree, type_), is_synthesis=False)
+
+    def _initial(self, tree: syntax.Variable, type_: Type) -> Value:
+        default = default_value(type_, self._defaults.get(type_.name) if isinstance(type_, EnumType) else None)
+        if tree.initial is None:
+            return default
+        # Only literals and enum values can stand here, so no component or variable is in sight.
+        checker = ExpressionChecker(Scope(self._scope.types, {}, self._scope.enums), self._findings)
+        typed = checker.fitting(tree.initial, type_)
+        if typed is None or not isinstance(typed.expression, Constant | EnumValue):
+            return default
+        if may_leave(typed.type, type_):
+            self._findings.error(
+                "type-mismatch",
+                f"the initial value lies outside {type_text(type_)}",
+                tree.initial.location,
+                "Start with a value of the range.",
+            )
+            return default
+        value = typed.expression.value
+        return float(value) if isinstance(type_, DoubleType) else value
+
+    # Transitions
+
+    def _transitions(self) -> Iterator[Transition]:
+        for state, tree in self._tree.transitions:
+            source = None if state is None else state.name.text
+            target = self._target(tree.target)
+            if isinstance(tree, syntax.TauTransition):
+                self._taus += 1
+                event = f"{self._tree.part.name}.tau_{self._taus}"
+                guard = None if tree.guard is None else self._checker(None).condition(tree.guard)
+                yield Transition(source, event, guard, (), target)
+                continue
+            found = self._event(tree)
+            if found is not None:
+                communication, kind = found
+                updates = self._updates(tree, communication, kind)
+                yield Transition(source, communication.event(kind), None, updates, target)
+
+    def _checker(self, received: Type | None) -> ExpressionChecker:
+        return ExpressionChecker(self._scope.with_received(received), self._findings)
+
+    def _target(self, name: syntax.Name | None) -> str | None:
+        if name is None:
+            return None
+        states = [state.name.text for state in self._tree.states]
+        if name.text not in states:
+            self._findings.unknown("state", name.text, name.location, states)
+            return None
+        return name.text
+
+    def _event(self, tree: syntax.CommunicationTransition) -> tuple[Communication, EventKind] | None:
+        communication = self._communications.get(tree.communication.text)
+        if communication is None:
+            self._unknown_communication(tree.communication)
+            return None
+        kind = EventKind(tree.kind)
+        if kind not in _KINDS[communication.kind]:
+            allowed = ", ".join(item for item in EventKind if item in _KINDS[communication.kind])
+            self._findings.error(
+                "wrong-result-kind",
+                f"{_article(communication.kind)} has no {kind}; it has {allowed}",
+                tree.location,
+                f"Use {allowed}.",
+            )
+            return None
+        preposition = _PREPOSITIONS.get(kind)
+        if preposition is not None and tree.preposition.text != preposition:
+            self._findings.warning(
+                "wrong-preposition",
+                f"'{kind}' goes with '{preposition}'",
+                tree.preposition.location,
+                f"Write 'on {kind} {preposition} {communication.name}'.",
+            )
+        return communication, kind
+
+    def _updates(
+        self, tree: syntax.CommunicationTransition, communication: Communication, kind: EventKind
+    ) -> tuple[Update, ...]:
+        if tree.updates and communication.kind is CommunicationKind.INCOMING_MESSAGE:
+            self._findings.error(
+                "update-on-incoming",
+                "a request of an incoming message can update nothing",
+                tree.updates[0].target.location,
+                "Update on something that is received, or use a service.",
+            )
+        checker = self._checker(communication.received_type(kind))
+        updates: dict[str, Update] = {}
+        places: dict[str, Location] = {}
+        for update in tree.updates:
+            name = self._updated(update.target)
+            if name is None:
+                continue
+            if name in places:
+                self._findings.error(
+                    "duplicate-assignment",
+                    f"'{name}' is assigned twice in one transition",
+                    update.target.location,
+                    "Keep one of the assignments: all of them happen at once.",
+                    RelatedPlace("it is assigned here first", places[name]),
+                )
+                continue
+            places[name] = update.target.location
+            expression = self._assigned(update, name, checker)
+            if expression is not None:
+                updates[name] = Update(name, expression)
+        return tuple(updates.values())
+
+    def _updated(self, access: syntax.Access) -> str | None:
+        """The variable of this behaviour that an access names: `v` or `OwnComponent.v`."""
+        own = self._scope.own
+        names = [access.root, *access.steps]
+        if access.root is not None and len(names) == 2 and own is not None:
+            component = self._scope.components.get(access.root.text)
+            if component is not None and component.name == own.name:
+                names = names[1:]
+        name = names[0]
+        if own is None or len(names) != 1 or not isinstance(name, syntax.Name) or name.text not in own.variables:
+            known = own.variables if own else {}
+            wanted = name.text if isinstance(name, syntax.Name) and len(names) == 1 else "this"
+            self._findings.error(
+                "update-out-of-scope",
+                f"'{wanted}' is no variable of this behaviour",
+                access.location,
+                "Assign a variable of this behaviour" + (f": {', '.join(sorted(known))}." if known else "."),
+            )
+            return None
+        return name.text
+
+    def _assigned(self, update: syntax.Update, name: str, checker: ExpressionChecker) -> Expression | None:
+        type_ = self._scope.own.variables[name] if self._scope.own else None
+        if type_ is None:
+            checker.infer(update.value)
+            return None
+        typed = checker.fitting(update.value, type_)
+        if typed is None:
+            return None
+        if may_leave(typed.type, type_):
+            self._findings.warning(
+                "may-leave-range",
+                f"the value can leave the range of '{name}', {type_text(type_)}",
+                update.value.location,
+                "Widen the range of the variable, or narrow what is assigned.",
+            )
+        return typed.expression
+
+    # Rules about the whole
+
+    def _check_graph(self, behaviour: Behaviour) -> None:
+        """From every reachable state a marked state must be reachable."""
+        steps: dict[str, set[str]] = {state.name: set() for state in behaviour.states}
+        for transition in behaviour.transitions:
+            for source in steps if transition.source is None else (transition.source,):
+                steps[source].add(transition.target or source)
+        initial = [state.name for state in behaviour.states if state.is_initial]
+        reachable = closure(initial[:1], steps)
+        backwards: dict[str, set[str]] = {name: set() for name in steps}
+        for source, targets in steps.items():
+            for target in targets:
+                backwards[target].add(source)
+        coreachable = closure([state.name for state in behaviour.states if state.is_marked], backwards)
+        for tree in self._tree.states:
+            name = tree.name.text
+            if name in reachable and name not in coreachable:
+                self._findings.error(
+                    "marked-unreachable",
+                    f"from the state '{name}' no marked state can be reached",
+                    tree.name.location,
+                    "Mark the states in which the component may rest, or add a way back to one.",
+                )
+
+    def _check_determinism(self) -> None:
+        """Two transitions on one event in one state."""
+        everywhere: dict[str, syntax.CommunicationTransition] = {}
+        found: dict[tuple[str | None, str], syntax.CommunicationTransition] = {}
+        for state, tree in self._tree.transitions:
+            if isinstance(tree, syntax.TauTransition):
+                continue
+            event = f"{tree.kind} {tree.communication.text}"
+            key = (state.name.text if state else None, event)
+            other = found.get(key)
+            if other is not None:
+                self._nondeterministic(tree, other)
+            found.setdefault(key, tree)
+            if state is None:
+                everywhere.setdefault(event, tree)
+        for (state_name, event), tree in found.items():
+            if state_name is not None and event in everywhere:
+                self._nondeterministic(tree, everywhere[event])
+
+    def _nondeterministic(self, tree: syntax.CommunicationTransition, other: syntax.CommunicationTransition) -> None:
+        related = RelatedPlace("the other transition stands here", other.location)
+        message = f"two transitions react to {tree.kind} of '{tree.communication.text}' in one state"
+        if tree.kind in (EventKind.REQUEST, EventKind.CANCEL):
+            self._findings.error(
+                "nondeterministic-request", message, tree.location, "Keep one of the transitions.", related
+            )
+        else:
+            self._findings.warning(
+                "nondeterministic-event",
+                f"{message}: synthesis counts both, at run time the state's own comes first",
+                tree.location,
+                "Keep one of the transitions.",
+                related,
+            )
+
+
+def closure(start: list[str], steps: Mapping[str, set[str]]) -> set[str]:
+    """Everything that can be reached."""
+    found, frontier = set(start), list(start)
+    while frontier:
+        for target in steps[frontier.pop()]:
+            if target not in found:
+                found.add(target)
+                frontier.append(target)
+    return found
+
+
+def partial_updates(tree: BehaviourTree, behaviour: Behaviour, findings: Findings) -> None:
+    """Note code-only variables that a communication updates in some states but not in others."""
+    code_only = {variable.name for variable in behaviour.variables if not variable.is_synthesis}
+    states = {state.name for state in behaviour.states}
+    updated: dict[tuple[str, str], set[str]] = {}
+    for transition in behaviour.transitions:
+        if is_tau(transition.event):
+            continue
+        for update in transition.updates:
+            if update.variable in code_only:
+                sources = states if transition.source is None else {transition.source}
+                updated.setdefault((update.variable, transition.event), set()).update(sources)
+    places = {variable.name.text: variable.name.location for variable in tree.variables}
+    for (variable, event), sources in updated.items():
+        missing = sorted(states - sources)
+        if missing:
+            findings.note(
+                "partial-update",
+                f"'{variable}' is updated on {event} only in some states, not in {', '.join(missing)}: it can be stale",
+                places[variable],
+                "Write the update in the behaviour itself, outside the states, if it should always happen.",
+            )
+
+
+def _article(text: str) -> str:
+    return f"{'an' if text[0] in 'aeiou' else 'a'} {text}"

@@ -1,0 +1,314 @@
+"""From a bundle to the checked model: every name bound, every type known, every rule of part A applied."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from robosc.errors import Diagnostic, InternalError, LanguageError, RelatedPlace, Severity, sorted_diagnostics
+from robosc.expressions import EnumType, StateTest, conjuncts
+from robosc.language import parse, syntax
+from robosc.model.behaviour import (
+    BehaviourBuilder,
+    BehaviourTree,
+    behaviour_tree,
+    component_names,
+    partial_updates,
+)
+from robosc.model.communications import (
+    CommunicationTree,
+    build_communication,
+    check_topics,
+    communication_trees,
+)
+from robosc.model.expressions import ExpressionChecker
+from robosc.model.findings import Findings
+from robosc.model.places import Places
+from robosc.model.requirements import ProvideBuilder, build_requirement
+from robosc.model.scope import ComponentNames, Scope
+from robosc.model.structure import (
+    Behaviour,
+    Communication,
+    CommunicationKind,
+    Component,
+    EnumDefinition,
+    EnumRule,
+    Model,
+    Provide,
+    Requirement,
+)
+from robosc.model.synthesis_variables import check_synthesis_variables, mark_synthesis_variables
+from robosc.model.types import Types
+from robosc.model.units import Libraries, Part, Unit, make_unit, parts_of
+from robosc.source import Bundle
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """What became of a bundle.
+
+    Attributes:
+        model: The robot, or None if there are errors or the main file is a library.
+        diagnostics: Every finding, sorted by place.
+        places: Where the parts of the model stand, or None without a model.
+    """
+
+    model: Model | None
+    diagnostics: tuple[Diagnostic, ...]
+    places: Places | None = None
+
+    @property
+    def has_errors(self) -> bool:
+        """Whether any finding is an error."""
+        return any(item.severity is Severity.ERROR for item in self.diagnostics)
+
+    def model_or_raise(self) -> Model:
+        """The model.
+
+        Raises:
+            LanguageError: There is none; it carries the findings.
+        """
+        if self.model is None:
+            raise LanguageError(self.diagnostics)
+        return self.model
+
+
+def check(bundle: Bundle) -> Checked:
+    """Check the main file of a bundle with the libraries that it imports from; never raises for any text."""
+    parsed = parse(bundle.main)
+    if parsed.tree is None:
+        return Checked(None, parsed.diagnostics)
+    findings = Findings()
+    checker = _RobotChecker(parsed.tree, bundle, findings)
+    model = checker.model()
+    diagnostics = sorted_diagnostics(findings.diagnostics)
+    if findings.has_errors or parsed.tree.is_library:
+        return Checked(None, diagnostics)
+    if model is None:
+        raise InternalError("a model without errors could not be built")
+    return Checked(model, diagnostics, checker.places)
+
+
+class _RobotChecker:
+    """Checks one robot; a library is checked as if it were a robot of its own components."""
+
+    def __init__(self, tree: syntax.File, bundle: Bundle, findings: Findings) -> None:
+        self._tree = tree
+        self._findings = findings
+        self._types = Types(findings)
+        self._unit = make_unit(tree, findings)
+        self._parts = parts_of(self._unit, Libraries(bundle, findings), findings)
+        self.places = Places(tree.name.location)
+
+    def model(self) -> Model | None:
+        """The model, or None where it cannot be built."""
+        self._resolve_own_types()
+        trees = communication_trees(self._parts, self._findings)
+        communications = self._communications(trees)
+        behaviour_trees = {part.name: behaviour_tree(part, self._findings) for part in self._parts}
+        names = {
+            part.name: component_names(part, behaviour_trees[part.name], self._types, self._findings)
+            for part in self._parts
+        }
+        enums = self._enums()
+        behaviours = self._behaviours(behaviour_trees, names, communications)
+        checker = ExpressionChecker(self._scope(self._unit, names, imported=True), self._findings)
+        requirements, provides = self._restrictions(checker, communications)
+        marked = mark_synthesis_variables(behaviours, requirements, provides)
+        for name, behaviour in marked.items():
+            tree = behaviour_trees[name]
+            if tree is not None:
+                check_synthesis_variables(tree, behaviour, communications, self._types, self._findings)
+                partial_updates(tree, behaviour, self._findings)
+        self._check_requests(communications, marked, requirements)
+        self._check_empty(communications)
+        if self._findings.has_errors:
+            return None
+        return Model(
+            name=self._tree.name.text,
+            components=tuple(Component(part.name, marked.get(part.name)) for part in self._parts),
+            communications=tuple(communications.values()),
+            enums=enums,
+            objects=tuple(self._types.objects.values()),
+            requirements=requirements,
+            provides=provides,
+        )
+
+    def _resolve_own_types(self) -> None:
+        """Every type of the file itself, used or not, so that its faults are found."""
+        for item in self._tree.items:
+            if isinstance(item, syntax.ObjectDefinition | syntax.EnumDefinition):
+                self._types.named(item.name, self._unit)
+
+    def _communications(self, trees: Iterable[CommunicationTree]) -> dict[str, Communication]:
+        found: dict[str, Communication] = {}
+        for item in trees:
+            communication = build_communication(item, self._types, self._findings)
+            if communication is not None and communication.name not in found:
+                found[communication.name] = communication
+                self.places.communications[communication.name] = item.location
+        self._broken = {item.tree.name.text for item in trees} - found.keys()
+        check_topics(found.values(), self.places.communications, self._types, self._findings)
+        return found
+
+    # Names
+
+    def _scope(
+        self, unit: Unit, names: Mapping[str, ComponentNames], *, imported: bool = False, own: str | None = None
+    ) -> Scope:
+        """The names of a file: its components as it calls them, the values of its enums."""
+        components: dict[str, ComponentNames] = {}
+        for part in self._parts:
+            if unit is self._unit:
+                components[part.name] = names[part.name]
+            elif part.unit is unit:
+                components.setdefault(part.tree.name.text, names[part.name])
+        if own is not None:
+            # Inside its own behaviour a component is always itself, whatever else was imported under its name.
+            part = next(part for part in self._parts if part.name == own)
+            components[part.tree.name.text] = names[own]
+        enums: dict[str, EnumType] = {}
+        for key, (enum, home, tree) in self._types.enums.items():
+            if home is unit:
+                enums[tree.name.text] = enum
+            elif imported:
+                enums.setdefault(key, enum)
+        return Scope(self._types, components, enums, names.get(own) if own else None)
+
+    def _enums(self) -> tuple[EnumDefinition, ...]:
+        """The definition of every enum, its rules resolved."""
+        found = []
+        for key, (enum, _, tree) in list(self._types.enums.items()):
+            scope = Scope(self._types, {}, {}, None, self._types.sources[key])
+            checker = ExpressionChecker(scope, self._findings)
+            rules = []
+            for rule in tree.rules:
+                condition = None if rule.condition is None else checker.condition(rule.condition)
+                if condition is not None:
+                    rules.append(EnumRule(condition, rule.value.text))
+            default = next((rule.value.text for rule in tree.rules if rule.condition is None), None)
+            if default is not None:
+                found.append(EnumDefinition(key, self._types.sources[key], enum.values, tuple(rules), default))
+        return tuple(found)
+
+    # Behaviours
+
+    def _behaviours(
+        self,
+        trees: Mapping[str, BehaviourTree | None],
+        names: Mapping[str, ComponentNames],
+        communications: Mapping[str, Communication],
+    ) -> dict[str, Behaviour]:
+        defaults = {
+            key: next((rule.value.text for rule in tree.rules if rule.condition is None), enum.values[-1])
+            for key, (enum, _, tree) in self._types.enums.items()
+            if enum.values
+        }
+        found: dict[str, Behaviour] = {}
+        for part in self._parts:
+            self.places.components[part.name] = part.place
+            tree = trees[part.name]
+            if tree is None:
+                continue
+            imported = part.unit is self._unit
+            scope = self._scope(part.unit, names, imported=imported, own=part.name)
+            builder = BehaviourBuilder(
+                tree, scope, communications, defaults, self._findings, self._unknown_communication(part, communications)
+            )
+            found[part.name] = builder.build()
+            self._place_behaviour(tree)
+        return found
+
+    def _place_behaviour(self, tree: BehaviourTree) -> None:
+        name = tree.part.name
+        self.places.states.update({(name, state.name.text): state.name.location for state in tree.states})
+        self.places.variables.update({(name, item.name.text): item.name.location for item in tree.variables})
+        self.places.transitions[name] = tuple(transition.location for _, transition in tree.transitions)
+
+    def _unknown_communication(self, part: Part, communications: Mapping[str, Communication]) -> "_Unknown":
+        return _Unknown(part, self._unit, communications, self._broken, self._findings)
+
+    # Requirements and data
+
+    def _restrictions(
+        self, checker: ExpressionChecker, communications: Mapping[str, Communication]
+    ) -> tuple[tuple[Requirement, ...], tuple[Provide, ...]]:
+        requirements: list[Requirement] = []
+        provides: list[Provide] = []
+        builder = ProvideBuilder(checker, self._types, self._findings)
+        for item in self._tree.items:
+            if isinstance(item, syntax.Requirement):
+                requirement = build_requirement(item, checker, communications, self._findings)
+                if requirement is not None:
+                    requirements.append(requirement)
+                    self.places.requirements.append(item.location)
+            elif isinstance(item, syntax.Provide):
+                provide = builder.build(item, communications)
+                if provide is not None:
+                    provides.append(provide)
+                    self.places.provides.append(item.location)
+        return tuple(requirements), tuple(provides)
+
+    def _check_requests(
+        self,
+        communications: Mapping[str, Communication],
+        behaviours: Mapping[str, Behaviour],
+        requirements: Iterable[Requirement],
+    ) -> None:
+        """Note an action whose own request makes one of its requirements false."""
+        for place, requirement in zip(self.places.requirements, requirements, strict=True):
+            for name in requirement.communications:
+                if communications[name].kind is CommunicationKind.ACTION:
+                    left = _left_by_request(name, requirement, behaviours)
+                    if left is not None:
+                        self._findings.note(
+                            "request-leaves-requirement",
+                            f"the request of '{name}' itself leaves {left}, so this requirement never cancels it",
+                            place,
+                            "Nothing needs mending if that is meant.",
+                        )
+
+    def _check_empty(self, communications: Mapping[str, Communication]) -> None:
+        if not communications and not self._findings.has_errors:
+            self._findings.warning(
+                "empty-model",
+                f"'{self._tree.name.text}' has no communication: there is nothing to synthesize",
+                self._tree.name.location,
+                "Add components with messages, services or actions.",
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class _Unknown:
+    """Reports a communication that a behaviour names and nobody has."""
+
+    part: Part
+    robot: Unit
+    communications: Mapping[str, Communication]
+    broken: set[str]
+    findings: Findings
+
+    def __call__(self, name: syntax.Name) -> None:
+        if name.text in self.broken:
+            return  # It exists, but what is wrong with it has been reported already.
+        if self.part.unit is self.robot:
+            self.findings.unknown("communication", name.text, name.location, self.communications)
+            return
+        self.findings.error(
+            "unknown-name",
+            f"the imported component '{self.part.tree.name.text}' reacts to '{name.text}', which is not imported",
+            self.part.place,
+            f"Import the component of '{self.part.unit.tree.name.text}' that has '{name.text}' too.",
+            RelatedPlace(f"'{name.text}' is named here", name.location),
+        )
+
+
+def _left_by_request(action: str, requirement: Requirement, behaviours: Mapping[str, Behaviour]) -> str | None:
+    """The state that a requirement names as a conjunct and that the action's own request leaves."""
+    for conjunct in conjuncts(requirement.condition):
+        if not isinstance(conjunct, StateTest) or conjunct.component not in behaviours:
+            continue
+        for transition in behaviours[conjunct.component].transitions:
+            leaves_it = transition.target not in (None, conjunct.state)
+            stands_there = transition.source in (None, conjunct.state)
+            if transition.event == f"{action}.request" and stands_there and leaves_it:
+                return f"'{conjunct.component}.{conjunct.state}'"
+    return None

@@ -1,0 +1,169 @@
+"""Builds and checks the communications of a robot, and what crosses the middleware (language A.5)."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from robosc.errors import RelatedPlace
+from robosc.expressions import BooleanType, DoubleType, EnumType, IntegerType, NoneType, ObjectType, StringType, Type
+from robosc.language import syntax
+from robosc.model.findings import Findings
+from robosc.model.structure import Communication, CommunicationKind, Interface
+from robosc.model.types import Types
+from robosc.model.units import Part, unique
+from robosc.source import Location
+
+STANDARD_INTERFACES: dict[type, str] = {
+    NoneType: "Empty",
+    BooleanType: "Bool",
+    StringType: "String",
+    IntegerType: "Int16",
+    DoubleType: "Float32",
+}
+"""Types of std_msgs that basic types become without `links`."""
+
+_DIRECTIONS = {
+    syntax.Direction.INCOMING: CommunicationKind.INCOMING_MESSAGE,
+    syntax.Direction.OUTGOING: CommunicationKind.OUTGOING_MESSAGE,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class CommunicationTree:
+    """A communication as written, and the component that it belongs to."""
+
+    part: Part
+    tree: syntax.Communication
+
+    @property
+    def location(self) -> Location:
+        """Where the robot's text speaks of it: its own name, or the import that brings it."""
+        return self.part.place if self.part.is_imported else self.tree.name.location
+
+
+def communication_trees(parts: Sequence[Part], findings: Findings) -> tuple[CommunicationTree, ...]:
+    """Every communication in source order; reports names that are given twice."""
+    trees = [
+        CommunicationTree(part, item)
+        for part in parts
+        for item in part.tree.items
+        if not isinstance(item, syntax.Behaviour)
+    ]
+    names = [syntax.Name(item.tree.name.text, item.location) for item in trees]
+    unique(names, "duplicate-communication", "communication", findings)
+    return tuple(trees)
+
+
+def build_communication(item: CommunicationTree, types: Types, findings: Findings) -> Communication | None:
+    """A communication of the model, or None where a type of it is broken."""
+    tree, part = item.tree, item.part
+    link = _interface(tree.link, part, findings)
+    parts: dict[str, syntax.Type] = {}
+    match tree:
+        case syntax.Message(direction=direction, type=type_):
+            kind = _DIRECTIONS[direction]
+            parts["request" if kind is CommunicationKind.INCOMING_MESSAGE else "response"] = type_
+        case syntax.Service(request=request, response=response):
+            kind = CommunicationKind.SERVICE
+            parts |= {"request": request, "response": response}
+        case syntax.Action(request=request, response=response, feedback=feedback):
+            kind = CommunicationKind.ACTION
+            parts |= {"request": request, "response": response, "feedback": feedback}
+    resolved = {name: types.resolve(type_, part.unit) for name, type_ in parts.items()}
+    for name, type_tree in parts.items():
+        _check_link(tree, kind, resolved[name], type_tree, types, findings)
+    if any(type_ is None for type_ in resolved.values()):
+        return None
+    identifier = tree.identifier.value if tree.identifier else tree.name.text
+    if not 0 < len(identifier) <= 255:
+        findings.error(
+            "name-too-long" if identifier else "invalid-identifier",
+            "the identifier is empty" if not identifier else "the identifier has more than 255 characters",
+            tree.identifier.location if tree.identifier else tree.name.location,
+            "Write the name of the topic, service or action.",
+        )
+        return None
+    return Communication(
+        name=tree.name.text,
+        component=part.name,
+        kind=kind,
+        identifier=identifier,
+        request=resolved.get("request"),
+        response=resolved.get("response"),
+        feedback=resolved.get("feedback"),
+        interface=link,
+    )
+
+
+def _interface(link: syntax.Name | None, part: Part, findings: Findings) -> Interface | None:
+    if link is None:
+        return None
+    found = part.unit.interfaces.get(link.text)
+    if found is None:
+        findings.unknown("interface", link.text, link.location, part.unit.interfaces)
+        return None
+    return Interface(found.type.text, found.package.text)
+
+
+def _check_link(
+    tree: syntax.Communication,
+    kind: CommunicationKind,
+    type_: Type | None,
+    type_tree: syntax.Type,
+    types: Types,
+    findings: Findings,
+) -> None:
+    """Objects, enums made from objects, services and actions need `links`."""
+    if tree.link is not None or type_ is None:
+        return
+    crossing = types.sources[type_.name] if isinstance(type_, EnumType) else type_
+    if kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION):
+        reason = f"the {kind} '{tree.name.text}'"
+    elif isinstance(crossing, ObjectType):
+        reason = "an enum made from an object" if isinstance(type_, EnumType) else "an object"
+    else:
+        return
+    findings.error(
+        "links-required",
+        f"{reason} needs a middleware type",
+        type_tree.location,
+        "Define 'interface x use Type from ros_package' and write 'links x'.",
+    )
+
+
+def middleware_type(communication: Communication, types: Types) -> str:
+    """The middleware type that crosses, as `package/Type`."""
+    if communication.interface is not None:
+        return f"{communication.interface.package}/{communication.interface.type}"
+    type_ = communication.request if communication.request is not None else communication.response
+    crossing = types.sources[type_.name] if isinstance(type_, EnumType) else type_
+    return f"std_msgs/{STANDARD_INTERFACES.get(type(crossing), 'Empty')}"
+
+
+def check_topics(
+    communications: Iterable[Communication], places: dict[str, Location], types: Types, findings: Findings
+) -> None:
+    """Who shares an identifier: one middleware type on each, and one component that publishes on it."""
+    first: dict[tuple[bool, str], Communication] = {}
+    for item in communications:
+        is_topic = item.kind in (CommunicationKind.INCOMING_MESSAGE, CommunicationKind.OUTGOING_MESSAGE)
+        if not is_topic:
+            continue
+        other = first.setdefault((True, item.identifier), item)
+        if other is not item and middleware_type(other, types) != middleware_type(item, types):
+            findings.warning(
+                "conflicting-topic",
+                f"'{item.identifier}' carries {middleware_type(other, types)} and {middleware_type(item, types)}",
+                places[item.name],
+                "Use one middleware type on one identifier; nothing can be generated otherwise.",
+                RelatedPlace("the other type is used here", places[other.name]),
+            )
+        if item.kind is CommunicationKind.OUTGOING_MESSAGE:
+            speaker = first.setdefault((False, item.identifier), item)
+            if speaker.component != item.component:
+                findings.warning(
+                    "shared-topic",
+                    f"'{item.component}' and '{speaker.component}' both publish on '{item.identifier}'",
+                    places[item.name],
+                    "Give each its own identifier: a receiver cannot tell who spoke.",
+                    RelatedPlace("the other one is here", places[speaker.name]),
+                )

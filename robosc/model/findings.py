@@ -1,0 +1,51 @@
+"""Collects what the checks find."""
+
+import difflib
+from collections.abc import Iterable
+
+from robosc.errors import Diagnostic, RelatedPlace, Severity
+from robosc.source import Location
+
+
+class Findings:
+    """A growing list of diagnostics: the one thing that the checks share and add to."""
+
+    def __init__(self) -> None:
+        self.diagnostics: list[Diagnostic] = []
+
+    def error(self, code: str, message: str, location: Location, mend: str, *related: RelatedPlace) -> None:
+        """Add an error."""
+        self.diagnostics.append(Diagnostic(Severity.ERROR, code, message, location, mend, related))
+
+    def warning(self, code: str, message: str, location: Location, mend: str, *related: RelatedPlace) -> None:
+        """Add a warning."""
+        self.diagnostics.append(Diagnostic(Severity.WARNING, code, message, location, mend, related))
+
+    def note(self, code: str, message: str, location: Location, mend: str, *related: RelatedPlace) -> None:
+        """Add a note."""
+        self.diagnostics.append(Diagnostic(Severity.NOTE, code, message, location, mend, related))
+
+    def unknown(self, what: str, name: str, location: Location, known: Iterable[str], mend: str = "") -> None:
+        """Add an `unknown-name` error with the nearest known name, if one is near."""
+        near = did_you_mean(name, known)
+        self.error(
+            "unknown-name",
+            f"unknown {what} '{name}'" + (f"; did you mean '{near}'?" if near else ""),
+            location,
+            mend or (f"Write '{near}'." if near else f"Define the {what} '{name}' or use one that exists."),
+        )
+
+    @property
+    def has_errors(self) -> bool:
+        """Whether any finding is an error."""
+        return any(item.severity is Severity.ERROR for item in self.diagnostics)
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str | None:
+    """The known name nearest to a misspelt one, or None."""
+    names = sorted(set(known))
+    folded = {item.casefold(): item for item in names}
+    if name.casefold() in folded:
+        return folded[name.casefold()]
+    near = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.7)
+    return folded[near[0]] if near else None

@@ -1,0 +1,30 @@
+"""Where in the text the parts of a checked model stand, for findings of later stages."""
+
+from dataclasses import dataclass, field
+
+from robosc.source import Location
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Locations by the names of the model; lists follow the model's own order.
+
+    Attributes:
+        robot: The robot's name.
+        components: By name.
+        communications: By name.
+        states: By component and state.
+        variables: By component and variable.
+        transitions: By component, in the order of its behaviour's transitions.
+        requirements: In the order of the model's requirements.
+        provides: In the order of the model's provide statements.
+    """
+
+    robot: Location
+    components: dict[str, Location] = field(default_factory=dict)
+    communications: dict[str, Location] = field(default_factory=dict)
+    states: dict[tuple[str, str], Location] = field(default_factory=dict)
+    variables: dict[tuple[str, str], Location] = field(default_factory=dict)
+    transitions: dict[str, tuple[Location, ...]] = field(default_factory=dict)
+    requirements: list[Location] = field(default_factory=list)
+    provides: list[Location] = field(default_factory=list)

@@ -1,0 +1,139 @@
+"""Builds and checks requirements and provided data."""
+
+from collections.abc import Iterator, Mapping
+
+from robosc.expressions import EnumType, NoneType, ObjectType, Type, type_text
+from robosc.language import syntax
+from robosc.model.expressions import ExpressionChecker, may_leave
+from robosc.model.findings import Findings
+from robosc.model.structure import (
+    Communication,
+    CommunicationKind,
+    ObjectValue,
+    Provide,
+    ProvidedValue,
+    Requirement,
+    RequirementForm,
+)
+from robosc.model.types import Types
+from robosc.model.units import unique
+
+
+def build_requirement(
+    tree: syntax.Requirement,
+    checker: ExpressionChecker,
+    communications: Mapping[str, Communication],
+    findings: Findings,
+) -> Requirement | None:
+    """A requirement of the model, or None where it is broken."""
+    names = list(_restricted(tree, communications, findings))
+    expression = checker.condition(tree.expression)
+    if expression is None or len(names) < len(tree.communications):
+        return None
+    form = RequirementForm.DISABLES if tree.disables else RequirementForm.NEEDS
+    return Requirement(tuple(dict.fromkeys(names)), form, expression)
+
+
+def _restricted(
+    tree: syntax.Requirement, communications: Mapping[str, Communication], findings: Findings
+) -> Iterator[str]:
+    for name in tree.communications:
+        communication = communications.get(name.text)
+        if communication is None:
+            findings.unknown("communication", name.text, name.location, communications)
+        elif communication.kind is CommunicationKind.OUTGOING_MESSAGE:
+            findings.error(
+                "requirement-on-outgoing",
+                f"'{name.text}' is an outgoing message: a component sends it, nobody can forbid it",
+                name.location,
+                "Restrict an incoming message, a service or an action.",
+            )
+        else:
+            yield name.text
+
+
+class ProvideBuilder:
+    """Builds provide statements.
+
+    Args:
+        checker: Resolves expressions of the robot.
+        types: All types.
+        findings: Where faults are reported.
+    """
+
+    def __init__(self, checker: ExpressionChecker, types: Types, findings: Findings) -> None:
+        self._checker = checker
+        self._types = types
+        self._findings = findings
+
+    def build(self, tree: syntax.Provide, communications: Mapping[str, Communication]) -> Provide | None:
+        """A provide statement of the model, or None where it is broken."""
+        name = tree.communication
+        condition = None if tree.condition is None else self._checker.condition(tree.condition)
+        communication = communications.get(name.text)
+        if communication is None:
+            self._findings.unknown("communication", name.text, name.location, communications)
+            return None
+        if communication.request is None:
+            self._findings.error(
+                "provide-to-outgoing",
+                f"'{name.text}' is an outgoing message: its data come from the component",
+                name.location,
+                "Provide data for an incoming message, a service or an action.",
+            )
+            return None
+        value = self._value(tree.value, communication.request, name)
+        if value is None or (tree.condition is not None and condition is None):
+            return None
+        return Provide(name.text, value, condition)
+
+    def _value(
+        self, tree: syntax.ObjectValue | syntax.Expression, wanted: Type, name: syntax.Name
+    ) -> ProvidedValue | None:
+        if isinstance(wanted, EnumType):
+            # An enum only reads data; what would be sent is a value of the type it is made from.
+            wanted = self._types.sources[wanted.name]
+        if isinstance(tree, syntax.ObjectValue):
+            return self._object(tree, wanted)
+        if isinstance(wanted, NoneType | ObjectType):
+            needed = "no data" if isinstance(wanted, NoneType) else f"an object '{wanted.name}'"
+            self._findings.error(
+                "type-mismatch",
+                f"'{name.text}' takes {needed}",
+                tree.location,
+                "Remove the statement." if isinstance(wanted, NoneType) else "Write '{ property: value }'.",
+            )
+            return None
+        typed = self._checker.fitting(tree, wanted)
+        if typed is None:
+            return None
+        if may_leave(typed.type, wanted):
+            self._findings.warning(
+                "may-leave-range",
+                f"the value can leave the range of '{name.text}', {type_text(wanted)}",
+                tree.location,
+                "Widen the range of the type, or narrow what is provided.",
+            )
+        return typed.expression
+
+    def _object(self, tree: syntax.ObjectValue, wanted: Type) -> ObjectValue | None:
+        if not isinstance(wanted, ObjectType):
+            self._findings.error(
+                "type-mismatch",
+                f"an object value cannot stand for {type_text(wanted)}",
+                tree.location,
+                "Write a plain expression.",
+            )
+            return None
+        unique([name for name, _ in tree.properties], "duplicate-property", "property", self._findings)
+        properties: list[tuple[str, ProvidedValue]] = []
+        for name, part in tree.properties:
+            type_ = self._types.property_type(wanted, name.text)
+            if type_ is None:
+                known = self._types.property_names(wanted)
+                self._findings.unknown(f"property of '{wanted.name}'", name.text, name.location, known)
+                continue
+            value = self._value(part, type_, name)
+            if value is not None:
+                properties.append((name.text, value))
+        return ObjectValue(tuple(properties)) if len(properties) == len(tree.properties) else None

@@ -1,0 +1,154 @@
+"""Resolves the types of a model: names to definitions, each once, in the scope of its file."""
+
+from robosc.errors import RelatedPlace
+from robosc.expressions import (
+    ArrayType,
+    BooleanType,
+    DoubleType,
+    EnumType,
+    IntegerType,
+    NoneType,
+    ObjectType,
+    StringType,
+    Type,
+)
+from robosc.language import syntax
+from robosc.model.findings import Findings
+from robosc.model.structure import ObjectDefinition, Property
+from robosc.model.units import Unit, unique
+
+_BASIC: dict[syntax.BasicTypeName, Type] = {
+    syntax.BasicTypeName.STRING: StringType(),
+    syntax.BasicTypeName.BOOLEAN: BooleanType(),
+    syntax.BasicTypeName.DOUBLE: DoubleType(),
+    syntax.BasicTypeName.NONE: NoneType(),
+}
+
+
+class Types:
+    """The data types that a model uses, in the order in which they were first asked for.
+
+    Attributes:
+        objects: Object definitions by model name.
+        enums: Enum types by model name, with the unit and tree they come from.
+        sources: Source type of each enum by model name.
+    """
+
+    def __init__(self, findings: Findings) -> None:
+        self.objects: dict[str, ObjectDefinition] = {}
+        self.enums: dict[str, tuple[EnumType, Unit, syntax.EnumDefinition]] = {}
+        self.sources: dict[str, Type] = {}
+        self._findings = findings
+        self._open: list[str] = []
+
+    def resolve(self, tree: syntax.Type, unit: Unit, *, in_object: bool = False) -> Type | None:
+        """The type that a tree means in a unit, or None after reporting why it means none."""
+        match tree:
+            case syntax.BasicType(name=syntax.BasicTypeName.INTEGER):
+                return self._integer(tree)
+            case syntax.BasicType(name=name):
+                return _BASIC[name]
+            case syntax.ArrayType(element=element):
+                if not in_object:
+                    self._findings.error(
+                        "array-not-allowed",
+                        "an array can stand only inside an object",
+                        tree.location,
+                        "Make an object type with the array as a property.",
+                    )
+                    return None
+                inner = self.resolve(element, unit, in_object=True)
+                return None if inner is None else ArrayType(inner)
+            case syntax.NamedType(name=name):
+                return self.named(name, unit)
+
+    def named(self, name: syntax.Name, unit: Unit) -> Type | None:
+        """The type that a name means in a unit, or None after reporting an unknown name."""
+        definition = unit.types.get(name.text)
+        if definition is None:
+            self._findings.unknown("data type", name.text, name.location, unit.types)
+            return None
+        key = unit.type_name(name.text)
+        if key in self._open:
+            self._findings.error(
+                "type-mismatch",
+                f"the type '{name.text}' contains itself",
+                name.location,
+                "Remove the property or rule source that leads back to it.",
+            )
+            return None
+        if isinstance(definition, syntax.ObjectDefinition):
+            if key not in self.objects:
+                self._define_object(key, definition, unit)
+            return ObjectType(key)
+        if key not in self.enums:
+            self._define_enum(key, definition, unit)
+        return self.enums[key][0] if self.enums[key][0].values else None
+
+    def _integer(self, tree: syntax.BasicType) -> Type | None:
+        if tree.low is not None and tree.high is not None and tree.low > tree.high:
+            self._findings.error(
+                "type-mismatch",
+                f"the range {tree.low}..{tree.high} is empty",
+                tree.location,
+                "Write the smaller bound first.",
+            )
+            return None
+        return IntegerType(tree.low, tree.high)
+
+    def _define_object(self, key: str, tree: syntax.ObjectDefinition, unit: Unit) -> None:
+        unique([item.name for item in tree.properties], "duplicate-property", "property", self._findings)
+        self._open.append(key)
+        properties: dict[str, Property] = {}
+        for item in tree.properties:
+            found = self.resolve(item.type, unit, in_object=True)
+            if found is not None:
+                properties.setdefault(item.name.text, Property(item.name.text, found))
+        self._open.pop()
+        self.objects[key] = ObjectDefinition(key, tuple(properties.values()))
+
+    def _define_enum(self, key: str, tree: syntax.EnumDefinition, unit: Unit) -> None:
+        self._open.append(key)
+        source = self.resolve(tree.source, unit)
+        self._open.pop()
+        if isinstance(source, EnumType):
+            self._findings.error(
+                "enum-default",
+                "an enum cannot be made from an enum",
+                tree.source.location,
+                f"Make it from the type that '{source.name}' is made from.",
+            )
+        defaults = [rule for rule in tree.rules if rule.condition is None]
+        if len(defaults) != 1:
+            self._report_defaults(tree, defaults)
+        values = tuple(dict.fromkeys(rule.value.text for rule in tree.rules))
+        unique([rule.value for rule in tree.rules], "duplicate-enum-value", "enum value", self._findings)
+        self.enums[key] = (EnumType(key, values), unit, tree)
+        self.sources[key] = NoneType() if source is None or isinstance(source, EnumType) else source
+
+    def _report_defaults(self, tree: syntax.EnumDefinition, defaults: list[syntax.EnumRule]) -> None:
+        if not defaults:
+            self._findings.error(
+                "enum-default",
+                f"the enum '{tree.name.text}' has no default rule",
+                tree.name.location,
+                "Add 'default -> NAME': the value for data that no rule fits.",
+            )
+            return
+        self._findings.error(
+            "enum-default",
+            f"the enum '{tree.name.text}' has more than one default rule",
+            defaults[1].value.location,
+            "Keep one default rule.",
+            RelatedPlace("the first default stands here", defaults[0].value.location),
+        )
+
+    def property_type(self, type_: Type, name: str) -> Type | None:
+        """The type of an object's property, or None if there is no such property."""
+        if not isinstance(type_, ObjectType):
+            return None
+        return next((item.type for item in self.objects[type_.name].properties if item.name == name), None)
+
+    def property_names(self, type_: Type) -> tuple[str, ...]:
+        """The names of an object's properties."""
+        return tuple(item.name for item in self.objects[type_.name].properties) if isinstance(type_, ObjectType) else ()

@@ -1,0 +1,188 @@
+"""Files as units of definitions, and where each component of a robot comes from (language A.4)."""
+
+from dataclasses import dataclass
+
+from robosc.errors import RelatedPlace
+from robosc.language import parse, syntax
+from robosc.model.findings import Findings
+from robosc.source import Bundle, Location
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Unit:
+    """A robot or a library; compared by identity.
+
+    Attributes:
+        tree: Its syntax tree.
+        components: Components by name.
+        types: Data types by name.
+        interfaces: Interfaces by name.
+    """
+
+    tree: syntax.File
+    components: dict[str, syntax.Component]
+    types: dict[str, syntax.ObjectDefinition | syntax.EnumDefinition]
+    interfaces: dict[str, syntax.Interface]
+
+    def type_name(self, name: str) -> str:
+        """A type's name in the model: a library's types carry its name before their own."""
+        return f"{self.tree.name.text}.{name}" if self.tree.is_library else name
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A component of the robot.
+
+    Attributes:
+        name: The name that the robot knows it by.
+        unit: The file that defines it.
+        tree: Its definition there.
+        place: Where the robot names it.
+    """
+
+    name: str
+    unit: Unit
+    tree: syntax.Component
+    place: Location
+
+    @property
+    def is_imported(self) -> bool:
+        """Whether it comes from a library."""
+        return self.place is not self.tree.name.location
+
+
+def make_unit(tree: syntax.File, findings: Findings) -> Unit:
+    """A unit of a tree; reports definitions that share a name."""
+    components = [item for item in tree.items if isinstance(item, syntax.Component)]
+    types = [item for item in tree.items if isinstance(item, syntax.ObjectDefinition | syntax.EnumDefinition)]
+    interfaces = [item for item in tree.items if isinstance(item, syntax.Interface)]
+    unique([item.name for item in components], "duplicate-component", "component", findings)
+    unique([item.name for item in types], "duplicate-data-type", "data type", findings)
+    unique([item.name for item in interfaces], "duplicate-interface", "interface", findings)
+    return Unit(
+        tree=tree,
+        components={item.name.text: item for item in reversed(components)},
+        types={item.name.text: item for item in reversed(types)},
+        interfaces={item.name.text: item for item in reversed(interfaces)},
+    )
+
+
+def unique(names: list[syntax.Name], code: str, what: str, findings: Findings) -> None:
+    """Report every name that was given before, ignoring case."""
+    first: dict[str, syntax.Name] = {}
+    for name in names:
+        earlier = first.setdefault(name.text.casefold(), name)
+        if earlier is not name:
+            same = "" if earlier.text == name.text else f" (it differs from '{earlier.text}' only in case)"
+            findings.error(
+                code,
+                f"the {what} '{name.text}' is defined twice{same}",
+                name.location,
+                f"Rename or remove one of the two {what}s.",
+                RelatedPlace(f"'{earlier.text}' is defined here first", earlier.location),
+            )
+
+
+class Libraries:
+    """The libraries of a bundle, parsed when they are asked for."""
+
+    def __init__(self, bundle: Bundle, findings: Findings) -> None:
+        self._bundle = bundle
+        self._findings = findings
+        self._units: dict[str, Unit | None] = {}
+        self._parsed: dict[str, syntax.File | None] = {}
+
+    def unit(self, name: syntax.Name) -> Unit | None:
+        """The library called `name`, or None after reporting why there is none."""
+        if name.text not in self._units:
+            self._units[name.text] = self._find(name)
+        return self._units[name.text]
+
+    def _find(self, name: syntax.Name) -> Unit | None:
+        broken = False
+        found: dict[str, syntax.File] = {}
+        for file in self._bundle.libraries:
+            if file.name not in self._parsed:
+                parsed = parse(file)
+                self._parsed[file.name] = parsed.tree
+                # Loading keeps only files that declare a library that is wanted, so this one is.
+                self._findings.diagnostics.extend(parsed.diagnostics)
+            tree = self._parsed[file.name]
+            broken = broken or tree is None
+            if tree is not None and tree.is_library and tree.name.text == name.text:
+                found[file.name] = tree
+        texts = {file.text for file in self._bundle.libraries if file.name in found}
+        if len(texts) > 1:
+            self._findings.error(
+                "ambiguous-library",
+                f"the library '{name.text}' is defined by {' and '.join(sorted(found))}",
+                name.location,
+                "Remove or rename one of the files, or do not search its folder.",
+            )
+            return None
+        if found:
+            return make_unit(next(iter(found.values())), self._findings)
+        if not broken:
+            self._unknown(name)
+        return None
+
+    def _unknown(self, name: syntax.Name) -> None:
+        looked = ", ".join(self._bundle.searched) or "the files that came with the model"
+        known = [tree.name.text for tree in self._parsed.values() if tree is not None and tree.is_library]
+        mend = f"Put the library into one of the folders looked at ({looked}) or name its folder with -L."
+        self._findings.unknown("library", name.text, name.location, known, mend)
+
+
+def parts_of(unit: Unit, libraries: Libraries, findings: Findings) -> tuple[Part, ...]:
+    """The components of a robot, imports followed, in source order."""
+    parts: list[Part] = []
+    imported: dict[tuple[Unit, str], Part] = {}
+    for item in unit.tree.items:
+        if not isinstance(item, syntax.Component):
+            continue
+        source = _follow(unit, item, libraries, findings)
+        if source is None:
+            continue
+        part = Part(item.name.text, source[0], source[1], item.name.location)
+        key = (part.unit, part.tree.name.text)
+        if part.is_imported and key in imported:
+            findings.error(
+                "duplicate-communication",
+                f"the component '{part.tree.name.text}' of '{part.unit.tree.name.text}' is imported twice",
+                part.place,
+                "Import it once: all its communications would exist twice.",
+                RelatedPlace("it is imported here first", imported[key].place),
+            )
+            continue
+        imported[key] = part
+        parts.append(part)
+    return tuple(parts)
+
+
+def _follow(
+    unit: Unit, component: syntax.Component, libraries: Libraries, findings: Findings
+) -> tuple[Unit, syntax.Component] | None:
+    """The unit and definition that a chain of imports ends at, or None after reporting why it does not."""
+    seen: list[tuple[Unit, str]] = []
+    while component.imported is not None:
+        if (unit, component.name.text) in seen:
+            chain = " from ".join(name for _, name in [*seen, (unit, component.name.text)])
+            findings.error(
+                "import-cycle",
+                f"the import never ends: {chain}",
+                component.imported.component.location,
+                "Define the component in one of the libraries.",
+            )
+            return None
+        seen.append((unit, component.name.text))
+        library = libraries.unit(component.imported.library)
+        if library is None:
+            return None
+        wanted = component.imported.component
+        if wanted.text not in library.components:
+            findings.unknown(
+                f"component of library '{library.tree.name.text}'", wanted.text, wanted.location, library.components
+            )
+            return None
+        unit, component = library, library.components[wanted.text]
+    return unit, component

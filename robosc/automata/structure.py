@@ -41,7 +41,8 @@ class InputVariable:
         type: A finite type.
         may_be_unknown: Whether the environment may also leave it out (an element of an array). Elements
             of one array that differ only in the last index: a later one is known only if every
-            earlier one is.
+            earlier one is. In general the environment chooses the length of every array on the path, and
+            a datum is known exactly if each index on its path is below its array's length.
     """
 
     event: str

@@ -1,0 +1,98 @@
+"""Expressions as closures over flat state tuples: the evaluator of the explicit algorithms.
+
+Means the same as `robosc.expressions.evaluate`, for many states of one system.
+"""
+
+from collections.abc import Callable, Mapping
+
+from robosc.automata.state import Subject
+from robosc.expressions import (
+    Binary,
+    Constant,
+    EnumValue,
+    Expression,
+    PathStep,
+    Received,
+    StateTest,
+    Unary,
+    Value,
+    VariableRead,
+    leaves,
+)
+from robosc.expressions.evaluate import BINARY, UNARY
+
+State = tuple[Value, ...]
+"""A global state, in the order of `subjects`."""
+
+Path = tuple[PathStep, ...]
+
+Data = Mapping[Path, Value | None]
+"""Received data of one occurrence of an event: a value for each path, None where it is unknown."""
+
+Function = Callable[[State, Data], Value | None]
+"""An expression's value in a state, with received data; None where it is unknown."""
+
+NO_DATA: Data = {}
+
+
+def subjects_read(expression: Expression) -> frozenset[Subject]:
+    """The locations and variables that an expression reads."""
+    found = set[Subject]()
+    for leaf in leaves(expression):
+        match leaf:
+            case VariableRead(component=component, variable=variable):
+                found.add(Subject(component, variable))
+            case StateTest(component=component):
+                found.add(Subject(component))
+    return frozenset(found)
+
+
+def paths_read(expression: Expression) -> tuple[Path, ...]:
+    """The received paths that an expression reads, each once, left to right."""
+    return tuple(dict.fromkeys(leaf.path for leaf in leaves(expression) if isinstance(leaf, Received)))
+
+
+def compile_expression(expression: Expression, places: Mapping[Subject, int]) -> Function:
+    """The expression as a function of state and received data.
+
+    Args:
+        expression: A resolved expression.
+        places: Where in a state tuple each subject stands.
+    """
+    # A chain such as `a and b and c ...` is a tree as deep as it is long, leaning left: a loop takes it.
+    spine: list[Binary] = []
+    node = expression
+    while isinstance(node, Binary):
+        spine.append(node)
+        node = node.left
+    first = _compile_operand(node, places)
+    if not spine:
+        return first
+    steps = tuple((BINARY[item.operator], compile_expression(item.right, places)) for item in reversed(spine))
+
+    def fold(state: State, data: Data) -> Value | None:
+        value = first(state, data)
+        for function, right in steps:
+            value = function(value, right(state, data))
+        return value
+
+    return fold
+
+
+def _compile_operand(expression: Expression, places: Mapping[Subject, int]) -> Function:
+    match expression:
+        case Constant(value=value) | EnumValue(value=value):
+            return lambda state, data: value
+        case VariableRead(component=component, variable=variable):
+            place = places[Subject(component, variable)]
+            return lambda state, data: state[place]
+        case StateTest(component=component, state=location):
+            place = places[Subject(component)]
+            return lambda state, data: state[place] == location
+        case Received(path=path):
+            return lambda state, data: data[path]
+        case Unary(operator=operator, operand=operand):
+            function, inner = UNARY[operator], compile_expression(operand, places)
+            return lambda state, data: function(inner(state, data))
+        case Binary():
+            return compile_expression(expression, places)

@@ -1,0 +1,100 @@
+"""The controlled system as an explicit graph: plants, event conditions and a supervisor's added conditions."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from robosc.automata.compile import State
+from robosc.automata.semantics import Semantics
+from robosc.errors import SynthesisCancelled
+
+Added = Mapping[str, Callable[[State], bool]]
+"""What a supervisor adds to events; nothing for events that are not in it."""
+
+STOP_INTERVAL = 1024
+"""States handled between two questions whether to stop."""
+
+
+@dataclass(frozen=True, slots=True)
+class ControlledGraph:
+    """Every state of the controlled system; a state's number is its place in `states`.
+
+    Attributes:
+        states: Reachable states, breadth-first, the initial one first.
+        steps: For each state the events that can happen, by name, each with the numbers of the states
+            that it can lead to, in the order of the states' values.
+        parents: For each state the number of the state it was found from and the event; None for the
+            initial one. Following them back gives a shortest run.
+    """
+
+    states: tuple[State, ...]
+    steps: tuple[tuple[tuple[str, tuple[int, ...]], ...], ...]
+    parents: tuple[tuple[int, str] | None, ...]
+
+    @property
+    def transition_count(self) -> int:
+        """Number of triples of state, event and state."""
+        return sum(len(targets) for steps in self.steps for _, targets in steps)
+
+    def trace(self, number: int) -> tuple[str, ...]:
+        """Events of a shortest run from the initial state."""
+        events: list[str] = []
+        parent = self.parents[number]
+        while parent is not None:
+            before, event = parent
+            events.append(event)
+            parent = self.parents[before]
+        return tuple(reversed(events))
+
+
+def controlled_graph(
+    semantics: Semantics,
+    added: Added,
+    *,
+    limit: int,
+    should_stop: Callable[[], bool] = lambda: False,
+) -> ControlledGraph | None:
+    """The graph of the controlled system, the same for the same input.
+
+    A controllable event happens where the plants, the ranges, its event conditions and its added condition
+    allow it; an uncontrollable one where the plants do and what is added to it, if anything, holds.
+
+    Args:
+        semantics: The uncontrolled system.
+        added: The supervisor's added conditions.
+        limit: Number of states beyond which to give up.
+        should_stop: Asked now and then; once true, the work ends.
+
+    Returns:
+        The graph, or None if it has more than `limit` states.
+
+    Raises:
+        SynthesisCancelled: `should_stop` became true.
+    """
+    events = sorted(semantics.system.events, key=lambda event: event.name)
+    numbers = {semantics.initial: 0}
+    states = [semantics.initial]
+    parents: list[tuple[int, str] | None] = [None]
+    steps: list[tuple[tuple[str, tuple[int, ...]], ...]] = []
+    while len(steps) < len(states):
+        if len(steps) % STOP_INTERVAL == 0 and should_stop():
+            raise SynthesisCancelled("the search of the controlled system was stopped")
+        state = states[len(steps)]
+        found: list[tuple[str, tuple[int, ...]]] = []
+        for event in events:
+            if event.is_controllable and not semantics.condition(state, event.name):
+                continue
+            targets = semantics.targets(state, event.name)
+            condition = added.get(event.name)
+            if not targets or (condition is not None and not condition(state)):
+                continue
+            ordered = sorted(targets) if len(targets) > 1 else targets
+            for target in ordered:
+                if target not in numbers:
+                    numbers[target] = len(states)
+                    states.append(target)
+                    parents.append((len(steps), event.name))
+            found.append((event.name, tuple(numbers[target] for target in ordered)))
+        steps.append(tuple(found))
+        if len(states) > limit:
+            return None
+    return ControlledGraph(tuple(states), tuple(steps), tuple(parents))

@@ -1,0 +1,263 @@
+"""The explicit meaning of a system: the slow and obvious one by which every other is judged.
+
+A transition is one synchronous step: every automaton with the event in its alphabet takes an edge whose
+guard is true; all updates read the old state and the same received data and happen together. What one
+event can do depends on few locations and variables only, so it is worked out once for each of their
+values and remembered.
+
+Definitions: Ouedraogo, Kumar, Malik and Akesson, "Nonblocking and safe control of discrete-event
+systems modeled as extended finite automata", IEEE T-ASE 8(3), 2011, pp. 560-569, sec. II.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from itertools import product
+from operator import itemgetter
+
+from robosc.automata.compile import NO_DATA, Function, State, compile_expression, paths_read, subjects_read
+from robosc.automata.inputs import connected_inputs, valuations
+from robosc.automata.state import Subject, initial_state, subject_type, subjects
+from robosc.automata.structure import Assignment, Automaton, Edge, Event, InputVariable, System
+from robosc.expressions import TRUE, IntegerType, Type, Value
+
+_Writes = tuple[tuple[int, Value], ...]
+"""What a step puts where in a state tuple."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Update:
+    place: int
+    function: Function
+    type: Type
+    inputs: tuple[InputVariable, ...]
+
+    def stays_in_range(self, value: Value) -> bool:
+        match self.type:
+            case IntegerType(low=int(low), high=int(high)):
+                return low <= value <= high  # type: ignore[operator]  # an integer's update is a number
+            case _:
+                return True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Arc:
+    """A compiled edge; compared by identity."""
+
+    guard: Function
+    place: int
+    target: str
+    updates: tuple[_Update, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Outcome:
+    """What one event does in a state.
+
+    Attributes:
+        is_possible: Whether every automaton has an edge for it whose guard is true.
+        may_leave_range: Whether some data or edge would take a variable out of its range.
+        meets_condition: Whether every event condition is true.
+        writes: What each choice of data and edges that stays in range changes.
+    """
+
+    is_possible: bool
+    may_leave_range: bool
+    meets_condition: bool
+    writes: tuple[_Writes, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Rule:
+    """Everything about one event.
+
+    Attributes:
+        event: The event.
+        reads: The part of a state that tells what it does.
+        participants: For each automaton that takes part: place of its location, arcs by location.
+        conditions: Its event conditions.
+        outcomes: What was worked out already, by the values of `reads`.
+    """
+
+    event: Event
+    reads: Callable[[State], object]
+    participants: tuple[tuple[int, dict[Value, tuple[_Arc, ...]]], ...]
+    conditions: tuple[Function, ...]
+    outcomes: dict[object, _Outcome] = field(default_factory=dict)
+
+    def outcome(self, state: State) -> _Outcome:
+        key = self.reads(state)
+        found = self.outcomes.get(key)
+        if found is None:
+            found = self.outcomes[key] = self._work_out(state)
+        return found
+
+    def _work_out(self, state: State) -> _Outcome:
+        meets_condition = all(condition(state, NO_DATA) is True for condition in self.conditions)
+        choices = [
+            [arc for arc in arcs.get(state[place], ()) if arc.guard(state, NO_DATA) is True]
+            for place, arcs in self.participants
+        ]
+        # An event in no alphabet belongs to no plant, so it cannot happen.
+        if not choices or not all(choices):
+            return _Outcome(False, False, meets_condition, ())
+        leaves_range = False
+        writes: dict[_Writes, None] = {}
+        for arcs in product(*choices):
+            leaves, results = _joint_step(arcs, state)
+            leaves_range = leaves_range or leaves
+            writes.update(dict.fromkeys(results))
+        return _Outcome(True, leaves_range, meets_condition, tuple(writes))
+
+
+def _joint_step(arcs: tuple[_Arc, ...], state: State) -> tuple[bool, list[_Writes]]:
+    """Whether the arcs, taken together, may leave a range, and what they write for each choice of data."""
+    leaves_range = False
+    parts: list[list[_Writes]] = [[tuple((arc.place, arc.target) for arc in arcs)]]
+    for updates in _independent_updates([update for arc in arcs for update in arc.updates]):
+        leaves, results = _updates_together(updates, state)
+        leaves_range = leaves_range or leaves
+        parts.append(results)
+    return leaves_range, [tuple(write for part in choice for write in part) for choice in product(*parts)]
+
+
+def _updates_together(updates: list[_Update], state: State) -> tuple[bool, list[_Writes]]:
+    """Whether updates that share data may leave a range, and what they write for each choice of data."""
+    leaves_range = False
+    results: dict[_Writes, None] = {}
+    inputs = dict.fromkeys(item for update in updates for item in update.inputs)
+    for data in valuations(inputs):
+        values = [(update, update.function(state, data)) for update in updates]
+        known = [(update, value) for update, value in values if value is not None]
+        if all(update.stays_in_range(value) for update, value in known):
+            results[tuple((update.place, value) for update, value in known)] = None
+        else:
+            leaves_range = True
+    return leaves_range, list(results)
+
+
+def _independent_updates(updates: list[_Update]) -> list[list[_Update]]:
+    """Updates in groups that share no received data: the groups' results combine freely."""
+    group_of: dict[InputVariable, int] = {}
+    for number, inputs in enumerate(connected_inputs(dict.fromkeys(i for update in updates for i in update.inputs))):
+        group_of.update(dict.fromkeys(inputs, number))
+    groups: list[tuple[set[int], list[_Update]]] = []
+    for update in updates:
+        numbers = {group_of[item] for item in update.inputs}
+        together = [group for group in groups if group[0] & numbers]
+        groups = [group for group in groups if not group[0] & numbers]
+        merged = [*(item for group in together for item in group[1]), update]
+        groups.append((numbers.union(*(group[0] for group in together)), merged))
+    return [group[1] for group in groups]
+
+
+class Semantics:
+    """The uncontrolled system, state by state.
+
+    States are tuples in the order of `subjects(system)`.
+
+    Attributes:
+        system: The system.
+        initial: The initial state.
+    """
+
+    def __init__(self, system: System) -> None:
+        self.system = system
+        self.initial: State = initial_state(system)
+        self._places = {subject: place for place, subject in enumerate(subjects(system))}
+        self._marked = tuple((self._places[Subject(item.name)], item.marked) for item in system.automata)
+        self._rules = {event.name: self._rule(event) for event in system.events}
+        self._uncontrollable = tuple(rule for rule in self._rules.values() if not rule.event.is_controllable)
+
+    def enabled(self, state: State, event: str) -> bool:
+        """Whether the plant enables an event; a controllable one must also stay in every range."""
+        rule = self._rules[event]
+        outcome = rule.outcome(state)
+        return outcome.is_possible and not (rule.event.is_controllable and outcome.may_leave_range)
+
+    def condition(self, state: State, event: str) -> bool:
+        """Whether every event condition on an event is true."""
+        rule = self._rules[event]
+        return not rule.conditions or rule.outcome(state).meets_condition
+
+    def targets(self, state: State, event: str) -> frozenset[State]:
+        """The states that an event can lead to, over all received data and edges; none if it is not enabled.
+
+        Choices that would leave a variable's range have no target: see `bad`.
+        """
+        rule = self._rules[event]
+        outcome = rule.outcome(state)
+        if rule.event.is_controllable and outcome.may_leave_range:
+            return frozenset()
+        results = set[State]()
+        for writes in outcome.writes:
+            target = list(state)
+            for place, value in writes:
+                target[place] = value
+            results.add(tuple(target))
+        return frozenset(results)
+
+    def bad(self, state: State) -> bool:
+        """Whether an uncontrollable event that the plant enables is against a condition or may leave a range."""
+        return bool(self.trouble(state))
+
+    def trouble(self, state: State) -> str | None:
+        """Why a state is bad, in words, or None if it is not."""
+        for rule in self._uncontrollable:
+            outcome = rule.outcome(state)
+            if outcome.is_possible and not outcome.meets_condition:
+                return f"{rule.event.name} can happen against its requirement"
+            if outcome.may_leave_range:
+                return f"{rule.event.name} can take a variable out of its range"
+        return None
+
+    def is_marked(self, state: State) -> bool:
+        """Whether every automaton is in a marked location."""
+        return all(state[place] in marked for place, marked in self._marked)
+
+    def _rule(self, event: Event) -> _Rule:
+        automata = [item for item in self.system.automata if event.name in item.alphabet]
+        edges = [edge for item in automata for edge in item.edges if edge.event == event.name]
+        conditions = [item.condition for item in self.system.conditions if item.event == event.name]
+        expressions = [
+            *conditions,
+            *(edge.guard for edge in edges),
+            *(update.expression for edge in edges for update in edge.updates),
+        ]
+        read = {Subject(item.name) for item in automata}.union(*(subjects_read(item) for item in expressions))
+        return _Rule(
+            event=event,
+            reads=_reader(sorted(self._places[subject] for subject in read)),
+            participants=tuple(self._participant(item, event.name) for item in automata),
+            conditions=tuple(compile_expression(item, self._places) for item in conditions if item != TRUE),
+        )
+
+    def _participant(self, automaton: Automaton, event: str) -> tuple[int, dict[Value, tuple[_Arc, ...]]]:
+        place = self._places[Subject(automaton.name)]
+        arcs: dict[Value, tuple[_Arc, ...]] = {}
+        for edge in automaton.edges:
+            if edge.event == event:
+                arcs[edge.source] = (*arcs.get(edge.source, ()), self._arc(automaton, edge, place))
+        return place, arcs
+
+    def _arc(self, automaton: Automaton, edge: Edge, place: int) -> _Arc:
+        updates = tuple(self._update(automaton, edge, update) for update in edge.updates)
+        return _Arc(compile_expression(edge.guard, self._places), place, edge.target, updates)
+
+    def _update(self, automaton: Automaton, edge: Edge, update: Assignment) -> _Update:
+        subject = Subject(automaton.name, update.variable)
+        paths = paths_read(update.expression)
+        return _Update(
+            place=self._places[subject],
+            function=compile_expression(update.expression, self._places),
+            type=subject_type(self.system, subject),
+            inputs=_inputs_of(self.system.inputs, edge.event, paths),
+        )
+
+
+def _reader(places: list[int]) -> Callable[[State], object]:
+    return itemgetter(*places) if places else lambda state: ()
+
+
+def _inputs_of(inputs: Iterable[InputVariable], event: str, paths: Iterable[object]) -> tuple[InputVariable, ...]:
+    wanted = set(paths)
+    return tuple(item for item in inputs if item.event == event and item.path in wanted)

@@ -1,0 +1,188 @@
+"""The graph of everything the controlled system may do: as JSON values, as a table, as a drawing.
+
+Everything allowed is in it, not only what an executor would choose. It works on plants, requirements and
+added conditions alone, so it says nothing that synthesis could have hidden.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from robosc.automata.compile import State
+from robosc.automata.controlled import Added, ControlledGraph, controlled_graph
+from robosc.automata.plants import communication_plant_name
+from robosc.automata.semantics import Semantics
+from robosc.automata.state import Subject, subjects
+from robosc.automata.structure import System
+from robosc.errors import UnsupportedModelError
+from robosc.expressions import Value
+from robosc.model.structure import CommunicationKind, Model
+
+DEFAULT_LIMIT = 100_000
+"""States beyond which exploring is given up."""
+
+
+@dataclass(frozen=True, slots=True)
+class GraphState:
+    """One state of the controlled system; all pairs in source order.
+
+    Attributes:
+        components: State of every component with a behaviour.
+        variables: Value of every synthesis variable, by `Component.variable`.
+        communications: Location of every service and action.
+        enabled: Events that can happen here, sorted by name.
+    """
+
+    components: tuple[tuple[str, str], ...]
+    variables: tuple[tuple[str, Value], ...]
+    communications: tuple[tuple[str, str], ...]
+    enabled: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Graph:
+    """The controlled system.
+
+    Attributes:
+        name: The robot's name.
+        initial: Number of the initial state.
+        states: States, breadth-first from the initial one; a state's number is its place.
+        transitions: State, event, state: sorted by the first, then by event and by the values of the second.
+    """
+
+    name: str
+    initial: int
+    states: tuple[GraphState, ...]
+    transitions: tuple[tuple[int, str, int], ...]
+
+
+def explore(
+    system: System,
+    added: Added,
+    model: Model,
+    *,
+    limit: int = DEFAULT_LIMIT,
+    should_stop: Callable[[], bool] = lambda: False,
+) -> Graph:
+    """The controlled system's graph, the same for the same input.
+
+    Args:
+        system: The automata of `model`.
+        added: The conditions that the supervisor adds to events, over states.
+        model: The checked robot.
+        limit: Number of states beyond which to give up.
+        should_stop: Asked now and then; once true, the work ends.
+
+    Raises:
+        UnsupportedModelError: There are more than `limit` states.
+        SynthesisCancelled: `should_stop` became true.
+    """
+    graph = controlled_graph(Semantics(system), added, limit=limit, should_stop=should_stop)
+    if graph is None:
+        raise UnsupportedModelError(
+            f"the controlled system of {model.name} has more than {limit} states: too many to list; raise the limit"
+        )
+    return Graph(
+        name=model.name,
+        initial=0,
+        states=_states(system, model, graph),
+        transitions=tuple(
+            (number, event, target)
+            for number, steps in enumerate(graph.steps)
+            for event, targets in steps
+            for target in targets
+        ),
+    )
+
+
+def _states(system: System, model: Model, graph: ControlledGraph) -> tuple[GraphState, ...]:
+    places = {subject: place for place, subject in enumerate(subjects(system))}
+    components = [item.name for item in model.components if item.behaviour]
+    variables = [subject for subject in places if subject.variable is not None]
+    communications = [
+        (item.name, places[Subject(communication_plant_name(item))])
+        for item in model.communications
+        if item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
+    ]
+
+    def graph_state(state: State, enabled: tuple[str, ...]) -> GraphState:
+        return GraphState(
+            components=tuple((name, str(state[places[Subject(name)]])) for name in components),
+            variables=tuple((str(subject), state[places[subject]]) for subject in variables),
+            communications=tuple((name, str(state[place])) for name, place in communications),
+            enabled=enabled,
+        )
+
+    return tuple(
+        graph_state(state, tuple(event for event, _ in steps))
+        for state, steps in zip(graph.states, graph.steps, strict=True)
+    )
+
+
+def graph_json(graph: Graph) -> dict[str, object]:
+    """The graph as JSON values: `initial`, `states`, `transitions`."""
+    return {
+        "initial": graph.initial,
+        "states": [
+            {
+                "components": dict(state.components),
+                "variables": dict(state.variables),
+                "communications": dict(state.communications),
+                "enabled": list(state.enabled),
+            }
+            for state in graph.states
+        ],
+        "transitions": [list(transition) for transition in graph.transitions],
+    }
+
+
+def graph_text(graph: Graph) -> str:
+    """The graph as a table: a line for each state, below it a line for each event with where it leads."""
+    header = ["", *(name for name, _ in _columns(graph.states[graph.initial]))]
+    rows = [[str(number), *(text for _, text in _columns(state))] for number, state in enumerate(graph.states)]
+    widths = [max(len(row[column]) for row in (header, *rows)) for column in range(len(header))]
+    leaving = _leaving(graph)
+
+    def line(cells: list[str]) -> str:
+        return "  ".join(cell.ljust(width) for cell, width in zip(cells, widths, strict=True)).rstrip()
+
+    counts = f"{graph.name}: {len(graph.states)} states, {len(graph.transitions)} transitions"
+    lines = [f"{counts}; it starts in state {graph.initial}", "", line(header)]
+    for number, row in enumerate(rows):
+        lines.append(line(row))
+        for event, targets in leaving[number].items():
+            lines.append(f"{'':{widths[0]}}  {event} -> {', '.join(map(str, targets))}")
+    return "\n".join(lines) + "\n"
+
+
+def graph_dot(graph: Graph) -> str:
+    """The graph in Graphviz's language: a box for each state, events of one arrow on its label."""
+    lines = [f"digraph {_quoted(graph.name)} {{", "  node [shape=box];", '  start [shape=point, label=""];']
+    lines.append(f"  start -> {graph.initial};")
+    for number, state in enumerate(graph.states):
+        label = "\n".join([str(number), *(f"{name} = {text}" for name, text in _columns(state))])
+        lines.append(f"  {number} [label={_quoted(label)}];")
+    arrows: dict[tuple[int, int], list[str]] = {}
+    for source, event, target in graph.transitions:
+        arrows.setdefault((source, target), []).append(event)
+    for (source, target), events in arrows.items():
+        label = "\n".join(events)
+        lines.append(f"  {source} -> {target} [label={_quoted(label)}];")
+    return "\n".join([*lines, "}"]) + "\n"
+
+
+def _columns(state: GraphState) -> list[tuple[str, str]]:
+    """What a reader wants to see of a state: name and value of each part."""
+    values = [(name, str(value).lower() if isinstance(value, bool) else str(value)) for name, value in state.variables]
+    return [*state.components, *values, *state.communications]
+
+
+def _leaving(graph: Graph) -> list[dict[str, list[int]]]:
+    result: list[dict[str, list[int]]] = [{} for _ in graph.states]
+    for source, event, target in graph.transitions:
+        result[source].setdefault(event, []).append(target)
+    return result
+
+
+def _quoted(text: str) -> str:
+    """A Graphviz string."""
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n") + '"'

@@ -1,0 +1,270 @@
+"""Random small systems for tests that compare an algorithm with a slow, obvious twin.
+
+`systems()` is a hypothesis strategy. Most of its systems have a supervisor that disables something and
+some have none; run this module to see the shares:
+
+    python -m support.random_systems        (with `tests` as the working folder)
+
+A system is drawn from a seed with `random.Random`: drawing each edge through hypothesis takes a hundred
+times as long, and what fails is small already.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from random import Random
+
+from hypothesis import strategies as st
+
+from robosc.automata import (
+    Assignment,
+    Automaton,
+    DiscreteVariable,
+    Edge,
+    Event,
+    EventCondition,
+    InputVariable,
+    Semantics,
+    System,
+)
+from robosc.expressions import (
+    TRUE,
+    Binary,
+    BinaryOperator,
+    BooleanType,
+    Constant,
+    EnumType,
+    EnumValue,
+    Expression,
+    IntegerType,
+    Received,
+    StateTest,
+    Type,
+    Unary,
+    VariableRead,
+    domain,
+    leaves,
+)
+from robosc.verification import ExplicitSupervisor, synthesize_explicit
+
+COLOUR = EnumType("Colour", ("red", "green", "blue"))
+CONTROLLABLE = tuple(Event(name, True) for name in ("go", "stop", "turn", "lift"))
+UNCONTROLLABLE = tuple(Event(name, False) for name in ("seen", "lost", "done"))
+MAXIMUM_STATES = 20_000
+WANTED_STATES = 5
+ATTEMPTS = 20
+
+
+def systems() -> st.SearchStrategy[System]:
+    """Systems of 2 to 4 automata with 1 to 4 locations and 0 to 2 variables each."""
+    return st.integers(0, 2**32 - 1).map(random_system)
+
+
+@lru_cache(maxsize=4096)
+def random_system(seed: int) -> System:
+    """The system of a seed: mostly the first of some candidates whose supervisor disables something."""
+    random = Random(seed)
+    candidate = _Builder(random).system()
+    if random.random() < 0.2:
+        return candidate
+    for _ in range(ATTEMPTS):
+        supervisor = synthesize_explicit(candidate, limit=MAXIMUM_STATES)
+        if supervisor and len(supervisor.reachable) >= WANTED_STATES and disables_something(candidate, supervisor):
+            break
+        candidate = _Builder(random).system()
+    return candidate
+
+
+def disables_something(system: System, supervisor: ExplicitSupervisor) -> bool:
+    """Whether the supervisor forbids, in a reachable state, what plants and requirements would allow."""
+    semantics = Semantics(system)
+    return any(
+        semantics.enabled(state, event.name)
+        and semantics.condition(state, event.name)
+        and not supervisor.allows(state, event.name)
+        for state in supervisor.reachable
+        for event in system.events
+        if event.is_controllable
+    )
+
+
+def kind(system: System) -> str:
+    """`empty`, `disables` or `free`: what its supervisor is like."""
+    supervisor = synthesize_explicit(system, limit=MAXIMUM_STATES)
+    if supervisor is None:
+        return "too large"
+    if supervisor.is_empty:
+        return "empty"
+    return "disables" if disables_something(system, supervisor) else "free"
+
+
+def shares(systems: Sequence[System]) -> dict[str, float]:
+    """The share of each kind among some systems."""
+    found = [kind(system) for system in systems]
+    return {name: found.count(name) / len(found) for name in ("disables", "free", "empty")}
+
+
+class _Builder:
+    """Draws one system."""
+
+    def __init__(self, random: Random) -> None:
+        self.random = random
+        names = ("A", "B", "C", "D")[: random.choice((2, 2, 3, 3, 4))]
+        self.events = (*CONTROLLABLE[: random.choice((2, 3, 4))], *UNCONTROLLABLE[: random.choice((1, 2, 3))])
+        self.locations = {name: tuple(f"l{n}" for n in range(random.choice((1, 2, 2, 3, 3, 4)))) for name in names}
+        self.variables = {
+            (name, f"v{number}"): self._type() for name in names for number in range(random.choice((0, 1, 1, 2)))
+        }
+        self.inputs = tuple(item for event in self.events if not event.is_controllable for item in self._inputs(event))
+
+    def _chance(self, share: float) -> bool:
+        return self.random.random() < share
+
+    def _type(self) -> Type:
+        low = self.random.randint(-2, 1)
+        return self.random.choice((BooleanType(), COLOUR, IntegerType(low, low + self.random.randint(1, 4))))
+
+    def _inputs(self, event: Event) -> list[InputVariable]:
+        count = self.random.choice((0, 0, 1, 2))
+        result = [InputVariable(event.name, (f"p{number}",), self._type()) for number in range(count)]
+        if self._chance(0.6):
+            element, indices = self._type(), self.random.sample(range(5), self.random.choice((1, 2, 2, 3)))
+            result.extend(InputVariable(event.name, ("scan", index), element, True) for index in indices)
+        return result
+
+    def system(self) -> System:
+        """The drawn system; each event belongs to one or two automata."""
+        owners = {
+            event: self.random.sample(tuple(self.locations), self.random.choice((1, 1, 2))) for event in self.events
+        }
+        automata = tuple(
+            self._automaton(name, [event for event in self.events if name in owners[event]]) for name in self.locations
+        )
+        read = {(edge.event, leaf) for automaton in automata for edge in automaton.edges for leaf in _paths(edge)}
+        inputs = tuple(item for item in self.inputs if (item.event, item.path) in read)
+        conditions = tuple(condition for event in self.events for condition in self._event_conditions(event))
+        return System("random", self.events, automata, inputs, conditions)
+
+    def _automaton(self, name: str, alphabet: list[Event]) -> Automaton:
+        locations = self.locations[name]
+        edges = [edge for event in alphabet for where in locations for edge in self._edges(name, where, event)]
+        variables = tuple(
+            DiscreteVariable(variable, type_, self.random.choice(tuple(domain(type_))))
+            for (owner, variable), type_ in self.variables.items()
+            if owner == name
+        )
+        marked = frozenset(location for location in locations if self._chance(0.5)) or frozenset(locations[:1])
+        return Automaton(
+            name, locations, locations[0], marked, frozenset(e.name for e in alphabet), tuple(edges), variables
+        )
+
+    def _edges(self, name: str, source: str, event: Event) -> list[Edge]:
+        """No edge, one, or two; the two of a controllable event have guards that exclude each other."""
+        count = self.random.choice((0, 1, 1, 1, 2) if event.is_controllable else (0, 0, 0, 1, 2))
+        guards: list[Expression] = []
+        if count >= 1:
+            guards.append(self._condition() if self._chance(0.4) else TRUE)
+        if count == 2:
+            opposite = Unary("not", Unary("holds", guards[0]))
+            free = self._condition() if self._chance(0.5) else TRUE
+            guards.append(opposite if event.is_controllable else free)
+        targets = self.locations[name]
+        return [
+            Edge(source, event.name, self.random.choice(targets), guard, self._updates(name, event)) for guard in guards
+        ]
+
+    def _updates(self, name: str, event: Event) -> tuple[Assignment, ...]:
+        return tuple(
+            Assignment(variable, self._value(type_, event, VariableRead(owner, variable)))
+            for (owner, variable), type_ in self.variables.items()
+            if owner == name and self._chance(0.6)
+        )
+
+    def _value(self, type_: Type, event: Event, own: VariableRead) -> Expression:
+        """A new value for a variable; integers count up and down and may leave their range."""
+        inputs = [item for item in self.inputs if item.event == event.name]
+        choices: list[Callable[[], Expression]] = [lambda: self._constant(type_)]
+        same = [Received(item.path) for item in inputs if item.type == type_]
+        if same:
+            choices.extend([lambda: self.random.choice(same)] * 5)
+        if isinstance(type_, BooleanType):
+            choices.append(self._condition)
+            if inputs:
+                choices.extend([lambda: self._condition_on(inputs)] * 4)
+        elif isinstance(type_, IntegerType):
+            # The environment rarely counts: it would leave every range sooner or later.
+            if event.is_controllable or self._chance(0.2):
+                choices.extend([lambda: self._count(own)] * 3)
+                choices.append(lambda: self._arithmetic(own))
+            numbers = [item for item in inputs if isinstance(item.type, IntegerType)]
+            if numbers:
+                choices.append(lambda: Binary("-", own, Received(self.random.choice(numbers).path)))
+        else:
+            choices.append(
+                lambda: self.random.choice([VariableRead(*v) for v, t in self.variables.items() if t == type_])
+            )
+        return self.random.choice(choices)()
+
+    def _count(self, own: VariableRead) -> Expression:
+        return Binary("+" if self._chance(0.5) else "-", own, Constant(1))
+
+    def _arithmetic(self, own: VariableRead) -> Expression:
+        others = [VariableRead(*v) for v, type_ in self.variables.items() if isinstance(type_, IntegerType)]
+        return Binary(self.random.choice(("+", "-", "*")), own, self.random.choice(others))
+
+    def _constant(self, type_: Type) -> Expression:
+        value = self.random.choice(tuple(domain(type_)))
+        return EnumValue(COLOUR.name, str(value)) if isinstance(type_, EnumType) else Constant(value)
+
+    def _condition_on(self, inputs: list[InputVariable]) -> Expression:
+        """Whether one or two received data have some values; unknown where such a datum is."""
+        parts = [
+            Binary("=", Received(item.path), self._constant(item.type))
+            for item in self.random.sample(inputs, min(len(inputs), self.random.choice((1, 2))))
+        ]
+        return parts[0] if len(parts) == 1 else Binary(self.random.choice(("and", "or")), parts[0], parts[1])
+
+    def _condition(self) -> Expression:
+        operators: tuple[BinaryOperator, ...] = ("and", "or", "or", "implies", "=")
+        shape = self.random.randrange(8)
+        if shape < len(operators):
+            return Binary(operators[shape], self._atom(), self._atom())
+        return Unary("not", self._atom()) if shape == len(operators) else self._atom()
+
+    def _atom(self) -> Expression:
+        if not self.variables or self._chance(0.4):
+            name = self.random.choice(tuple(self.locations))
+            return StateTest(name, self.random.choice(self.locations[name]))
+        variable = self.random.choice(tuple(self.variables))
+        type_, read = self.variables[variable], VariableRead(*variable)
+        if isinstance(type_, BooleanType):
+            return read
+        if isinstance(type_, EnumType):
+            return Binary(self.random.choice(("=", "!=")), read, self._constant(type_))
+        operators: tuple[BinaryOperator, ...] = ("=", "!=", "<", "<=", ">", ">=")
+        # A quotient is unknown where the divisor is zero.
+        left = Binary("/", Constant(2), read) if self._chance(0.2) else read
+        return Binary(self.random.choice(operators), left, self._constant(type_))
+
+    def _event_conditions(self, event: Event) -> list[EventCondition]:
+        """Conditions on controllable events, and now and then a weak one on an uncontrollable event."""
+        if not self._chance(0.4 if event.is_controllable else 0.5):
+            return []
+        if event.is_controllable:
+            return [EventCondition(event.name, self._condition()) for _ in range(self.random.choice((1, 1, 2)))]
+        return [EventCondition(event.name, Binary("or", self._condition(), self._condition()))]
+
+
+def _paths(edge: Edge) -> list[tuple[object, ...]]:
+    return [leaf.path for update in edge.updates for leaf in leaves(update.expression) if isinstance(leaf, Received)]
+
+
+def main() -> None:
+    """Print the shares among systems of successive seeds."""
+    drawn = shares([random_system(seed) for seed in range(1000)])
+    plain = shares([_Builder(Random(seed)).system() for seed in range(1000)])
+    print("drawn:", {name: f"{share:.0%}" for name, share in drawn.items()})
+    print("without choosing:", {name: f"{share:.0%}" for name, share in plain.items()})
+
+
+if __name__ == "__main__":
+    main()

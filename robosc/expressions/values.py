@@ -10,6 +10,7 @@ This module imports nothing and runs on Python 3.8 and later: generated code car
 from __future__ import annotations
 
 import math
+import numbers
 from typing import Any
 
 INFINITY = math.inf
@@ -112,9 +113,14 @@ def read_boolean(value: Any) -> Any:
 
 
 def read_integer(value: Any) -> Any:
-    """A received integer; None where something else came or it needs more than 32 bits."""
-    if value is True or value is False or not isinstance(value, int):
-        return None
+    """A received integer; None where something else came or it needs more than 32 bits.
+
+    Numbers of array libraries (an element of a fixed-size array of a ROS message is one) count as well.
+    """
+    if type(value) is not int:
+        if value is True or value is False or not isinstance(value, numbers.Integral):
+            return None
+        value = int(value)
     return value if -2147483648 <= value <= 2147483647 else None
 
 
@@ -123,7 +129,9 @@ def read_double(value: Any) -> Any:
 
     A received infinity is an ordinary number in comparisons; arithmetic on it and assigning it are not.
     """
-    if value is True or value is False or not isinstance(value, (int, float)):
+    if type(value) is float:
+        return value
+    if value is True or value is False or not isinstance(value, numbers.Real):
         return None
     try:
         return float(value)
@@ -140,7 +148,7 @@ def read_element(values: Any, index: int) -> Any:
     """An array's element; None outside the array."""
     try:
         return values[index] if 0 <= index < len(values) else None
-    except TypeError:
+    except (TypeError, LookupError):
         return None
 
 

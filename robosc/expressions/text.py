@@ -1,0 +1,84 @@
+"""Expressions in the language's own words and syntax, with as few parentheses as A.3 allows."""
+
+from robosc.expressions.tree import (
+    Binary,
+    Constant,
+    EnumValue,
+    Expression,
+    Received,
+    StateTest,
+    Unary,
+    VariableRead,
+)
+
+_LEVELS = {"or": 1, "and": 2, "=": 3, "!=": 4, ">": 5, ">=": 5, "<": 5, "<=": 5, "+": 6, "-": 6, "*": 7, "/": 7}
+_NOT, _NEGATIVE, _OPERAND = 8, 9, 10
+_IMPLIES = 0
+
+
+def expression_text(expression: Expression) -> str:
+    """The expression as a user would write it.
+
+    The operator `holds` has no syntax, since an author never needs it; it is printed as `holds(...)`.
+    A communication's location is printed as `name.location`.
+    """
+    return _print(expression)[0]
+
+
+def _print(expression: Expression) -> tuple[str, int]:
+    """The text and how tightly its outermost operator binds."""
+    match expression:
+        case Constant(value=bool(value)):
+            return ("true" if value else "false"), _OPERAND
+        case Constant(value=str(value)):
+            return _quoted(value), _OPERAND
+        case Constant(value=int(value) | float(value)):
+            text = _number(value)
+            return text, (_NEGATIVE if text.startswith("-") else _OPERAND)
+        case EnumValue(value=value):
+            return value, _OPERAND
+        case VariableRead(component=component, variable=variable):
+            return f"{component}.{variable}", _OPERAND
+        case StateTest(component=component, state=state):
+            return f"{component.rpartition(' ')[2]}.{state}", _OPERAND
+        case Received(path=path):
+            steps = (f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
+            return "value" + "".join(steps), _OPERAND
+        case Unary(operator="holds", operand=operand):
+            return f"holds({_print(operand)[0]})", _OPERAND
+        case Unary(operator="not", operand=operand):
+            return f"!{_within(operand, _NOT)}", _NOT
+        case Unary(operand=operand):
+            return f"-{_within(operand, _NEGATIVE)}", _NEGATIVE
+        case Binary(operator="implies", left=left, right=right):
+            # Its operands are literals, negations or parentheses, and it stands alone.
+            return f"{_within(left, _NOT)} => {_within(right, _NOT)}", _IMPLIES
+        case Binary(operator=operator, left=left, right=right):
+            level = _LEVELS[operator]
+            return f"{_within(left, level)} {operator} {_within(right, level + 1)}", level
+    raise TypeError(f"no expression: {expression!r}")
+
+
+def _within(expression: Expression, level: int) -> str:
+    """An operand, in parentheses where it binds less tightly than its place asks."""
+    text, binds = _print(expression)
+    return text if binds >= level else f"({text})"
+
+
+def _number(value: float) -> str:
+    """A number in the language's digits: no exponent."""
+    if isinstance(value, int):
+        return str(value)
+    text = repr(value)
+    return (
+        text
+        if "e" not in text
+        else format(value, "f")
+        if value == float(format(value, "f"))
+        else f"{value:.340f}".rstrip("0")
+    )
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n").replace("\t", "\\t")
+    return f'"{escaped}"'

@@ -1,0 +1,75 @@
+"""Predicates over bits as decision diagrams over locations and variables."""
+
+from typing import Any
+
+from robosc.automata.state import Subject
+from robosc.supervisor.structure import DecisionDiagram, DecisionNode
+from robosc.synthesis.encoding import Bits, Encoding
+from robosc.synthesis.nodes import cofactors, is_constant
+
+_Run = tuple[int, Any]
+"""A first index and the predicate that holds from there on."""
+
+
+class _Extractor:
+    """Collects the nodes of one diagram."""
+
+    def __init__(self, encoding: Encoding) -> None:
+        self._encoding = encoding
+        self._manager = encoding.manager
+        self._home = {name: subject for subject, bits in encoding.subjects.items() for name in bits.names}
+        self._nodes: list[DecisionNode] = []
+        self._numbers: dict[DecisionNode, int] = {}
+        self._known: dict[int, tuple[Any, int]] = {}
+
+    def diagram(self, predicate: Any) -> DecisionDiagram:
+        root = self._number(predicate)
+        return DecisionDiagram(tuple(self._nodes), root)
+
+    def _number(self, predicate: Any) -> int:
+        """The number of a predicate in the diagram: 0 false, 1 true, from 2 on its nodes."""
+        if is_constant(self._manager, predicate):
+            return int(predicate == self._manager.true)
+        found = self._known.get(int(predicate))
+        if found is None:
+            # The predicate is kept with its number: the engine could otherwise give its node to another one.
+            found = self._known[int(predicate)] = (predicate, self._new_number(predicate))
+        return found[1]
+
+    def _new_number(self, predicate: Any) -> int:
+        subject = self._home[predicate.var]
+        bits = self._encoding.subjects[subject]
+        starts: list[int] = []
+        children: list[int] = []
+        for start, below in self._runs(bits, predicate, 0):
+            child = self._number(below)
+            if start < len(bits.domain) and (not children or children[-1] != child):
+                starts.append(start)
+                children.append(child)
+        if len(children) == 1:
+            return children[0]
+        return self._node(subject, tuple(starts), tuple(children))
+
+    def _node(self, subject: Subject, starts: tuple[int, ...], children: tuple[int, ...]) -> int:
+        node = DecisionNode(subject.automaton, subject.variable, starts, children)
+        if node not in self._numbers:
+            self._numbers[node] = len(self._nodes) + 2
+            self._nodes.append(node)
+        return self._numbers[node]
+
+    def _runs(self, bits: Bits, predicate: Any, place: int) -> list[_Run]:
+        """What is left of a predicate for each index of the bits from `place` on, equal neighbours put together."""
+        if is_constant(self._manager, predicate) or predicate.var not in bits.names[place:]:
+            return [(0, predicate)]
+        half = 1 << (len(bits.names) - place - 1)
+        low, high = cofactors(predicate) if predicate.var == bits.names[place] else (predicate, predicate)
+        runs = self._runs(bits, low, place + 1)
+        for start, below in self._runs(bits, high, place + 1):
+            if start or runs[-1][1] != below:
+                runs.append((half + start, below))
+        return runs
+
+
+def extract(encoding: Encoding, predicate: Any) -> DecisionDiagram:
+    """The decision diagram of a state predicate, with numbers that depend on its function and the order alone."""
+    return _Extractor(encoding).diagram(predicate)

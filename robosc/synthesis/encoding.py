@@ -1,0 +1,191 @@
+"""Locations, variables and received data as Boolean variables, and expressions as predicates over them.
+
+A value of a finite domain is encoded by its index, most significant bit first. Each bit has a variable for
+the current state and, next to it in the order, one for the next state, which only forward images use.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from robosc.automata.state import Subject, initial_state, subject_domain, subject_type, subjects
+from robosc.automata.structure import InputVariable, System
+from robosc.expressions import IntegerType, PathStep, Type, Value, domain
+from robosc.synthesis.engines import Manager
+from robosc.synthesis.order import subject_order
+
+
+@dataclass(frozen=True, slots=True)
+class Bits:
+    """The variables that encode one value of a finite domain.
+
+    Attributes:
+        names: Current-state variables, most significant first.
+        domain: The values, in the order of their indices.
+        type: Type of the value, or None for a location.
+        known: Variable that tells whether the value is known at all, or None if it always is.
+    """
+
+    names: tuple[str, ...]
+    domain: Sequence[Value]
+    type: Type | None
+    known: str | None = None
+
+
+def next_name(name: str) -> str:
+    """The next-state variable of a current-state one."""
+    return name + "'"
+
+
+class Encoding:
+    """The Boolean variables of one system in one manager.
+
+    Attributes:
+        manager: The manager.
+        system: The system.
+        subjects: Bits of each place of a state.
+        state_names: Every current-state variable, in the manager's order.
+    """
+
+    def __init__(self, system: System, manager: Manager) -> None:
+        self.system = system
+        self.manager = manager
+        self.subjects: dict[Subject, Bits] = {}
+        for number, subject in enumerate(subject_order(system)):
+            bits = self._bits(f"s{number}", subject_domain(system, subject), self._type(subject))
+            self.subjects[subject] = bits
+            for name in bits.names:
+                manager.declare(name, next_name(name))
+        self.state_names = tuple(name for bits in self.subjects.values() for name in bits.names)
+        self.inputs = tuple(self._input(number, item) for number, item in enumerate(system.inputs))
+        self._choices = 0
+
+    def _type(self, subject: Subject) -> Type | None:
+        return None if subject.variable is None else subject_type(self.system, subject)
+
+    @staticmethod
+    def _bits(prefix: str, values: Sequence[Value], type_: Type | None, known: str | None = None) -> Bits:
+        width = (len(values) - 1).bit_length()
+        return Bits(tuple(f"{prefix}.{place}" for place in range(width)), values, type_, known)
+
+    def _input(self, number: int, item: InputVariable) -> tuple[InputVariable, Bits]:
+        known = f"i{number}.known" if item.may_be_unknown else None
+        bits = self._bits(f"i{number}", domain(item.type), item.type, known)
+        self.manager.declare(*bits.names, *([known] if known else []))
+        return item, bits
+
+    def choice(self, count: int) -> Bits:
+        """Fresh variables for a choice among `count` edges."""
+        bits = self._bits(f"c{self._choices}", range(count), None)
+        self._choices += 1
+        self.manager.declare(*bits.names)
+        return bits
+
+    def inputs_of(self, event: str) -> dict[tuple[PathStep, ...], Bits]:
+        """Bits of the data that an event carries, by path."""
+        return {item.path: bits for item, bits in self.inputs if item.event == event}
+
+    # Predicates
+
+    def code(self, bits: Bits, index: int) -> Any:
+        """Where a value has an index."""
+        result = self.manager.true
+        for place, name in enumerate(reversed(bits.names)):
+            variable = self.manager.var(name)
+            result = result & (variable if (index >> place) & 1 else ~variable)
+        return result
+
+    def equals(self, bits: Bits, value: Value) -> Any:
+        """Where a value is `value`."""
+        return self.code(bits, bits.domain.index(value))
+
+    def in_location(self, automaton: str, location: str) -> Any:
+        """Where an automaton is in a location."""
+        return self.equals(self.subjects[Subject(automaton)], location)
+
+    def any_of(self, predicates: Iterable[Any]) -> Any:
+        """Where one of the predicates is true."""
+        result = self.manager.false
+        for predicate in predicates:
+            result = result | predicate
+        return result
+
+    def all_of(self, predicates: Iterable[Any]) -> Any:
+        """Where all of the predicates are true."""
+        result = self.manager.true
+        for predicate in predicates:
+            result = result & predicate
+        return result
+
+    def valid(self, bits: Bits) -> Any:
+        """Where the bits encode a value at all."""
+        count = len(bits.domain)
+        if count == 1 << len(bits.names):
+            return self.manager.true
+        # index < count, from the least significant bit up.
+        result = self.manager.false
+        for place, name in enumerate(reversed(bits.names)):
+            variable = self.manager.var(name)
+            limit_has_bit = (count >> place) & 1
+            result = self.manager.ite(variable, result if limit_has_bit else self.manager.false, result)
+            if limit_has_bit:
+                result = self.manager.ite(variable, result, self.manager.true)
+        return result
+
+    def valid_states(self) -> Any:
+        """Where every place of the state encodes a value."""
+        return self.all_of(self.valid(bits) for bits in self.subjects.values())
+
+    def initial_states(self) -> Any:
+        """The initial state."""
+        values = zip(subjects(self.system), initial_state(self.system), strict=True)
+        return self.all_of(self.equals(self.subjects[subject], value) for subject, value in values)
+
+    def marked_states(self) -> Any:
+        """Where every automaton is in a marked location."""
+        return self.all_of(
+            self.any_of(self.in_location(automaton.name, location) for location in sorted(automaton.marked))
+            for automaton in self.system.automata
+        )
+
+    def possible_inputs(self, event: str) -> Any:
+        """The data that an event can carry: valid codes, and arrays without gaps."""
+        inputs = [(item, bits) for item, bits in self.inputs if item.event == event]
+        result = self.all_of(self.valid(bits) for _, bits in inputs)
+        for item, bits in inputs:
+            for other, other_bits in inputs:
+                if bits.known and other_bits.known and _implied(item, other):
+                    later, earlier = self.manager.var(bits.known), self.manager.var(other_bits.known)
+                    result = result & (~later | earlier)
+        return result
+
+    def input_names(self, event: str) -> tuple[str, ...]:
+        """The variables of the data that an event carries."""
+        return tuple(
+            name
+            for item, bits in self.inputs
+            if item.event == event
+            for name in (*bits.names, *([bits.known] if bits.known else []))
+        )
+
+
+def _implied(later: InputVariable, earlier: InputVariable) -> bool:
+    """Whether an element is known wherever another one is.
+
+    It is if every array that its path goes through is one of the other's and is indexed lower or alike there.
+    """
+    lengths = {later.path[:place]: step for place, step in enumerate(later.path) if isinstance(step, int)}
+    needed = {earlier.path[:place]: step for place, step in enumerate(earlier.path) if isinstance(step, int)}
+    return (
+        later != earlier
+        and bool(needed)
+        and all(array in lengths and index <= lengths[array] for array, index in needed.items())
+    )
+
+
+Inputs = Mapping[tuple[PathStep, ...], Bits]
+
+
+def offset_of(bits: Bits) -> int:
+    """What is added to an index to get an integer's value."""
+    return int(bits.domain[0]) if isinstance(bits.type, IntegerType) else 0

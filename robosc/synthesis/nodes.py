@@ -1,0 +1,103 @@
+"""Walks over the nodes of decision diagrams, the same for every engine.
+
+Sources: O. Coudert and J. C. Madre, "A unified framework for the formal verification of sequential circuits",
+ICCAD 1990, pp. 126-129 (restrict); R. E. Bryant, "Graph-based algorithms for Boolean function manipulation",
+IEEE Trans. Computers C-35(8), 1986, pp. 677-691 (counting).
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+from robosc.synthesis.engines import Manager
+
+
+def cofactors(node: Any) -> tuple[Any, Any]:
+    """The predicates where a node's variable is false and true: a complemented edge complements both."""
+    return (~node.low, ~node.high) if node.negated else (node.low, node.high)
+
+
+def is_constant(manager: Manager, node: Any) -> bool:
+    """Whether a predicate is true or false everywhere."""
+    return bool(node == manager.true or node == manager.false)
+
+
+def node_count(manager: Manager, node: Any) -> int:
+    """Decision nodes that a predicate takes, its complemented parts counted apart."""
+    seen: dict[int, Any] = {}
+    stack = [node]
+    while stack:
+        item = stack.pop()
+        if int(item) not in seen and not is_constant(manager, item):
+            seen[int(item)] = item
+            stack.extend(cofactors(item))
+    return len(seen)
+
+
+def count_models(manager: Manager, node: Any, variables: Sequence[str]) -> int:
+    """Assignments of `variables` that make a predicate true, exactly.
+
+    Args:
+        manager: Its manager.
+        node: A predicate over some of the variables.
+        variables: In the manager's order.
+    """
+    counter = _Counter(manager, variables)
+    return counter.from_node(node) << counter.place(node)
+
+
+# Classes rather than functions in functions: two closures that call each other are a cycle that only the garbage
+# collector ends, and it may take CUDD's manager away before the nodes that the cycle holds.
+class _Counter:
+    def __init__(self, manager: Manager, variables: Sequence[str]) -> None:
+        self._manager = manager
+        self._position = {name: place for place, name in enumerate(variables)}
+        self._known: dict[int, tuple[Any, int]] = {}
+
+    def place(self, node: Any) -> int:
+        """How many variables stand before a node's own."""
+        return len(self._position) if is_constant(self._manager, node) else self._position[node.var]
+
+    def from_node(self, node: Any) -> int:
+        """Assignments of the variables from the node's own on."""
+        if is_constant(self._manager, node):
+            return int(node == self._manager.true)
+        found = self._known.get(int(node))
+        if found is None:
+            here = self.place(node) + 1
+            total = sum(self.from_node(child) << (self.place(child) - here) for child in cofactors(node))
+            # The node is kept with its count: its number could otherwise be given to another one.
+            found = self._known[int(node)] = (node, total)
+        return found[1]
+
+
+def restrict(manager: Manager, node: Any, care: Any) -> Any:
+    """A predicate that equals `node` wherever `care` is true, mostly a smaller one."""
+    return _Restrict(manager).walk(node, care)
+
+
+class _Restrict:
+    def __init__(self, manager: Manager) -> None:
+        self._manager = manager
+        self._known: dict[tuple[int, int], tuple[Any, Any, Any]] = {}
+
+    def walk(self, f: Any, c: Any) -> Any:
+        if is_constant(self._manager, c) or is_constant(self._manager, f):
+            return f
+        key = (int(f), int(c))
+        found = self._known.get(key)
+        if found is None:
+            found = self._known[key] = (f, c, self._step(f, c))
+        return found[2]
+
+    def _step(self, f: Any, c: Any) -> Any:
+        low_c, high_c = cofactors(c)
+        if c.level < f.level:
+            return self.walk(f, low_c | high_c)
+        low_f, high_f = cofactors(f)
+        if f.level < c.level:
+            return self._manager.ite(self._manager.var(f.var), self.walk(high_f, c), self.walk(low_f, c))
+        if low_c == self._manager.false:
+            return self.walk(high_f, high_c)
+        if high_c == self._manager.false:
+            return self.walk(low_f, low_c)
+        return self._manager.ite(self._manager.var(f.var), self.walk(high_f, high_c), self.walk(low_f, low_c))

@@ -1,0 +1,68 @@
+"""What synthesis returns: outcomes are values."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from robosc.supervisor.structure import AddedCondition
+
+
+class SynthesisStatus(StrEnum):
+    """How a synthesis ended."""
+
+    SUPERVISOR = "supervisor"
+    EMPTY = "empty"
+    """No supervisor can keep the system safe and nonblocking."""
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """Where a synthesis is.
+
+    Attributes:
+        phase: `encoding`, `fixed point` or `reachability`.
+        iteration: Rounds of the phase so far.
+        nodes: Nodes in the manager.
+    """
+
+    phase: str
+    iteration: int
+    nodes: int
+
+    def __str__(self) -> str:
+        return f"{self.phase}, round {self.iteration}, {self.nodes} nodes"
+
+
+@dataclass(frozen=True, slots=True)
+class Statistics:
+    """Figures of one synthesis.
+
+    Attributes:
+        engine: Engine that was used.
+        state_bits: Boolean variables that encode a state.
+        iterations: Rounds of the fixed point.
+        peak_nodes: Most nodes in the manager at the end of a round.
+        states: Reachable states of the controlled system, exact; 0 where there is no supervisor.
+    """
+
+    engine: str
+    state_bits: int
+    iterations: int
+    peak_nodes: int
+    states: int
+
+
+@dataclass(frozen=True, slots=True)
+class SynthesisResult:
+    """The outcome of a synthesis.
+
+    Attributes:
+        status: How it ended.
+        added: What the supervisor adds, for events to which it adds something, in the system's order.
+        statistics: Figures.
+        reason: Why there is no supervisor, in words; empty where there is one.
+    """
+
+    status: SynthesisStatus
+    added: tuple[AddedCondition, ...]
+    statistics: Statistics
+    reason: str = ""

@@ -1,0 +1,274 @@
+"""Expressions as predicates, with three truth values and exact numbers.
+
+Integers are bit vectors. Numbers that are or may become doubles are partitions: for each value it can
+have, the predicate where it has it; exact for every operation, and small since only variables with
+finitely many values take part. Their arithmetic is that of `robosc.expressions.values` itself.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from robosc.automata.state import Subject
+from robosc.errors import InternalError, UnsupportedModelError
+from robosc.expressions import (
+    MAXIMUM_INTEGER,
+    MINIMUM_INTEGER,
+    Binary,
+    BooleanType,
+    Constant,
+    EnumValue,
+    Expression,
+    IntegerType,
+    Received,
+    StateTest,
+    Unary,
+    Value,
+    VariableRead,
+)
+from robosc.expressions.evaluate import BINARY, UNARY
+from robosc.synthesis.encoding import Bits, Encoding, Inputs, offset_of
+from robosc.synthesis.vectors import Arithmetic, Vector
+
+MAXIMUM_PARTITION = 100_000
+"""Pairs of values beyond which an operation on doubles is refused."""
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """A boolean: where it is true and where it is false; elsewhere it is unknown."""
+
+    true: Any
+    false: Any
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """An integer: its value, and where it is known."""
+
+    vector: Vector
+    known: Any
+
+
+@dataclass(frozen=True, slots=True)
+class Partition:
+    """A value of any kind: where it has each of its values; elsewhere it is unknown."""
+
+    cases: tuple[tuple[Value, Any], ...]
+
+
+Symbolic = Truth | Number | Partition
+
+
+class Symbols:
+    """Translates the expressions of one encoding.
+
+    Args:
+        encoding: The variables.
+        inputs: Received data that can be read, by path.
+    """
+
+    def __init__(self, encoding: Encoding, inputs: Inputs | None = None) -> None:
+        self._encoding = encoding
+        self._manager = encoding.manager
+        self._arithmetic = Arithmetic(encoding.manager)
+        self._inputs = inputs or {}
+
+    def holds(self, expression: Expression) -> Any:
+        """Where a condition is true (not unknown)."""
+        return self._truth(self.translate(expression)).true
+
+    def translate(self, expression: Expression) -> Symbolic:
+        """The value of an expression in every state.
+
+        Raises:
+            UnsupportedModelError: Doubles with too many different values.
+        """
+        match expression:
+            case Constant(value=bool(value)):
+                yes, no = self._manager.true, self._manager.false
+                return Truth(yes, no) if value else Truth(no, yes)
+            case Constant(value=int(value)):
+                return Number(self._arithmetic.constant(value), self._manager.true)
+            case Constant(value=value) | EnumValue(value=value):
+                return Partition(((value, self._manager.true),))
+            case StateTest(component=component, state=state):
+                inside = self._encoding.in_location(component, state)
+                return Truth(inside, ~inside)
+            case VariableRead(component=component, variable=variable):
+                return self._read(self._encoding.subjects[Subject(component, variable)])
+            case Received(path=path):
+                return self._read(self._inputs[path])
+            case Unary(operator=operator, operand=operand):
+                return self._unary(operator, self.translate(operand))
+            case Binary(operator=operator, left=left, right=right):
+                return self._binary(operator, self.translate(left), self.translate(right))
+
+    def _read(self, bits: Bits) -> Symbolic:
+        known = self._manager.true if bits.known is None else self._manager.var(bits.known)
+        match bits.type:
+            case BooleanType():
+                value = self._manager.var(bits.names[0])
+                return Truth(known & value, known & ~value)
+            case IntegerType():
+                return Number(self._integer(bits), known)
+            case _:
+                values = enumerate(bits.domain)
+                return Partition(tuple((value, known & self._encoding.code(bits, index)) for index, value in values))
+
+    def _integer(self, bits: Bits) -> Vector:
+        offset = offset_of(bits)
+        index = self._arithmetic.unsigned(
+            [self._manager.var(name) for name in reversed(bits.names)], len(bits.domain) - 1
+        )
+        return index if offset == 0 else self._arithmetic.add(index, self._arithmetic.constant(offset))
+
+    # Operators
+
+    def _unary(self, operator: str, operand: Symbolic) -> Symbolic:
+        match operator, operand:
+            case "not", Truth(true=true, false=false):
+                return Truth(false, true)
+            case "holds", Truth(true=true):
+                return Truth(true, ~true)
+            case "-", Number(vector=vector, known=known):
+                return self._within_32_bits(self._arithmetic.negate(vector), known)
+            case "-", Partition(cases=cases):
+                return self._collect((UNARY["-"](value), predicate) for value, predicate in cases)
+        raise InternalError(f"no operator {operator} on {type(operand).__name__}")
+
+    def _binary(self, operator: str, left: Symbolic, right: Symbolic) -> Symbolic:
+        match left, right:
+            case Truth(), Truth():
+                return self._logic(operator, left, right)
+            case Number(), Number() if operator != "/":
+                return self._integers(operator, left, right)
+        pairs = self._pairs(operator, self._partition(left), self._partition(right))
+        if operator in ("=", "!=", "<", "<=", ">", ">="):
+            outcomes = [(BINARY[operator](a, b), predicate) for a, b, predicate in pairs]
+            return Truth(
+                self._encoding.any_of(predicate for outcome, predicate in outcomes if outcome is True),
+                self._encoding.any_of(predicate for outcome, predicate in outcomes if outcome is False),
+            )
+        return self._collect((BINARY[operator](a, b), predicate) for a, b, predicate in pairs)
+
+    def _logic(self, operator: str, a: Truth, b: Truth) -> Truth:
+        match operator:
+            case "and":
+                return Truth(a.true & b.true, a.false | b.false)
+            case "or":
+                return Truth(a.true | b.true, a.false & b.false)
+            case "implies":
+                return Truth(a.false | b.true, a.true & b.false)
+        same, different = (a.true & b.true) | (a.false & b.false), (a.true & b.false) | (a.false & b.true)
+        return Truth(same, different) if operator == "=" else Truth(different, same)
+
+    def _integers(self, operator: str, a: Number, b: Number) -> Symbolic:
+        known = a.known & b.known
+        arithmetic, first, second = self._arithmetic, a.vector, b.vector
+        match operator:
+            case "+":
+                return self._within_32_bits(arithmetic.add(first, second), known)
+            case "-":
+                return self._within_32_bits(arithmetic.subtract(first, second), known)
+            case "*":
+                return self._within_32_bits(arithmetic.multiply(first, second), known)
+            case "=" | "!=":
+                outcome = arithmetic.equal(first, second)
+            case "<" | ">=":
+                outcome = arithmetic.less(first, second)
+            case _:
+                outcome = arithmetic.less(second, first)
+        if operator in ("!=", ">=", "<="):
+            outcome = ~outcome
+        return Truth(known & outcome, known & ~outcome)
+
+    def _within_32_bits(self, vector: Vector, known: Any) -> Number:
+        """A result of integer arithmetic: unknown where it does not fit into 32 bits."""
+        if vector.low < MINIMUM_INTEGER:
+            known = known & ~self._arithmetic.less(vector, self._arithmetic.constant(MINIMUM_INTEGER))
+        if vector.high > MAXIMUM_INTEGER:
+            known = known & ~self._arithmetic.less(self._arithmetic.constant(MAXIMUM_INTEGER), vector)
+        low, high = max(vector.low, MINIMUM_INTEGER), min(vector.high, MAXIMUM_INTEGER)
+        if low > high:
+            return Number(self._arithmetic.constant(0), self._manager.false)
+        if (low, high) == (vector.low, vector.high):
+            return Number(vector, known)
+        # What lies beyond is unknown, so its bits do not matter; zero keeps the bounds true.
+        kept = tuple(known & bit for bit in vector.bits)
+        return Number(Vector(kept, min(low, 0), max(high, 0)), known)
+
+    # Partitions
+
+    def _truth(self, value: Symbolic) -> Truth:
+        if not isinstance(value, Truth):
+            raise InternalError("a condition is not boolean")
+        return value
+
+    def _partition(self, value: Symbolic) -> Partition:
+        match value:
+            case Partition():
+                return value
+            case Truth(true=true, false=false):
+                return Partition(((True, true), (False, false)))
+            case Number(vector=vector, known=known):
+                if vector.high - vector.low >= MAXIMUM_PARTITION:
+                    raise self._too_large()
+                return self._collect(
+                    (number, known & self._arithmetic.equal(vector, self._arithmetic.constant(number)))
+                    for number in range(vector.low, vector.high + 1)
+                )
+
+    def _pairs(self, operator: str, a: Partition, b: Partition) -> list[tuple[Value, Value, Any]]:
+        if len(a.cases) * len(b.cases) > MAXIMUM_PARTITION:
+            raise self._too_large()
+        pairs = ((first, second, p & q) for first, p in a.cases for second, q in b.cases)
+        return [pair for pair in pairs if pair[2] != self._manager.false]
+
+    def _collect(self, cases: Any) -> Partition:
+        """Cases with equal values put together; impossible and unknown ones left out."""
+        found: dict[tuple[str, Value], Any] = {}
+        for value, predicate in cases:
+            if value is not None and predicate != self._manager.false:
+                # 1 and 1.0 are the same key but not the same arithmetic: whole numbers overflow.
+                key = (type(value).__name__, value)
+                found[key] = found.get(key, self._manager.false) | predicate
+        return Partition(tuple((value, predicate) for (_, value), predicate in found.items()))
+
+    @staticmethod
+    def _too_large() -> UnsupportedModelError:
+        return UnsupportedModelError(
+            f"a condition computes with doubles over more than {MAXIMUM_PARTITION} combinations of values; "
+            "use integers, or smaller ranges"
+        )
+
+    # What an update writes
+
+    def written(self, bits: Bits, expression: Expression) -> tuple[dict[str, Any], Any]:
+        """For each bit of a variable its value after an update, and where the update leaves the range."""
+        value = self.translate(expression)
+        match value:
+            case Truth(true=true, false=false):
+                name = bits.names[0]
+                return {name: true | (self._manager.var(name) & ~false)}, self._manager.false
+            case Number(vector=vector, known=known):
+                return self._written_integer(bits, vector, known)
+            case Partition(cases=cases):
+                known = self._encoding.any_of(predicate for _, predicate in cases)
+                indexed = [(bits.domain.index(case), predicate) for case, predicate in cases]
+                new: dict[str, Any] = {}
+                for place, name in enumerate(reversed(bits.names)):
+                    chosen = self._encoding.any_of(p for index, p in indexed if (index >> place) & 1)
+                    new[name] = chosen | (self._manager.var(name) & ~known)
+                return new, self._manager.false
+
+    def _written_integer(self, bits: Bits, vector: Vector, known: Any) -> tuple[dict[str, Any], Any]:
+        low, high = int(bits.domain[0]), int(bits.domain[-1])
+        below = self._arithmetic.less(vector, self._arithmetic.constant(low))
+        above = self._arithmetic.less(self._arithmetic.constant(high), vector)
+        index = self._arithmetic.subtract(vector, self._arithmetic.constant(low))
+        padded = [*index.bits, *([index.bits[-1]] * len(bits.names))]
+        new = {
+            name: self._manager.ite(known, bit, self._manager.var(name))
+            for name, bit in zip(reversed(bits.names), padded, strict=False)
+        }
+        return new, known & (below | above)

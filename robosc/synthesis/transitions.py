@@ -1,0 +1,211 @@
+"""Events as predicates and next-state functions, without the product of the automata's edges.
+
+For each bit that an event may change there is one function of the state before it (and of received data): an
+if-then-else over the edges of the automaton it belongs to. The predecessors of a predicate are then found by
+substitution, and no next-state variable is needed backwards.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from robosc.automata.state import Subject
+from robosc.automata.structure import Automaton, Edge, Event, System
+from robosc.synthesis.encoding import Encoding, next_name
+from robosc.synthesis.symbolic import Symbols
+
+
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """What one event does; predicates are over current-state variables and `hidden` ones.
+
+    Attributes:
+        event: The event.
+        possible: Where every automaton takes an edge, for data that can come.
+        out_of_range: Where, taking it, an update leaves its variable's range.
+        condition: Where its event conditions are true (current-state variables only).
+        functions: Value of each changed bit after it.
+        hidden: Variables of received data and of choices between edges.
+    """
+
+    event: Event
+    possible: Any
+    out_of_range: Any
+    condition: Any
+    functions: dict[str, Any]
+    hidden: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Arc:
+    """An edge with the predicate where it is taken, what it writes and where it leaves a range."""
+
+    taken: Any
+    written: dict[str, Any]
+    out_of_range: Any
+
+
+def transitions_of(encoding: Encoding) -> tuple[Transition, ...]:
+    """Every event of a system, in its order."""
+    return tuple(_transition(encoding, event) for event in encoding.system.events)
+
+
+def _transition(encoding: Encoding, event: Event) -> Transition:
+    manager, system = encoding.manager, encoding.system
+    symbols = Symbols(encoding, encoding.inputs_of(event.name))
+    participants = [automaton for automaton in system.automata if event.name in automaton.alphabet]
+    # An event in no alphabet belongs to no plant, so it cannot happen.
+    possible = encoding.possible_inputs(event.name) if participants else manager.false
+    hidden = list(encoding.input_names(event.name))
+    functions: dict[str, Any] = {}
+    out_of_range = manager.false
+    for automaton in participants:
+        arcs, choice_names, valid_choice = _arcs(encoding, symbols, automaton, event.name)
+        hidden += choice_names
+        possible = possible & valid_choice & encoding.any_of(arc.taken for arc in arcs)
+        out_of_range = out_of_range | encoding.any_of(arc.taken & arc.out_of_range for arc in arcs)
+        functions |= _functions(encoding, arcs)
+    return Transition(
+        event=event,
+        possible=possible,
+        out_of_range=out_of_range,
+        condition=_condition(encoding, symbols, system, event.name),
+        functions=functions,
+        hidden=tuple(hidden),
+    )
+
+
+def _condition(encoding: Encoding, symbols: Symbols, system: System, event: str) -> Any:
+    return encoding.all_of(symbols.holds(item.condition) for item in system.conditions if item.event == event)
+
+
+def _arcs(
+    encoding: Encoding, symbols: Symbols, automaton: Automaton, event: str
+) -> tuple[list[_Arc], tuple[str, ...], Any]:
+    """The edges of an automaton for an event; where several may be taken, a choice decides."""
+    guards = [
+        (edge, encoding.in_location(automaton.name, edge.source) & symbols.holds(edge.guard))
+        for edge in automaton.edges
+        if edge.event == event
+    ]
+    rivals = _rivals(encoding, guards)
+    if not rivals:
+        return [_arc(encoding, symbols, automaton, edge, guard) for edge, guard in guards], (), encoding.manager.true
+    choice = encoding.choice(max(index for index in rivals.values()) + 1)
+    arcs = []
+    for number, (edge, guard) in enumerate(guards):
+        taken = guard & encoding.code(choice, rivals[number]) if number in rivals else guard
+        arcs.append(_arc(encoding, symbols, automaton, edge, taken))
+    return arcs, choice.names, encoding.valid(choice)
+
+
+def _rivals(encoding: Encoding, guards: Sequence[tuple[Edge, Any]]) -> dict[int, int]:
+    """Edges of which several can be taken in one state, each with its number among those of its location."""
+    false = encoding.manager.false
+    by_location: dict[str, list[int]] = {}
+    for number, (edge, _) in enumerate(guards):
+        by_location.setdefault(edge.source, []).append(number)
+    found: dict[int, int] = {}
+    for numbers in by_location.values():
+        overlap = any(
+            guards[first][1] & guards[second][1] != false
+            for place, first in enumerate(numbers)
+            for second in numbers[place + 1 :]
+        )
+        if overlap:
+            found |= {number: place for place, number in enumerate(numbers)}
+    return found
+
+
+def _arc(encoding: Encoding, symbols: Symbols, automaton: Automaton, edge: Edge, taken: Any) -> _Arc:
+    manager = encoding.manager
+    written: dict[str, Any] = {}
+    out_of_range = manager.false
+    if edge.target != edge.source:
+        location = encoding.subjects[Subject(automaton.name)]
+        index = location.domain.index(edge.target)
+        for place, name in enumerate(reversed(location.names)):
+            written[name] = manager.true if (index >> place) & 1 else manager.false
+    for update in edge.updates:
+        bits = encoding.subjects[Subject(automaton.name, update.variable)]
+        new, leaves = symbols.written(bits, update.expression)
+        written |= new
+        out_of_range = out_of_range | leaves
+    return _Arc(taken, written, out_of_range)
+
+
+def _functions(encoding: Encoding, arcs: Iterable[_Arc]) -> dict[str, Any]:
+    """The next value of every bit that one of the edges writes."""
+    manager = encoding.manager
+    arcs = list(arcs)
+    result: dict[str, Any] = {}
+    for name in dict.fromkeys(name for arc in arcs for name in arc.written):
+        current = manager.var(name)
+        value = current
+        for arc in arcs:
+            if name in arc.written:
+                value = manager.ite(arc.taken, arc.written[name], value)
+        if value != current:
+            result[name] = value
+    return result
+
+
+class Steps:
+    """Predecessors and successors of predicates under one event.
+
+    Args:
+        encoding: The variables.
+        transition: The event.
+    """
+
+    def __init__(self, encoding: Encoding, transition: Transition) -> None:
+        self._manager = encoding.manager
+        self._transition = transition
+        true, false = self._manager.true, self._manager.false
+        self._constants = {name: f == true for name, f in transition.functions.items() if f in (true, false)}
+        self._composed = {name: f for name, f in transition.functions.items() if name not in self._constants}
+        leaving = self._without_hidden(transition.possible & transition.out_of_range)
+        enabled = self._without_hidden(transition.possible)
+        self.event = transition.event
+        self.plant = enabled & ~leaving if self.event.is_controllable else enabled
+        """Where the plant enables the event; a controllable one must stay in every range."""
+        self.condition = transition.condition
+        """Where its event conditions are true."""
+        self.bad = self._manager.false if self.event.is_controllable else leaving | (enabled & ~transition.condition)
+        """States in which the event, uncontrollable, can do harm at once."""
+        self._in_range = transition.possible & ~transition.out_of_range
+        self._changed = tuple(transition.functions)
+        self._relation: Any = None
+
+    def some(self, predicate: Any) -> Any:
+        """Where the event can lead into a predicate."""
+        return self._without_hidden(self._in_range & self._after(predicate))
+
+    def only(self, predicate: Any) -> Any:
+        """Where the event, if it happens, leads into a predicate for all data."""
+        return ~self._without_hidden(self._in_range & ~self._after(predicate))
+
+    def image(self, states: Any) -> Any:
+        """The states that the event leads to from `states`."""
+        manager = self._manager
+        if self._relation is None:
+            relation = self._in_range
+            for name, function in self._transition.functions.items():
+                following = manager.var(next_name(name))
+                relation = relation & manager.ite(following, function, ~function)
+            self._relation = self._without_hidden(relation)
+        moved = self._exist(self._changed, states & self._relation)
+        return manager.let({next_name(name): name for name in self._changed}, moved) if self._changed else moved
+
+    def _after(self, predicate: Any) -> Any:
+        """Where a predicate will be true after the event: substitution of the next-state functions."""
+        # Constants first: what the other functions bring in are values from before the event.
+        if self._constants:
+            predicate = self._manager.let(self._constants, predicate)
+        return self._manager.let(self._composed, predicate) if self._composed else predicate
+
+    def _without_hidden(self, predicate: Any) -> Any:
+        return self._exist(self._transition.hidden, predicate)
+
+    def _exist(self, names: Sequence[str], predicate: Any) -> Any:
+        return self._manager.exist(names, predicate) if names else predicate

@@ -1,0 +1,107 @@
+"""Integers as vectors of predicates: two's complement, least significant bit first, exact in width.
+
+Ripple-carry addition, shift-and-add multiplication, comparison by the sign of a difference. No operation wraps
+around: the width of a result always suffices for its bounds.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from robosc.synthesis.engines import Manager
+
+
+@dataclass(frozen=True, slots=True)
+class Vector:
+    """An integer that depends on the state.
+
+    Attributes:
+        bits: Predicates, least significant first, the last one the sign.
+        low: A lower bound of its value.
+        high: An upper bound.
+    """
+
+    bits: tuple[Any, ...]
+    low: int
+    high: int
+
+
+def width_for(low: int, high: int) -> int:
+    """Bits of two's complement that hold every value from `low` to `high`."""
+    return max((low if low >= 0 else ~low).bit_length(), (high if high >= 0 else ~high).bit_length()) + 1
+
+
+class Arithmetic:
+    """Operations on vectors of one manager."""
+
+    def __init__(self, manager: Manager) -> None:
+        self._manager = manager
+
+    def constant(self, value: int) -> Vector:
+        """A number."""
+        bits = tuple(self._truth((value >> place) & 1) for place in range(width_for(value, value)))
+        return Vector(bits, value, value)
+
+    def unsigned(self, bits: Sequence[Any], high: int) -> Vector:
+        """A number from 0 to `high` of plain bits, least significant first."""
+        return Vector((*bits, self._manager.false), 0, high)
+
+    def add(self, a: Vector, b: Vector) -> Vector:
+        """The sum."""
+        low, high = a.low + b.low, a.high + b.high
+        width = width_for(low, high)
+        return Vector(self._sum(self._extend(a, width), self._extend(b, width), self._manager.false), low, high)
+
+    def negate(self, a: Vector) -> Vector:
+        """The opposite number."""
+        low, high = -a.high, -a.low
+        width = width_for(min(low, a.low), max(high, a.high))
+        inverted = tuple(~bit for bit in self._extend(a, width))
+        zero = (self._manager.false,) * width
+        return Vector(self._sum(inverted, zero, self._manager.true), low, high)
+
+    def subtract(self, a: Vector, b: Vector) -> Vector:
+        """The difference."""
+        return self.add(a, self.negate(b))
+
+    def multiply(self, a: Vector, b: Vector) -> Vector:
+        """The product."""
+        corners = (a.low * b.low, a.low * b.high, a.high * b.low, a.high * b.high)
+        low, high = min(corners), max(corners)
+        width = width_for(low, high)
+        first, second = self._extend(a, width), self._extend(b, width)
+        total = (self._manager.false,) * width
+        for place, bit in enumerate(second):
+            shifted = ((self._manager.false,) * place + first)[:width]
+            total = self._sum(total, tuple(bit & other for other in shifted), self._manager.false)
+        return Vector(total, low, high)
+
+    def less(self, a: Vector, b: Vector) -> Any:
+        """Where a < b."""
+        if a.high < b.low:
+            return self._manager.true
+        if a.low >= b.high:
+            return self._manager.false
+        return self.subtract(a, b).bits[-1]
+
+    def equal(self, a: Vector, b: Vector) -> Any:
+        """Where a = b."""
+        width = max(len(a.bits), len(b.bits))
+        result = self._manager.true
+        for first, second in zip(self._extend(a, width), self._extend(b, width), strict=True):
+            result = result & self._manager.ite(first, second, ~second)
+        return result
+
+    def _truth(self, bit: int) -> Any:
+        return self._manager.true if bit else self._manager.false
+
+    def _extend(self, a: Vector, width: int) -> tuple[Any, ...]:
+        return (*a.bits[:width], *(a.bits[-1],) * (width - len(a.bits)))
+
+    def _sum(self, a: Sequence[Any], b: Sequence[Any], carry: Any) -> tuple[Any, ...]:
+        result = []
+        for first, second in zip(a, b, strict=True):
+            differ = self._manager.ite(first, ~second, second)
+            result.append(self._manager.ite(differ, ~carry, carry))
+            carry = self._manager.ite(differ, carry, first)
+        return tuple(result)

@@ -1,0 +1,417 @@
+"""Every static rule of part A: one model that breaks just it, and one beside it that does not.
+
+`§` stands where the finding must point.
+"""
+
+import pytest
+from support.models import checked, marked_place
+
+from robosc.errors import Severity
+
+MESSAGE = "incoming message go with type: none outgoing message seen with type: boolean"
+STATES = "initial marked state a { } marked state b { }"
+
+
+def robot(*parts: str) -> str:
+    return "robot R {\n" + "\n".join(parts) + "\n}"
+
+
+def component(behaviour: str, communications: str = MESSAGE, name: str = "C") -> str:
+    return f"component {name} {{ {communications} behaviour {{ {behaviour} }} }}"
+
+
+OBJECT = (
+    "interface i use Scan from p datatype object Scan { range: double list: array(double) name: string n: integer }"
+)
+
+# code, severity, broken, sound
+RULES: list[tuple[str, str, str, str]] = [
+    (
+        "duplicate-component",
+        "error",
+        robot("component A { } component §a { }"),
+        robot("component A { } component B { }"),
+    ),
+    (
+        "duplicate-communication",
+        "error",
+        robot("component A { incoming message m with type: none } component B { incoming message §m with type: none }"),
+        robot("component A { incoming message m with type: none } component B { incoming message n with type: none }"),
+    ),
+    (
+        "duplicate-data-type",
+        "error",
+        robot("datatype object T { } datatype enum §t from double to { default -> x }", component(STATES)),
+        robot("datatype object T { } datatype enum U from double to { default -> x }", component(STATES)),
+    ),
+    (
+        "duplicate-interface",
+        "error",
+        robot("interface i use A from p interface §i use B from p", component(STATES)),
+        robot("interface i use A from p interface j use A from p", component(STATES)),
+    ),
+    (
+        "duplicate-property",
+        "error",
+        robot("datatype object T { x: double §X: double }", component(STATES)),
+        robot("datatype object T { x: double y: double }", component(STATES)),
+    ),
+    (
+        "duplicate-state",
+        "error",
+        robot(component("initial marked state a { } marked state §A { }")),
+        robot(component("initial marked state a { } marked state b { }")),
+    ),
+    (
+        "duplicate-variable",
+        "error",
+        robot(component("variable v: boolean variable §v: boolean " + STATES)),
+        robot(component("variable v: boolean variable w: boolean " + STATES)),
+    ),
+    (
+        "duplicate-variable",
+        "error",
+        robot(component("variable §a: boolean " + STATES)),
+        robot(component("variable go: boolean " + STATES)),
+    ),
+    (
+        "duplicate-enum-value",
+        "error",
+        robot("datatype enum E from double to { value > 1 -> x default -> §X }", component(STATES)),
+        robot("datatype enum E from double to { value > 1 -> x default -> y }", component(STATES)),
+    ),
+    (
+        "no-initial-state",
+        "error",
+        robot(component("marked state a { }").replace("behaviour", "§behaviour")),
+        robot(component(STATES)),
+    ),
+    (
+        "multiple-initial-states",
+        "error",
+        robot(component("initial marked state a { } initial marked state §b { }")),
+        robot(component(STATES)),
+    ),
+    (
+        "marked-unreachable",
+        "error",
+        robot(component("initial marked state a { on request to go goto b } state §b { }")),
+        robot(component("initial marked state a { on request to go goto b } state b { on response from seen goto a }")),
+    ),
+    (
+        "multiple-behaviours",
+        "error",
+        robot(component(STATES).removesuffix("}") + f"§behaviour {{ {STATES} }} }}"),
+        robot(component(STATES)),
+    ),
+    (
+        "wrong-result-kind",
+        "error",
+        robot(component("§on feedback from seen " + STATES)),
+        robot(component("on response from seen " + STATES)),
+    ),
+    (
+        "wrong-result-kind",
+        "error",
+        robot(component("§on response from go " + STATES)),
+        robot(component("on request to go " + STATES)),
+    ),
+    (
+        "wrong-preposition",
+        "warning",
+        robot(component("on response §to seen " + STATES)),
+        robot(component("on response from seen " + STATES)),
+    ),
+    (
+        "provide-to-outgoing",
+        "error",
+        robot(component(STATES), "provide §seen with true"),
+        robot(component(STATES, "incoming message go with type: boolean"), "provide go with true"),
+    ),
+    (
+        "requirement-on-outgoing",
+        "error",
+        robot(component(STATES), "requirement §seen needs C.a"),
+        robot(component(STATES), "requirement go needs C.a"),
+    ),
+    (
+        "update-on-incoming",
+        "error",
+        robot(component("variable v: boolean on request to go do §v := true " + STATES)),
+        robot(component("variable v: boolean on response from seen do v := true " + STATES)),
+    ),
+    (
+        "update-out-of-scope",
+        "error",
+        robot(
+            component("on response from seen do §D.v := true " + STATES),
+            component("variable v: boolean initial marked state a { }", "", "D"),
+        ),
+        robot(component("variable v: boolean on response from seen do C.v := true " + STATES)),
+    ),
+    (
+        "duplicate-assignment",
+        "error",
+        robot(component("variable v: boolean on response from seen do v := true, §v := false " + STATES)),
+        robot(
+            component("variable v: boolean variable w: boolean on response from seen do v := true, w := v " + STATES)
+        ),
+    ),
+    (
+        "nondeterministic-request",
+        "error",
+        robot(component("initial marked state a { on request to go goto b §on request to go } marked state b { }")),
+        robot(component("initial marked state a { on request to go goto b } marked state b { on request to go }")),
+    ),
+    (
+        "nondeterministic-event",
+        "warning",
+        robot(component("on response from seen initial marked state a { §on response from seen goto a }")),
+        robot(component("initial marked state a { on response from seen goto a }")),
+    ),
+    (
+        "type-mismatch",
+        "error",
+        robot(component("variable v: boolean on response from seen do v := §3 " + STATES)),
+        robot(component("variable v: double on response from seen do v := 3 " + STATES)),
+    ),
+    (
+        "unknown-name",
+        "error",
+        robot(component(STATES), "requirement go needs C.§c"),
+        robot(component(STATES), "requirement go needs C.a"),
+    ),
+    (
+        "ambiguous-name",
+        "error",
+        robot(
+            "datatype enum E from double to { default -> x } datatype enum F from double to { default -> x }",
+            component(STATES),
+            "requirement go needs §x = true",
+        ),
+        robot(
+            "datatype enum E from double to { default -> x } datatype enum F from double to { default -> x }",
+            component("variable v: E " + STATES),
+            "requirement go needs x = C.v",
+        ),
+    ),
+    (
+        "no-value-here",
+        "error",
+        robot(component(STATES), "requirement go needs §value"),
+        robot(
+            component("variable v: boolean on response from seen do v := value " + STATES), "requirement go needs C.v"
+        ),
+    ),
+    (
+        "integer-range-required",
+        "error",
+        robot(component("variable v: §integer " + STATES), "requirement go needs C.v > 0"),
+        robot(component("variable v: integer(0..3) " + STATES), "requirement go needs C.v > 0"),
+    ),
+    (
+        "double-in-synthesis",
+        "error",
+        robot(component("variable v: §double " + STATES), "requirement go needs C.v > 0"),
+        robot(component("variable v: double " + STATES)),
+    ),
+    (
+        "string-in-synthesis",
+        "error",
+        robot(component("variable v: §string " + STATES), 'requirement go needs C.v = "x"'),
+        robot(component("variable v: string " + STATES)),
+    ),
+    (
+        "may-leave-range",
+        "warning",
+        robot(
+            component(
+                "variable v: integer(0..10) on response from n do v := §value " + STATES,
+                "outgoing message n with type: integer(0..100)",
+            )
+        ),
+        robot(
+            component(
+                "variable v: integer(0..10) on response from n do v := value " + STATES,
+                "outgoing message n with type: integer(1..9)",
+            )
+        ),
+    ),
+    (
+        "infinite-source",
+        "error",
+        robot(
+            component(
+                "variable v: boolean on response from d do v := value §> 0.5 " + STATES,
+                "outgoing message d with type: double incoming message go with type: none",
+            ),
+            "requirement go needs C.v",
+        ),
+        robot(
+            "datatype enum E from double to { value > 0.5 -> yes default -> no }",
+            component(
+                "variable v: boolean on response from d do v := value = yes " + STATES,
+                "outgoing message d with type: E incoming message go with type: none",
+            ),
+            "requirement go needs C.v",
+        ),
+    ),
+    (
+        "array-not-allowed",
+        "error",
+        robot(component(STATES, "incoming message m with type: §array(double)")),
+        robot(OBJECT, component(STATES, "incoming message m with type: Scan links i")),
+    ),
+    (
+        "object-variable",
+        "error",
+        robot(OBJECT, component("variable v: §Scan " + STATES)),
+        robot(OBJECT, component("variable v: double " + STATES)),
+    ),
+    (
+        "enum-default",
+        "error",
+        robot("datatype enum §E from double to { value > 1 -> x }", component(STATES)),
+        robot("datatype enum E from double to { value > 1 -> x default -> y }", component(STATES)),
+    ),
+    (
+        "enum-default",
+        "error",
+        robot("datatype enum E from double to { default -> x default -> §y }", component(STATES)),
+        robot("datatype enum E from double to { default -> y }", component(STATES)),
+    ),
+    (
+        "enum-default",
+        "error",
+        robot(
+            "datatype enum E from double to { default -> x } datatype enum F from §E to { default -> y }",
+            component(STATES),
+        ),
+        robot("datatype enum E from double to { default -> x }", component(STATES)),
+    ),
+    (
+        "links-required",
+        "error",
+        robot(OBJECT, component(STATES, "incoming message m with type: §Scan")),
+        robot(OBJECT, component(STATES, "incoming message m with type: Scan links i")),
+    ),
+    (
+        "links-required",
+        "error",
+        robot(
+            OBJECT,
+            "datatype enum E from Scan to { value.range > 1 -> x default -> y }",
+            component(STATES, "outgoing message m with type: §E"),
+        ),
+        robot(
+            OBJECT,
+            "datatype enum E from Scan to { value.range > 1 -> x default -> y }",
+            component(STATES, "outgoing message m with type: E links i"),
+        ),
+    ),
+    (
+        "shared-topic",
+        "warning",
+        robot(
+            'component A { outgoing message m with identifier: "/t", type: none }',
+            'component B { outgoing message §n with identifier: "/t", type: none }',
+        ),
+        robot(
+            'component A { outgoing message m with identifier: "/t", type: none outgoing message n with identifier: "/t", type: none }'
+        ),
+    ),
+    (
+        "conflicting-topic",
+        "warning",
+        robot(
+            'component A { outgoing message m with identifier: "/t", type: none outgoing message §n with identifier: "/t", type: double }'
+        ),
+        robot(
+            'component A { outgoing message m with identifier: "/t", type: none outgoing message n with identifier: "/u", type: double }'
+        ),
+    ),
+    (
+        "partial-update",
+        "note",
+        robot(
+            component(
+                "variable §v: double initial marked state a { on response from seen do v := 1 goto b } marked state b { }"
+            )
+        ),
+        robot(component("variable v: double on response from seen do v := 1 " + STATES)),
+    ),
+    (
+        "request-leaves-requirement",
+        "note",
+        robot(
+            "interface i use A from p",
+            component(
+                "initial marked state a { on request to act goto b } state b { on response from act goto a }",
+                "action act with request: none, response: none, feedback: none links i",
+            ),
+            "§requirement act needs C.a",
+        ),
+        robot(
+            "interface i use A from p",
+            component(
+                "on request to act " + STATES, "action act with request: none, response: none, feedback: none links i"
+            ),
+            "requirement act needs C.a",
+        ),
+    ),
+    ("empty-model", "warning", "robot §R { }", robot(component(STATES))),
+    (
+        "integer-too-large",
+        "error",
+        robot(component("variable v: integer = §2147483648 " + STATES)),
+        robot(component("variable v: integer = 2147483647 " + STATES)),
+    ),
+    (
+        "name-too-long",
+        "error",
+        f"robot §{'r' * 256} {{ {component(STATES)} }}",
+        f"robot {'r' * 255} {{ {component(STATES)} }}",
+    ),
+]
+
+
+@pytest.mark.parametrize(("code", "severity", "broken", "sound"), RULES, ids=[rule[0] for rule in RULES])
+def test_rule(code: str, severity: str, broken: str, sound: str) -> None:
+    text, line, column = marked_place(broken)
+    found = [item for item in checked(text).diagnostics if item.location]
+    assert [(item.code, str(item.severity), item.location.line, item.location.column) for item in found] == [
+        (code, severity, line, column)
+    ]
+    assert found[0].mend.endswith(".")
+    assert code not in {item.code for item in checked(sound).diagnostics}
+    assert not checked(sound).has_errors, checked(sound).diagnostics
+
+
+def test_all_findings_come_in_one_run_sorted_by_place() -> None:
+    text = robot(
+        component("variable v: boolean = 3 on response to seen do w := true " + STATES),
+        "requirement seen needs C.x",
+        "provide go with 1",
+    )
+    found = checked(text).diagnostics
+    assert [item.code for item in found] == [
+        "type-mismatch",
+        "wrong-preposition",
+        "update-out-of-scope",
+        "requirement-on-outgoing",
+        "unknown-name",
+        "type-mismatch",
+    ]
+    assert [item.location for item in found] == sorted(item.location for item in found if item.location)
+
+
+@pytest.mark.parametrize(("expression", "near"), [("Camera.restin", "resting"), ("camera.resting", "Camera"), ("Camera.v = near_by", "nearby")])
+def test_a_near_name_is_suggested(expression: str, near: str) -> None:
+    text = robot(
+        "datatype enum E from double to { value > 1 -> nearby default -> far }",
+        component("variable v: E initial marked state resting { }", name="Camera"),
+        f"requirement go needs {expression}",
+    )
+    (found,) = checked(text).diagnostics
+    assert found.severity is Severity.ERROR
+    assert f"did you mean '{near}'?" in found.message

@@ -1,0 +1,49 @@
+"""Models as texts in tests."""
+
+from pathlib import Path
+
+from robosc.language import load_bundle
+from robosc.model import Checked, check
+from robosc.model.structure import Model
+from robosc.source import Bundle, SourceFile
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+EXAMPLE_NAMES = (
+    "line_follower/line_follower",
+    "line_follower/line_follower_layer",
+    "maze_solver/maze_solver",
+    "navigation/navigation",
+)
+
+
+def bundle_of(text: str, **libraries: str) -> Bundle:
+    """A bundle of a model's text and libraries by file name (without the ending)."""
+    files = tuple(SourceFile(f"{name}.rscd", source) for name, source in sorted(libraries.items()))
+    return Bundle(SourceFile("model.rscd", text), files, (".",))
+
+
+def checked(text: str, **libraries: str) -> Checked:
+    """The check of a model's text."""
+    return check(bundle_of(text, **libraries))
+
+
+def model_of(text: str, **libraries: str) -> Model:
+    """The model of a text without errors."""
+    return checked(text, **libraries).model_or_raise()
+
+
+def example_bundle(name: str) -> Bundle:
+    """The bundle of an example robot, such as `maze_solver/maze_solver`."""
+    return load_bundle(EXAMPLES / f"{name}.rscd")
+
+
+def example_model(name: str) -> Model:
+    """The model of an example robot."""
+    return check(example_bundle(name)).model_or_raise()
+
+
+def marked_place(text: str) -> tuple[str, int, int]:
+    """A text without its one `§`, and the line and column where that stood."""
+    before, mark, after = text.partition("§")
+    assert mark and "§" not in after
+    return before + after, before.count("\n") + 1, len(before) - before.rfind("\n")

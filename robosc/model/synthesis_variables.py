@@ -86,7 +86,7 @@ def check_synthesis_variables(
                 code, mend = "string-in-synthesis", "Use an enum made from the string."
         findings.error(
             code,
-            f"'{variable.name}' decides about requests, so it cannot be of the infinite type {type_text(variable.type)}",
+            f"'{variable.name}' decides about requests, so it cannot be of type {type_text(variable.type)}",
             places[variable.name],
             mend,
         )

@@ -145,6 +145,8 @@ def _branches(node: DecisionNode, count: int) -> list[tuple[int, Indices]]:
 
 def _formula(node: DecisionNode, domain: SubjectDomain, built: Sequence[Expression]) -> Expression:
     branches = _branches(node, len(domain))
+    if len(branches) == 1:  # A file may hold a node that decides nothing.
+        return built[branches[0][0]]
     if len(branches) == 2:
         (first, where), (second, elsewhere) = branches
         if first == 1 or second == 0:

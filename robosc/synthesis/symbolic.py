@@ -211,12 +211,21 @@ class Symbols:
             case Truth(true=true, false=false):
                 return Partition(((True, true), (False, false)))
             case Number(vector=vector, known=known):
-                if vector.high - vector.low >= MAXIMUM_PARTITION:
-                    raise self._too_large()
-                return self._collect(
-                    (number, known & self._arithmetic.equal(vector, self._arithmetic.constant(number)))
-                    for number in range(vector.low, vector.high + 1)
-                )
+                return self._values_of(vector, known)
+
+    def _values_of(self, vector: Vector, known: Any) -> Partition:
+        """The values that an integer has somewhere: its bits split what is known, the sign first."""
+        sign = len(vector.bits) - 1
+        cases: list[tuple[int, Any]] = [(0, known)]
+        for place in range(sign, -1, -1):
+            bit = vector.bits[place]
+            weight = -(1 << place) if place == sign else 1 << place
+            split = [(value, where & ~bit) for value, where in cases]
+            split += [(value + weight, where & bit) for value, where in cases]
+            cases = [case for case in split if case[1] != self._manager.false]
+            if len(cases) > MAXIMUM_PARTITION:
+                raise self._too_large()
+        return Partition(tuple(cases))
 
     def _pairs(self, operator: str, a: Partition, b: Partition) -> list[tuple[Value, Value, Any]]:
         if len(a.cases) * len(b.cases) > MAXIMUM_PARTITION:

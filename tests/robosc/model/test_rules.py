@@ -4,9 +4,9 @@
 """
 
 import pytest
-from support.models import checked, marked_place
 
 from robosc.errors import Severity
+from support.models import checked, marked_place
 
 MESSAGE = "incoming message go with type: none outgoing message seen with type: boolean"
 STATES = "initial marked state a { } marked state b { }"
@@ -405,7 +405,10 @@ def test_all_findings_come_in_one_run_sorted_by_place() -> None:
     assert [item.location for item in found] == sorted(item.location for item in found if item.location)
 
 
-@pytest.mark.parametrize(("expression", "near"), [("Camera.restin", "resting"), ("camera.resting", "Camera"), ("Camera.v = near_by", "nearby")])
+@pytest.mark.parametrize(
+    ("expression", "near"),
+    [("Camera.restin", "resting"), ("camera.resting", "Camera"), ("Camera.v = near_by", "nearby")],
+)
 def test_a_near_name_is_suggested(expression: str, near: str) -> None:
     text = robot(
         "datatype enum E from double to { value > 1 -> nearby default -> far }",

@@ -1,0 +1,243 @@
+"""The grammar of part A, its lexical corners, and what the parser says of broken texts."""
+
+import string
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from robosc.errors import Diagnostic
+from robosc.language import parse, syntax
+from robosc.source import SourceFile
+from support.models import EXAMPLE_NAMES, EXAMPLES
+
+
+def tree_of(text: str) -> syntax.File:
+    parsed = parse(SourceFile("model.rscd", text))
+    assert parsed.diagnostics == ()
+    assert parsed.tree is not None
+    return parsed.tree
+
+
+def faults(text: str) -> tuple[Diagnostic, ...]:
+    parsed = parse(SourceFile("model.rscd", text))
+    assert parsed.tree is None
+    assert parsed.diagnostics
+    return parsed.diagnostics
+
+
+def expression(text: str) -> syntax.Expression:
+    (requirement,) = tree_of(f"robot R {{ requirement r needs {text} }}").items
+    assert isinstance(requirement, syntax.Requirement)
+    return requirement.expression
+
+
+def shape(tree: syntax.Expression) -> str:
+    """An expression with every pair of parentheses written."""
+    match tree:
+        case syntax.Literal(value=value):
+            return repr(value)
+        case syntax.Access(root=root, steps=steps):
+            parts = [f".{s.text}" if isinstance(s, syntax.Name) else f"[{s.value}]" for s in steps]
+            return ("value" if root is None else root.text) + "".join(parts)
+        case syntax.Unary(operator=operator, operand=operand):
+            return f"{operator}{shape(operand)}"
+        case syntax.Binary(operator=operator, left=left, right=right):
+            return f"({shape(left)} {operator} {shape(right)})"
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("a or b and c", "(a or (b and c))"),
+        ("a and b or c", "((a and b) or c)"),
+        ("a = b and c", "((a = b) and c)"),
+        ("b = y != 0", "(b = (y != 0))"),
+        ("a = b = c", "((a = b) = c)"),
+        ("a != b < c", "(a != (b < c))"),
+        ("a < b + c * d", "(a < (b + (c * d)))"),
+        ("a - b - c", "((a - b) - c)"),
+        ("a / b * c", "((a / b) * c)"),
+        ("a * !b", "(a * !b)"),
+        ("!-a", "!-a"),
+        ("--a", "--a"),
+        ("-a + b", "(-a + b)"),
+        ("!a and b", "(!a and b)"),
+        ("!(a and b)", "!(a and b)"),
+        ("(a or b) and c", "((a or b) and c)"),
+        ("a => b", "(a => b)"),
+        ("!a => !b", "(!a => !b)"),
+        ("(a => b) or c", "((a => b) or c)"),
+        ("a>=b", "(a >= b)"),
+        ("a=!b", "(a = !b)"),
+        ("a!=b", "(a != b)"),
+        ("a<-b", "(a < -b)"),
+        ("order and android", "(order and android)"),
+        ("value.list[3].x", "value.list[3].x"),
+        ("3.25", "3.25"),
+        ("0.05", "0.05"),
+        (r"'it\'s'", '"it\'s"'),
+        (r'"a\"b\\c\n"', "'a\"b\\\\c\\n'"),
+        ("^state", "state"),
+        ("type and identifier", "(type and identifier)"),
+        ("a // or b\n and c", "(a and c)"),
+        ("a /* or b */ and c", "(a and c)"),
+    ],
+)
+def test_expressions(text: str, expected: str) -> None:
+    assert shape(expression(text)) == expected
+
+
+NAMES = ("alpha", "beta", "gamma.delta", "value", "1", "2.5", "true")
+OPERATORS = (*(operator for operator in "or and = != > >= < <= + - * /".split()),)
+LEVELS = {"or": 1, "and": 2, "=": 3, "!=": 4, ">": 5, ">=": 5, "<": 5, "<=": 5, "+": 6, "-": 6, "*": 7, "/": 7}
+
+
+def printed(tree: str | tuple[str, object, object] | tuple[str, object], level: int = 0) -> str:
+    """A tree with as few parentheses as A.3 allows: the parser must find the same tree again."""
+    if isinstance(tree, str):
+        return tree
+    if len(tree) == 2:
+        operator, operand = tree
+        mine = 8 if operator == "!" else 9
+        text = f"{operator}{printed(operand, mine)}"  # type: ignore[arg-type]
+        return text if mine >= level else f"({text})"
+    operator, left, right = tree
+    mine = LEVELS[operator]
+    text = f"{printed(left, mine)} {operator} {printed(right, mine + 1)}"  # type: ignore[arg-type]
+    return text if mine >= level else f"({text})"
+
+
+def full(tree: object) -> str:
+    if isinstance(tree, str):
+        return {"true": "True"}.get(tree, tree)
+    assert isinstance(tree, tuple)
+    if len(tree) == 2:
+        return f"{tree[0]}{full(tree[1])}"
+    return f"({full(tree[1])} {tree[0]} {full(tree[2])})"
+
+
+trees = st.recursive(
+    st.sampled_from(NAMES),
+    lambda inner: st.one_of(
+        st.tuples(st.sampled_from(OPERATORS), inner, inner), st.tuples(st.sampled_from(["!", "-"]), inner)
+    ),
+    max_leaves=10,
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(trees)
+def test_precedence_and_association_of_random_trees(tree: object) -> None:
+    assert shape(expression(printed(tree))) == full(tree)  # type: ignore[arg-type]
+
+
+def test_a_long_chain_needs_no_deep_recursion() -> None:
+    text = " or ".join(f"a{n}" for n in range(3000))
+    assert shape(expression(text)).count(" or ") == 2999
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "column"),
+    [
+        ("a => b => c", "ambiguous-implication", 3),
+        ("a => b or c", "ambiguous-implication", 3),
+        ("a = b => c", "ambiguous-implication", 7),
+        ("-!a", "syntax-error", 2),
+        ("1 .5", "syntax-error", 3),
+        ("2147483648", "integer-too-large", 1),
+        ("9" * 5000, "integer-too-large", 1),
+        ("é", "syntax-error", 1),
+        ("state", "syntax-error", 1),
+        ("a ->b", "syntax-error", 3),
+    ],
+)
+def test_broken_expressions(text: str, code: str, column: int) -> None:
+    prefix = "robot R { requirement r needs "
+    (found,) = faults(prefix + text + " }")
+    assert (found.code, found.location and found.location.column) == (code, len(prefix) + column)
+
+
+def test_both_readings_of_a_mixed_implication_are_shown() -> None:
+    (found,) = faults("robot R { requirement r needs a => b or c }")
+    assert "'(a => b) or c'" in found.message
+    assert "'a => (b or c)'" in found.message
+
+
+def test_an_arrow_needs_no_blank() -> None:
+    (enum,) = tree_of("library L { datatype enum E from double to { value>0.7-> safe default->unsafe } }").items
+    assert isinstance(enum, syntax.EnumDefinition)
+    assert [rule.value.text for rule in enum.rules] == ["safe", "unsafe"]
+
+
+def test_free_words_and_blanks_before_colons() -> None:
+    tree = tree_of(
+        "robot type { component identifier { incoming message depth with identifier : 'x', type : none "
+        "action always with request : none, response:none, feedback :none } requirement always needs identifier.x }"
+    )
+    assert tree.name.text == "type"
+    component = tree.items[0]
+    assert isinstance(component, syntax.Component)
+    assert [item.name.text for item in component.items if not isinstance(item, syntax.Behaviour)] == ["depth", "always"]
+
+
+def test_places_count_characters_and_cover_names() -> None:
+    tree = tree_of("// é\nrobot R {\n\tcomponent Camera { }\n}")
+    assert tree.items[0].name.location.line == 3  # type: ignore[union-attr]
+    assert tree.items[0].name.location.column == 12  # type: ignore[union-attr]
+    assert tree.items[0].name.location.length == 6  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "line", "column", "words"),
+    [
+        ("", "empty-file", 1, 1, "empty"),
+        (" \n ", "empty-file", 1, 1, "empty"),
+        ("robot", "syntax-error", 1, 6, "expected a name"),
+        ("robot R {\n /* open", "unclosed-comment", 2, 2, "never closed"),
+        ('robot R { component C { incoming message m with identifier: "x', "unclosed-string", 1, 61, "never closed"),
+        ("robot R { \0 }", "invalid-character", 1, 11, "NUL"),
+        ("robot R { " + "(" * 300, "nesting-too-deep", 1, 210, "200"),
+        ("robot R { requirement r needs " + "!" * 300 + "a }", "nesting-too-deep", 1, 31, "200"),
+        ("robot R { requirement r needs " + "-" * 100000 + "a }", "nesting-too-deep", 1, 31, "200"),
+        ("robot R { requirement r needs a" + "+a" * 300 + " }", "nesting-too-deep", 1, 31, "200"),
+        ("robot R { component C { message m with type: none } }", "syntax-error", 1, 25, "'incoming'"),
+        ("library L { requirement r needs a }", "syntax-error", 1, 13, "'component'"),
+        ("robot R { } robot S { }", "syntax-error", 1, 13, "end of the file"),
+        ("robot R { component state { } }", "syntax-error", 1, 21, "a name"),
+    ],
+)
+def test_broken_texts(text: str, code: str, line: int, column: int, words: str) -> None:
+    (found,) = faults(text)
+    assert found.location is not None
+    assert (found.code, found.location.line, found.location.column) == (code, line, column)
+    assert words in found.message
+
+
+def test_a_reserved_word_as_a_name_is_explained() -> None:
+    (found,) = faults("robot R { component state { } }")
+    assert found.mend == "If 'state' is meant as a name, write '^state'."
+
+
+EXAMPLE_TEXTS = [(EXAMPLES / f"{name}.rscd").read_text(encoding="utf-8") for name in EXAMPLE_NAMES]
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.text(alphabet=string.printable + "é\0→", max_size=200))
+@example('"')
+@example("/*")
+def test_garbage_never_raises(text: str) -> None:
+    parse(SourceFile("model.rscd", text))
+    parse(SourceFile("model.rscd", f"robot R {{ {text}"))
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.sampled_from(EXAMPLE_TEXTS), st.data())
+def test_mutated_models_never_raise(text: str, data: st.DataObject) -> None:
+    begin = data.draw(st.integers(0, len(text)))
+    end = data.draw(st.integers(begin, min(len(text), begin + 40)))
+    inserted = data.draw(
+        st.sampled_from(["", "{", "}", "(", '"', "/*", "-", "->", "state", "value", "99999999999", "\0"])
+    )
+    parsed = parse(SourceFile("model.rscd", text[:begin] + inserted + text[end:]))
+    assert (parsed.tree is None) == bool(parsed.diagnostics)

@@ -1,0 +1,209 @@
+"""Symbolic synthesis against the explicit twin, the same suite over every engine."""
+
+import os
+from collections import Counter
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robosc.automata import Automaton, Edge, Event, InputVariable, System
+from robosc.automata.controlled import controlled_graph
+from robosc.automata.semantics import Semantics
+from robosc.automata.structure import Assignment, DiscreteVariable, EventCondition
+from robosc.errors import SynthesisCancelled
+from robosc.expressions import BooleanType, IntegerType, Received
+from robosc.expressions.tree import Binary, Constant, VariableRead
+from robosc.supervisor.conditions import state_predicates
+from robosc.synthesis import Progress, SynthesisStatus, UnknownEngineError, synthesize
+from robosc.verification import synthesize_explicit
+from support.random_systems import kind, random_system
+
+ENGINES = ("cudd", "autoref")
+EXAMPLES = int(os.environ.get("ROBOSC_RANDOM_SYSTEMS", "300"))
+"""Random systems in one run; set the variable to try more."""
+
+LIMIT = 50_000
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _needs_cudd() -> None:
+    pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+
+
+def agree(system: System) -> str:
+    """Compare both engines with the explicit twin in every reachable state; returns the system's kind."""
+    explicit = synthesize_explicit(system, limit=LIMIT)
+    assert explicit is not None
+    results = [synthesize(system, engine=engine) for engine in ENGINES]
+    first = results[0]
+    assert all(result.added == first.added and result.status == first.status for result in results)
+    assert all(result.statistics.states == first.statistics.states for result in results)
+    assert (first.status is SynthesisStatus.EMPTY) == explicit.is_empty
+    if explicit.is_empty:
+        assert first.reason
+        return "empty"
+    assert first.statistics.states == len(explicit.reachable)
+    semantics = Semantics(system)
+    added = state_predicates(system, first.added)
+    disables = False
+    for state in explicit.reachable:
+        for event in system.events:
+            if not event.is_controllable:
+                assert event.name not in added
+                continue
+            plant = semantics.enabled(state, event.name) and semantics.condition(state, event.name)
+            allowed = plant and (event.name not in added or added[event.name](state))
+            assert allowed == explicit.allows(state, event.name), (state, event)
+            disables = disables or (plant and not allowed)
+    graph = controlled_graph(semantics, added, limit=LIMIT)
+    assert graph is not None
+    assert set(graph.states) == set(explicit.reachable)
+    return "disables" if disables else "free"
+
+
+def test_random_systems(capsys: pytest.CaptureFixture[str]) -> None:
+    shares: Counter[str] = Counter()
+
+    @settings(max_examples=EXAMPLES, deadline=None, database=None, derandomize=True)
+    @given(st.integers(0, 2**32 - 1))
+    def compare(seed: int) -> None:
+        system = random_system(seed)
+        found = agree(system)
+        assert found == kind(system)
+        shares[found] += 1
+
+    compare()
+    total = sum(shares.values())
+    with capsys.disabled():
+        print(f"\nrandom systems: {total}, " + ", ".join(f"{n} {shares[n] / total:.0%}" for n in sorted(shares)))
+    assert shares["disables"] >= total / 2
+    assert shares["empty"] >= total / 10
+
+
+@pytest.fixture(params=ENGINES)
+def engine(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+def counter(high: int, *, controllable: bool = True) -> System:
+    """A counter that one event raises, and another sets back."""
+    up = Binary("+", VariableRead("C", "n"), Constant(1))
+    automaton = Automaton(
+        name="C",
+        locations=("only",),
+        initial="only",
+        marked=frozenset({"only"}),
+        alphabet=frozenset({"up", "zero"}),
+        edges=(
+            Edge("only", "up", "only", updates=(Assignment("n", up),)),
+            Edge("only", "zero", "only", updates=(Assignment("n", Constant(0)),)),
+        ),
+        variables=(DiscreteVariable("n", IntegerType(0, high), 0),),
+    )
+    return System("Counter", (Event("up", controllable), Event("zero", True)), (automaton,))
+
+
+@pytest.mark.parametrize("high", [1, 2, 3, 7, 100])
+def test_a_counter_stops_at_its_bound(engine: str, high: int) -> None:
+    result = synthesize(counter(high), engine=engine)
+    assert result.statistics.states == high + 1
+    # The range itself disables the event: there is nothing for the supervisor to add.
+    assert result.added == ()
+
+
+def test_a_counter_that_nobody_can_stop_has_no_supervisor(engine: str) -> None:
+    result = synthesize(counter(3, controllable=False), engine=engine)
+    assert result.status is SynthesisStatus.EMPTY
+    assert "uncontrollable" in result.reason
+
+
+def test_counts_are_exact_beyond_a_double(engine: str) -> None:
+    """60 toggles have 2^60 states, and one automaton more makes the number odd."""
+    toggles = [
+        Automaton(
+            f"T{number}",
+            ("off", "on"),
+            "off",
+            frozenset({"off", "on"}),
+            frozenset({f"t{number}"}),
+            (Edge("off", f"t{number}", "on"), Edge("on", f"t{number}", "off")),
+        )
+        for number in range(60)
+    ]
+    line = Automaton(
+        "Three",
+        ("a", "b", "c"),
+        "a",
+        frozenset({"a", "b", "c"}),
+        frozenset({"next"}),
+        (Edge("a", "next", "b"), Edge("b", "next", "c")),
+    )
+    events = (*(Event(f"t{number}", True) for number in range(60)), Event("next", True))
+    result = synthesize(System("Many", events, (*toggles, line)), engine=engine)
+    assert result.statistics.states == 3 * 2**60
+
+
+def nested(paths: tuple[tuple[str | int, ...], ...]) -> System:
+    """One automaton that remembers the last received elements of arrays within arrays."""
+    variables = tuple(DiscreteVariable(f"v{n}", BooleanType(), False) for n in range(len(paths)))
+    updates = tuple(Assignment(f"v{n}", Received(path)) for n, path in enumerate(paths))
+    automaton = Automaton(
+        "A", ("l",), "l", frozenset({"l"}), frozenset({"e"}), (Edge("l", "e", "l", updates=updates),), variables
+    )
+    inputs = tuple(InputVariable("e", path, BooleanType(), may_be_unknown=True) for path in paths)
+    return System("Nested", (Event("e", False),), (automaton,), inputs)
+
+
+@pytest.mark.parametrize(
+    "paths",
+    [
+        (("a", 0), ("a", 2)),
+        (("a", 0), ("b", 0)),
+        (("a", 1, "b", 0), ("a", 0, "b", 3)),
+        (("a", 1, "b", 0), ("a", 1, "b", 3), ("a", 0, "b", 3)),
+        (("a", 2), ("a", 1), ("a", 1, "b", 0)),
+    ],
+)
+def test_arrays_within_arrays(paths: tuple[tuple[str | int, ...], ...]) -> None:
+    """Which elements can be missing together shows in the states that one event reaches."""
+    assert agree(nested(paths)) == "free"
+
+
+def test_cancelling(engine: str) -> None:
+    asked = 0
+
+    def stop() -> bool:
+        nonlocal asked
+        asked += 1
+        return asked > 3
+
+    with pytest.raises(SynthesisCancelled):
+        synthesize(counter(100), engine=engine, should_stop=stop)
+    assert asked == 4
+
+
+def test_progress_is_told(engine: str) -> None:
+    told: list[Progress] = []
+    synthesize(counter(3), engine=engine, on_progress=told.append)
+    assert {progress.phase for progress in told} == {"fixed point", "reachability"}
+    assert all(progress.nodes > 0 for progress in told)
+
+
+def test_an_unknown_engine_is_refused() -> None:
+    with pytest.raises(UnknownEngineError, match="there are auto, autoref, cudd"):
+        synthesize(counter(3), engine="sylvan")
+
+
+def test_an_event_condition_on_an_uncontrollable_event_makes_states_bad(engine: str) -> None:
+    """Nobody may set the counter back from 2, and nobody can forbid it: so 2 is never reached."""
+    system = replace(
+        counter(3),
+        events=(Event("up", True), Event("zero", False)),
+        conditions=(EventCondition("zero", Binary("!=", VariableRead("C", "n"), Constant(2))),),
+    )
+    result = synthesize(system, engine=engine)
+    assert result.statistics.states == 2
+    allowed = state_predicates(system, result.added)["up"]
+    assert [allowed(("only", n)) for n in (0, 1)] == [True, False]

@@ -1,0 +1,195 @@
+"""Types of resolved expressions, inferred from the model that they speak of.
+
+The checked model's own front end has typed the text that it was made from; this is for expressions that
+come from a file and may say anything.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import assert_never
+
+from robosc.errors import InvalidSupervisorError
+from robosc.expressions import (
+    MAXIMUM_INTEGER,
+    MINIMUM_INTEGER,
+    ArrayType,
+    Binary,
+    BooleanType,
+    Constant,
+    DoubleType,
+    EnumType,
+    EnumValue,
+    Expression,
+    IntegerType,
+    ObjectType,
+    Received,
+    StateTest,
+    StringType,
+    Type,
+    Unary,
+    Value,
+    VariableRead,
+    is_numeric,
+    type_text,
+)
+
+_BOOLEAN, _INTEGER, _DOUBLE = BooleanType(), IntegerType(), DoubleType()
+_LOGIC = frozenset({"or", "and", "implies"})
+_ORDER = frozenset({"<", "<=", ">", ">="})
+
+
+@dataclass(frozen=True, slots=True)
+class Scope:
+    """What expressions may name.
+
+    Attributes:
+        variables: Type of each variable, by component and name.
+        states: Every state, as component and name.
+        enums: Every enum, by name.
+        enum_values: Its values, for a quick look.
+        objects: Types of each object's properties, by the object's name.
+    """
+
+    variables: Mapping[tuple[str, str], Type]
+    states: frozenset[tuple[str, str]]
+    enums: Mapping[str, EnumType]
+    enum_values: Mapping[str, frozenset[str]]
+    objects: Mapping[str, Mapping[str, Type]]
+
+    def infer(self, expression: Expression, received: Type | None = None) -> Type:
+        """The type of an expression.
+
+        Args:
+            expression: Any expression, at most some hundreds of operators deep.
+            received: Type of the received data it may read; None where there is none.
+
+        Raises:
+            InvalidSupervisorError: It names something that is not there, or its types do not fit.
+        """
+        match expression:
+            case Constant(value=value):
+                return _constant_type(value)
+            case EnumValue(enum=enum, value=value):
+                return self._enum_value_type(enum, value)
+            case VariableRead(component=component, variable=variable):
+                if (component, variable) not in self.variables:
+                    raise InvalidSupervisorError(f"there is no variable {component}.{variable}")
+                return self.variables[component, variable]
+            case StateTest(component=component, state=state):
+                if (component, state) not in self.states:
+                    raise InvalidSupervisorError(f"there is no state {component}.{state}")
+                return _BOOLEAN
+            case Received():
+                return self.received_type(expression, received)
+            case Unary(operator=operator, operand=operand):
+                return _unary_type(operator, self.infer(operand, received))
+            case Binary(operator=operator, left=left, right=right):
+                return _binary_type(operator, self.infer(left, received), self.infer(right, received))
+        assert_never(expression)
+
+    def received_type(self, read: Received, received: Type | None) -> Type:
+        """The type of the part of `received` that a path reads.
+
+        Raises:
+            InvalidSupervisorError: Nothing is received here, or it has no such part.
+        """
+        if received is None:
+            raise InvalidSupervisorError("received data is read where none is")
+        type_ = received
+        for step in read.path:
+            match type_, step:
+                case ObjectType(name=name), str() if step in self.objects.get(name, {}):
+                    type_ = self.objects[name][step]
+                case ArrayType(element=element), int():
+                    type_ = element
+                case _:
+                    raise InvalidSupervisorError(f"{type_text(type_)} has no part {step!r}")
+        return type_
+
+    def _enum_value_type(self, enum: str, value: str) -> EnumType:
+        if enum not in self.enums:
+            raise InvalidSupervisorError(f"there is no enum {enum}")
+        if value not in self.enum_values[enum]:
+            raise InvalidSupervisorError(f"the enum {enum} has no value {value}")
+        return self.enums[enum]
+
+
+def has_type(value: Value, type_: Type) -> bool:
+    """Whether a value is one of a type's; an integer is also a double."""
+    match type_:
+        case BooleanType():
+            return isinstance(value, bool)
+        case IntegerType(low=low, high=high):
+            lowest = MINIMUM_INTEGER if low is None else low
+            highest = MAXIMUM_INTEGER if high is None else high
+            return isinstance(value, int) and not isinstance(value, bool) and lowest <= value <= highest
+        case DoubleType():
+            return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < math.inf
+        case StringType():
+            return isinstance(value, str)
+        case EnumType(values=values):
+            return isinstance(value, str) and value in values
+        case _:
+            return False
+
+
+def is_assignable(type_: Type, to: Type) -> bool:
+    """Whether an expression of one type may stand where another is wanted; ranges are for run time.
+
+    Enums of one name are one enum: that its values are the same wherever it occurs is checked beforehand.
+    """
+    match type_, to:
+        case IntegerType(), IntegerType() | DoubleType():
+            return True
+        case DoubleType(), DoubleType():
+            return True
+        case BooleanType(), BooleanType():
+            return True
+        case StringType(), StringType():
+            return True
+        case EnumType(), EnumType():
+            return type_.name == to.name
+        case _:
+            return False
+
+
+def _constant_type(value: Value) -> Type:
+    if isinstance(value, bool):
+        return _BOOLEAN
+    if isinstance(value, int):
+        if not MINIMUM_INTEGER <= value <= MAXIMUM_INTEGER:
+            raise InvalidSupervisorError("an integer is beyond 32 bits")
+        return _INTEGER
+    return _DOUBLE if isinstance(value, float) else StringType()
+
+
+def _unary_type(operator: str, operand: Type) -> Type:
+    if operator == "-":
+        if not is_numeric(operand):
+            raise _unfit(operator, operand)
+        return _DOUBLE if isinstance(operand, DoubleType) else _INTEGER
+    if not isinstance(operand, BooleanType):
+        raise _unfit(operator, operand)
+    return _BOOLEAN
+
+
+def _binary_type(operator: str, left: Type, right: Type) -> Type:
+    if operator in _LOGIC:
+        if not (isinstance(left, BooleanType) and isinstance(right, BooleanType)):
+            raise _unfit(operator, left, right)
+        return _BOOLEAN
+    if operator in ("=", "!="):
+        if not (is_assignable(left, right) or is_assignable(right, left)):
+            raise _unfit(operator, left, right)
+        return _BOOLEAN
+    if not (is_numeric(left) and is_numeric(right)):
+        raise _unfit(operator, left, right)
+    if operator in _ORDER:
+        return _BOOLEAN
+    is_double = operator == "/" or isinstance(left, DoubleType) or isinstance(right, DoubleType)
+    return _DOUBLE if is_double else _INTEGER
+
+
+def _unfit(operator: str, *operands: Type) -> InvalidSupervisorError:
+    return InvalidSupervisorError(f"'{operator}' does not take {' and '.join(map(type_text, operands))}")

@@ -11,7 +11,7 @@ Python 3.8 and later: generated packages carry copies of them.
 
 from __future__ import annotations
 
-from typing import Any, Dict, NamedTuple, Optional, Protocol, Tuple  # noqa: UP035  # Python 3.8
+from typing import Any, Dict, NamedTuple, Optional, Protocol, Tuple
 
 
 class CommunicationInfo(NamedTuple):

@@ -1,0 +1,173 @@
+"""Service calls and goals that are under way (semantics 3.2 and 3.4)."""
+
+from __future__ import annotations
+
+from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
+
+from robosc.execution.edges import have_fallen, held_ever
+from robosc.execution.protocol import ControlledSystem
+
+FOREVER = float("inf")
+
+OUTCOMES = ("succeeded", "rejected", "aborted", "cancelled", "lost")
+"""How a goal can end: with a result, refused by its server, given up by it, cancelled, or its server is gone."""
+
+
+class Call(NamedTuple):
+    """A service call without a reply so far.
+
+    Attributes:
+        service: Name of the service.
+        deadline_s: Reading of the clock at which it counts as failed.
+    """
+
+    service: str
+    deadline_s: float
+
+
+class Calls:
+    """Service calls under way, by id."""
+
+    __slots__ = ("_calls", "_next_id", "_timeout_s")
+
+    def __init__(self, timeout_s: Optional[float]) -> None:
+        self._timeout_s = FOREVER if timeout_s is None else timeout_s
+        self._calls: Dict[int, Call] = {}
+        self._next_id = 1
+
+    def open(self, service: str, now_s: float) -> int:
+        """The id of a new call."""
+        number = self._next_id
+        self._next_id += 1
+        self._calls[number] = Call(service, now_s + self._timeout_s)
+        return number
+
+    def close(self, number: int) -> Optional[str]:
+        """End a call: its service, or None if no such call is under way."""
+        call = self._calls.pop(number, None)
+        return None if call is None else call.service
+
+    def expired(self, now_s: float) -> List[int]:
+        """Ids of the calls whose time is over."""
+        return [number for number, call in self._calls.items() if now_s >= call.deadline_s]
+
+    def deadline_s(self) -> float:
+        """When the next one is over."""
+        return min((call.deadline_s for call in self._calls.values()), default=FOREVER)
+
+    def clear(self) -> None:
+        """Forget all of them: their replies are unexpected from now on. Ids are not used again."""
+        self._calls.clear()
+
+
+class Goal:
+    """A goal whose end is not known so far.
+
+    Attributes:
+        number: Its id.
+        action: Name of the action.
+        is_running: Whether the model's action executes it; no longer after its cancel or error.
+        is_accepted: Whether its server accepted it.
+        is_cancel_wanted: Whether it is to be cancelled.
+        is_cancel_sent: Whether its server was asked to cancel it.
+        deadline_s: Reading of the clock at which it counts as failed.
+        held: For each requirement of the action: whether it held in a stable state since the request.
+    """
+
+    __slots__ = (
+        "action",
+        "deadline_s",
+        "held",
+        "is_accepted",
+        "is_cancel_sent",
+        "is_cancel_wanted",
+        "is_running",
+        "number",
+    )
+
+    def __init__(self, number: int, action: str, deadline_s: float, held: Tuple[bool, ...]) -> None:
+        self.number = number
+        self.action = action
+        self.is_running = True
+        self.is_accepted = False
+        self.is_cancel_wanted = False
+        self.is_cancel_sent = False
+        self.deadline_s = deadline_s
+        self.held = held
+
+
+class Goals:
+    """Goals under way, by id; at most one of an action.
+
+    Args:
+        system: Tells which requirements hold.
+        actions: Names of the actions, in source order.
+        timeout_s: Seconds until a goal counts as failed, or None.
+    """
+
+    __slots__ = ("_actions", "_goals", "_next_id", "_system", "_timeout_s")
+
+    def __init__(self, system: ControlledSystem, actions: Sequence[str], timeout_s: Optional[float]) -> None:
+        self._system = system
+        self._actions = tuple(actions)
+        self._timeout_s = FOREVER if timeout_s is None else timeout_s
+        self._goals: Dict[int, Goal] = {}
+        self._next_id = 1
+
+    def __bool__(self) -> bool:
+        return bool(self._goals)
+
+    def open(self, action: str, now_s: float) -> Goal:
+        """A new goal; the system is in the stable state after its request."""
+        goal = Goal(self._next_id, action, now_s + self._timeout_s, self._system.requirements(action))
+        self._next_id += 1
+        goals = [*self._goals.values(), goal]
+        self._goals = {item.number: item for item in sorted(goals, key=lambda g: self._actions.index(g.action))}
+        return goal
+
+    def find(self, number: int) -> Optional[Goal]:
+        """The goal with an id, if its end is not known."""
+        return self._goals.get(number)
+
+    def close(self, number: int) -> Optional[Goal]:
+        """The end of a goal is known: the goal, or None if there is none with that id."""
+        return self._goals.pop(number, None)
+
+    def is_open(self, action: str) -> bool:
+        """Whether a goal of an action may still be under way."""
+        return any(goal.action == action for goal in self._goals.values())
+
+    def all(self) -> List[Goal]:
+        """Every goal, in source order of the actions."""
+        return list(self._goals.values())
+
+    def expired(self, now_s: float) -> List[Goal]:
+        """Running goals whose time is over."""
+        return [goal for goal in self._goals.values() if goal.is_running and now_s >= goal.deadline_s]
+
+    def deadline_s(self) -> float:
+        """When the next running one is over."""
+        return min((goal.deadline_s for goal in self._goals.values() if goal.is_running), default=FOREVER)
+
+    def to_cancel(self) -> Optional[Goal]:
+        """A goal to be cancelled now: a requirement that held since its request no longer does, and cancel is allowed.
+
+        Only a change cancels: what the request itself made false never held since. Without requirements, never.
+        """
+        for goal in self._goals.values():
+            if goal.is_running and any(goal.held):
+                has_turned = have_fallen(goal.held, self._system.requirements(goal.action))
+                if has_turned and self._system.enabled(goal.action + ".cancel"):
+                    return goal
+        return None
+
+    def observe_stable_state(self) -> None:
+        """Remember which requirements of the running goals hold."""
+        for goal in self._goals.values():
+            if goal.is_running:
+                goal.held = held_ever(goal.held, self._system.requirements(goal.action))
+
+    def leave_model(self) -> None:
+        """The model starts again and knows nothing of the goals; their end is still awaited."""
+        for goal in self._goals.values():
+            goal.is_running = False

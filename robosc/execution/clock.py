@@ -1,0 +1,56 @@
+"""Time as the executor sees it: one seam, so that tests and simulations decide how it passes."""
+
+from __future__ import annotations
+
+import time
+from typing import Protocol
+
+
+class Clock(Protocol):
+    """Two readings of time."""
+
+    def monotonic(self) -> float:
+        """Seconds since some moment; never goes back. Everything that waits is measured with it."""
+
+    def wall(self) -> float:
+        """Seconds since 1970-01-01 UTC; stands in the event log and decides nothing."""
+
+
+class SystemClock:
+    """The computer's clocks."""
+
+    monotonic = staticmethod(time.monotonic)
+    wall = staticmethod(time.time)
+
+
+class ManualClock:
+    """A clock that moves only when it is told to.
+
+    Args:
+        now_s: Its first reading.
+        epoch_s: What is added to a reading for the wall clock.
+    """
+
+    __slots__ = ("epoch_s", "now_s")
+
+    def __init__(self, now_s: float = 0.0, epoch_s: float = 0.0) -> None:
+        self.now_s = now_s
+        self.epoch_s = epoch_s
+
+    def monotonic(self) -> float:
+        """The reading it was set to."""
+        return self.now_s
+
+    def wall(self) -> float:
+        """The reading it was set to, after the epoch."""
+        return self.epoch_s + self.now_s
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass.
+
+        Raises:
+            ValueError: Time would go back.
+        """
+        if seconds < 0:
+            raise ValueError("time does not go back")
+        self.now_s += seconds

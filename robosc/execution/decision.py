@@ -1,0 +1,147 @@
+"""Which of the enabled requests is issued: the policies of semantics 3.5.
+
+Requests are known by number, 0 up to N - 1 in source order. A decision is: `choose` among candidates,
+again without those that could not be issued, `issued` for the one that was, then `close`.
+"""
+
+from __future__ import annotations
+
+import random
+from typing import List, Protocol, Sequence, Tuple
+
+_NEVER = -1
+
+
+class Policy(Protocol):
+    """Decides between requests that are enabled together."""
+
+    def choose(self, candidates: Sequence[int]) -> int:
+        """One of the candidates (at least one, ascending)."""
+
+    def issued(self, request: int) -> None:
+        """A chosen request was issued."""
+
+    def close(self, enabled: Tuple[int, ...]) -> None:
+        """The decision is over; `enabled` were the requests that were enabled at it."""
+
+
+class FairPolicy:
+    """Newly enabled requests first, then the longest-ago issued, never-issued first, source order.
+
+    A request profits from being new at most once in N decisions. So of any N decisions at which a request
+    waits, N - 1 others take at most N - 1 by being new; the rest go to the longest-ago issued, and none starves.
+
+    Args:
+        count: Number of requests, N.
+    """
+
+    __slots__ = ("_count", "_decision", "_favoured", "_issued", "_new", "_previous")
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+        self._decision = 0
+        self._previous: Tuple[int, ...] = ()
+        # Number of the decision at which each request was last issued, or last issued for being new.
+        self._issued: List[int] = [_NEVER] * count
+        self._favoured: List[int] = [-count] * count
+        self._new = False
+
+    def choose(self, candidates: Sequence[int]) -> int:
+        """The first by the order of the class."""
+        previous, issued = self._previous, self._issued
+        if candidates is previous:
+            # The very same tuple as at the last decision, so nothing is new.
+            self._new = False
+            return candidates[0] if len(candidates) == 1 else min(candidates, key=issued.__getitem__)
+        latest_favour = self._decision - self._count
+        best, best_is_new = _NEVER, False
+        for request in candidates:
+            is_new = request not in previous and self._favoured[request] <= latest_favour
+            if best == _NEVER or (is_new and not best_is_new):
+                best, best_is_new = request, is_new
+            elif is_new is best_is_new and issued[request] < issued[best]:
+                best = request
+        self._new = best_is_new
+        return best
+
+    def issued(self, request: int) -> None:
+        """Remember when; and, if it was chosen for being new, that it used this up."""
+        self._issued[request] = self._decision
+        if self._new:
+            self._favoured[request] = self._decision
+
+    def close(self, enabled: Tuple[int, ...]) -> None:
+        """Remember what was enabled."""
+        self._previous = enabled
+        self._decision += 1
+
+
+class PriorityPolicy:
+    """The first enabled request of a list; if none of them is enabled, fair.
+
+    Args:
+        count: Number of requests.
+        order: Requests, most urgent first.
+    """
+
+    __slots__ = ("_fair", "_listed", "_order")
+
+    def __init__(self, count: int, order: Sequence[int]) -> None:
+        self._fair = FairPolicy(count)
+        self._order = tuple(order)
+        self._listed = frozenset(order)
+
+    def choose(self, candidates: Sequence[int]) -> int:
+        """The most urgent candidate, else the fair one."""
+        for request in self._order:
+            if request in candidates:
+                return request
+        return self._fair.choose(candidates)
+
+    def issued(self, request: int) -> None:
+        """Only what is not in the list is the fair policy's business."""
+        if request not in self._listed:
+            self._fair.issued(request)
+
+    def close(self, enabled: Tuple[int, ...]) -> None:
+        """The decision is over."""
+        self._fair.close(enabled)
+
+
+class RandomPolicy:
+    """Any candidate with equal probability, the same sequence for the same seed.
+
+    Args:
+        seed: Where the sequence starts.
+    """
+
+    __slots__ = ("_random",)
+
+    def __init__(self, seed: int) -> None:
+        self._random = random.Random(seed)  # noqa: S311  # a choice between safe requests, no secret
+
+    def choose(self, candidates: Sequence[int]) -> int:
+        """A random one."""
+        return candidates[self._random.randrange(len(candidates))]
+
+    def issued(self, request: int) -> None:
+        """Chance has no memory."""
+
+    def close(self, enabled: Tuple[int, ...]) -> None:
+        """Chance has no memory."""
+
+
+def make_policy(policy: str, names: Sequence[str], priority: Sequence[str], seed: int) -> Policy:
+    """A policy with no past.
+
+    Args:
+        policy: `fair`, `priority` or `random`.
+        names: Names of all requests' communications, in source order.
+        priority: Names, most urgent first, for `priority`.
+        seed: For `random`.
+    """
+    if policy == "random":
+        return RandomPolicy(seed)
+    if policy == "priority":
+        return PriorityPolicy(len(names), [names.index(name) for name in priority])
+    return FairPolicy(len(names))

@@ -1,0 +1,19 @@
+"""Conditions that held in some stable state and hold no longer: what releases messages and cancels goals."""
+
+from __future__ import annotations
+
+from typing import Tuple
+
+Conditions = Tuple[bool, ...]
+"""Conditions in a fixed order: which of them hold."""
+
+
+def have_fallen(held: Conditions, holds: Conditions) -> bool:
+    """Whether a condition that held earlier does not hold now."""
+    pairs = zip(held, holds)  # noqa: B905  # Python 3.8
+    return held != holds and any(before and not now for before, now in pairs)
+
+
+def held_ever(held: Conditions, holds: Conditions) -> Conditions:
+    """Which conditions held earlier or hold now."""
+    return tuple([before or now for before, now in zip(held, holds)])  # noqa: B905  # Python 3.8

@@ -1,0 +1,6 @@
+"""The reference implementation of `ControlledSystem`: it interprets a supervisor, obviously right before fast."""
+
+from robosc.execution.interpreter.description import describe
+from robosc.execution.interpreter.system import InterpretedSystem
+
+__all__ = ["InterpretedSystem", "describe"]

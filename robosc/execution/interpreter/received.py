@@ -1,0 +1,148 @@
+"""Received data as a model sees it: properties, elements, ranges, enums (language B.4). Nothing here raises."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from robosc.execution.interpreter.functions import Function, Path, function_of
+from robosc.execution.protocol import Reading
+from robosc.expressions import (
+    ArrayType,
+    BooleanType,
+    DoubleType,
+    EnumType,
+    IntegerType,
+    ObjectType,
+    StringType,
+    Type,
+    Value,
+    values,
+)
+from robosc.model.structure import EnumDefinition, Model
+
+_NO_STATE: Mapping[Any, Any] = {}
+
+
+class Reader:
+    """Converts received data of one model."""
+
+    def __init__(self, model: Model) -> None:
+        self._properties = {item.name: {part.name: part.type for part in item.properties} for item in model.objects}
+        self._enums = {item.name: _CompiledEnum(item) for item in model.enums}
+
+    def read(self, root: Type | None, paths: tuple[Path, ...], raw: Any) -> Reading:
+        """What paths of received data are.
+
+        Args:
+            root: The declared type of the data, or None if the event carries none.
+            paths: What to read.
+            raw: What came, whatever it is.
+        """
+        datum = _Datum(self, root, raw)
+        found = {path: datum.value(path) for path in paths}
+        return Reading(
+            values=found,
+            data={path_text(path): value for path, value in found.items()},
+            unknown=tuple(datum.unknown),
+            enum_unknown=datum.enum_unknown,
+        )
+
+    def step(self, type_: Type | None, step: str | int) -> Type | None:
+        """The type of a part, or None if there is no such part."""
+        match type_:
+            case ObjectType(name=name) if isinstance(step, str):
+                return self._properties[name].get(step)
+            case ArrayType(element=element) if isinstance(step, int):
+                return element
+            case _:
+                return None
+
+    def enum(self, name: str) -> "_CompiledEnum":
+        """The definition of an enum."""
+        return self._enums[name]
+
+
+class _CompiledEnum:
+    def __init__(self, definition: EnumDefinition) -> None:
+        self.source = definition.source
+        self.default = definition.default
+        self.rules: tuple[tuple[Function, str], ...] = tuple(
+            (function_of(rule.condition), rule.value) for rule in definition.rules
+        )
+
+
+class _Datum:
+    """One received datum while it is read.
+
+    Attributes:
+        unknown: What was unknown or moved into its range, in words.
+        enum_unknown: Whether an enum fell to its default although an earlier rule was unknown.
+    """
+
+    def __init__(self, reader: Reader, root: Type | None, raw: Any) -> None:
+        self._reader = reader
+        self._root = root
+        self._raw = raw
+        self._known: dict[Path, Value | None] = {}
+        self.unknown: list[str] = []
+        self.enum_unknown = False
+
+    def value(self, path: Path) -> Value | None:
+        """The value at a path, or None where it is unknown; each path is converted once."""
+        if path not in self._known:
+            raw, type_ = self._raw, self._root
+            for step in path:
+                raw, type_ = _part(raw, step), self._reader.step(type_, step)
+            self._known[path] = self._convert(raw, type_, path)
+        return self._known[path]
+
+    def _convert(self, raw: Any, type_: Type | None, path: Path) -> Value | None:
+        match type_:
+            case BooleanType():
+                return values.read_boolean(raw)  # type: ignore[no-any-return]
+            case IntegerType():
+                return self._in_range(values.read_integer(raw), type_, path)
+            case DoubleType():
+                return values.read_double(raw)  # type: ignore[no-any-return]
+            case StringType():
+                return values.read_string(raw)  # type: ignore[no-any-return]
+            case EnumType(name=name):
+                return self._enum_value(raw, self._reader.enum(name), path)
+            case _:
+                return None
+
+    def _in_range(self, value: int | None, type_: IntegerType, path: Path) -> int | None:
+        if value is None or type_.low is None or type_.high is None:
+            return value
+        clamped = min(max(value, type_.low), type_.high)
+        if clamped != value:
+            self.unknown.append(f"{path_text(path)} is {value}, outside {type_.low}..{type_.high}")
+        return clamped
+
+    def _enum_value(self, raw: Any, enum: _CompiledEnum, path: Path) -> str:
+        """The value of the first rule that is true, else the default."""
+        source = _Datum(self._reader, enum.source, raw)
+        value, was_unknown = enum.default, False
+        for condition, result in enum.rules:
+            outcome = condition(_NO_STATE, source.value)
+            if outcome is True:
+                value, was_unknown = result, False
+                break
+            was_unknown = was_unknown or outcome is None
+        self.unknown += source.unknown
+        self.enum_unknown = self.enum_unknown or source.enum_unknown or was_unknown
+        if was_unknown:
+            self.unknown.append(f"{path_text(path)} is {value} by default: an earlier rule is unknown")
+        return value
+
+
+def _part(raw: Any, step: str | int) -> Any:
+    try:
+        return values.read_element(raw, step) if isinstance(step, int) else values.read_property(raw, step)
+    except Exception:
+        # Foreign objects may do anything when they are asked for a part; to us it is then unknown.
+        return None
+
+
+def path_text(path: Path) -> str:
+    """A path as a user writes it: `value.ranges[0]`."""
+    return "value" + "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)

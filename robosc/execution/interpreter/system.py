@@ -1,0 +1,185 @@
+"""A supervisor, interpreted: plants, ranges, requirements and added conditions exactly as semantics 1 words them."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from robosc.automata.plants import communication_plant_name
+from robosc.execution.interpreter.description import describe
+from robosc.execution.interpreter.functions import Data, Place, function_of, holds, no_data
+from robosc.execution.interpreter.received import Reader
+from robosc.execution.interpreter.rules import (
+    EventRule,
+    Participant,
+    TransitionRule,
+    event_rules,
+    initial_state,
+    provided_function,
+)
+from robosc.execution.protocol import Reading
+from robosc.expressions import Value, conjuncts
+from robosc.model.structure import is_tau
+from robosc.supervisor.structure import Supervisor
+
+
+@dataclass(frozen=True, slots=True)
+class _Successor:
+    """Where an event leads.
+
+    Attributes:
+        state: The new state.
+        skipped: Variables whose update was skipped.
+        leaves_range: Whether a synthesis variable would leave its range.
+    """
+
+    state: dict[Place, Value]
+    skipped: tuple[str, ...]
+    leaves_range: bool
+
+
+class InterpretedSystem:
+    """Implements `robosc.execution.protocol.ControlledSystem` for any supervisor.
+
+    Args:
+        supervisor: What to interpret.
+
+    Attributes:
+        description: Its static part.
+    """
+
+    def __init__(self, supervisor: Supervisor) -> None:
+        model = supervisor.model
+        self.description = describe(supervisor)
+        self._model = model
+        self._reader = Reader(model)
+        self._events = event_rules(supervisor)
+        self._requirements = {
+            item.name: tuple(function_of(requirement.condition) for requirement in model.requirements_on(item.name))
+            for item in model.communications
+        }
+        self._conjuncts = {
+            item.name: tuple(
+                function_of(part)
+                for requirement in model.requirements_on(item.name)
+                for part in conjuncts(requirement.condition)
+            )
+            for item in model.communications
+        }
+        self._provides = {
+            item.name: tuple(
+                (
+                    None if statement.condition is None else function_of(statement.condition),
+                    provided_function(statement.value),
+                )
+                for statement in model.provides_for(item.name)
+            )
+            for item in model.communications
+        }
+        self._initial = initial_state(model)
+        self._state = self._initial
+
+    def restart(self) -> None:
+        """Back to the initial state."""
+        self._state = self._initial
+
+    def enabled(self, event: str) -> bool:
+        """Whether a controllable event is allowed now (KeyError if there is no such event)."""
+        rule = self._events[event]
+        state = self._state
+        if not all(holds(condition, state) for condition in rule.conditions):
+            return False
+        if rule.added is not None and not rule.added(state):
+            return False
+        successor = self._successor(rule, no_data)
+        if successor is None or successor.leaves_range:
+            return False
+        return not is_tau(event) or successor.state != state
+
+    def read(self, event: str, data: Any) -> Reading:
+        """Convert what came with an uncontrollable event."""
+        rule = self._events[event]
+        return self._reader.read(rule.received, rule.paths, data)
+
+    def step(self, event: str, reading: Reading | None = None) -> tuple[str, ...] | None:
+        """Take an event: the variables whose update was skipped, or None if the state cannot accept it."""
+        rule = self._events[event]
+        if reading is None and rule.paths:
+            reading = self.read(event, None)
+        successor = self._successor(rule, no_data if reading is None else reading.values.get)
+        if successor is None or (rule.is_controllable and successor.leaves_range):
+            return None
+        self._state = successor.state
+        return successor.skipped
+
+    def provide(self, communication: str) -> tuple[bool, Any]:
+        """Data for a request: (is known, data)."""
+        for condition, value in self._provides[communication]:
+            if condition is None or holds(condition, self._state):
+                return value(self._state)
+        return True, None
+
+    def requirements(self, communication: str) -> tuple[bool, ...]:
+        """Which requirements on a request hold."""
+        return tuple(holds(function, self._state) for function in self._requirements[communication])
+
+    def conjuncts(self, communication: str) -> tuple[bool, ...]:
+        """Which top-level conjuncts of the requirements on a request hold."""
+        return tuple(holds(function, self._state) for function in self._conjuncts[communication])
+
+    def location(self, communication: str) -> str:
+        """Location of a communication's plant (KeyError if there is no such service or action)."""
+        return str(self._state[communication_plant_name(self._model.communication(communication)), None])
+
+    def state(self) -> dict[str, dict[str, Any]]:
+        """State and variables of every component with a behaviour."""
+        return {
+            component.name: {
+                "state": self._state[component.name, None],
+                "variables": {
+                    variable.name: self._state[component.name, variable.name]
+                    for variable in component.behaviour.variables
+                },
+            }
+            for component in self._model.components
+            if component.behaviour
+        }
+
+    def signature(self) -> Any:
+        """A value that tells states apart."""
+        return tuple(self._state.values())
+
+    def _successor(self, rule: EventRule, data: Data) -> _Successor | None:
+        """Where an event leads from the current state by the plants alone; None if one of them blocks it."""
+        old = self._state
+        new = dict(old)
+        skipped: list[str] = []
+        leaves_range = False
+        if rule.plant is not None:
+            name, moves = rule.plant
+            location = str(old[name, None])
+            if location not in moves:
+                return None
+            new[name, None] = moves[location]
+        for participant in rule.participants:
+            transition = self._chosen(participant)
+            if transition is None:
+                if participant.may_block:
+                    return None
+                continue
+            if transition.target is not None:
+                new[participant.name, None] = transition.target
+            for update in transition.updates:
+                value = update.function(old, data)
+                assigned = update.assigned(value)
+                leaves_range = leaves_range or update.leaves_range(value)
+                if assigned is None:
+                    skipped.append(f"{participant.name}.{update.variable.name}")
+                else:
+                    new[update.place] = assigned
+        return _Successor(new, tuple(skipped), leaves_range)
+
+    def _chosen(self, participant: Participant) -> TransitionRule | None:
+        """The transition that a component takes from its current state."""
+        for transition in participant.transitions.get(str(self._state[participant.name, None]), ()):
+            if transition.guard is None or holds(transition.guard, self._state):
+                return transition
+        return None

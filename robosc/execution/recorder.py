@@ -1,0 +1,112 @@
+"""What an executor tells about itself: entries of the event log, and counters for diagnostics."""
+
+from __future__ import annotations
+
+from typing import Any, Dict, NamedTuple, Sequence
+
+from robosc.execution.clock import Clock
+from robosc.execution.event_log import EventLog
+from robosc.execution.protocol import ControlledSystem
+
+
+class Counters(NamedTuple):
+    """What went wrong so far.
+
+    Attributes:
+        unknown: Enums that fell to their default past an unknown rule, received integers that were moved into
+            their range, updates that were skipped, requests whose data was unknown or did not fit.
+        unexpected: Events that the state could not accept, replies that match no request.
+        faults: Faults.
+        dropped: Entries that the event log lost.
+    """
+
+    unknown: int
+    unexpected: int
+    faults: int
+    dropped: int
+
+
+class Recorder:
+    """Counts, and writes entries; nothing in it raises.
+
+    Args:
+        system: Its state stands in the entries of events.
+        clock: Tells the time of an entry.
+        log: Where entries go.
+
+    Attributes:
+        is_active: Whether the log keeps anything.
+        began_s: Reading of the clock when the handling of what came last began: decision times count from here.
+    """
+
+    __slots__ = (
+        "_clock",
+        "_log",
+        "_lost",
+        "_system",
+        "began_s",
+        "faults",
+        "is_active",
+        "unexpected_count",
+        "unknown_count",
+    )
+
+    def __init__(self, system: ControlledSystem, clock: Clock, log: EventLog) -> None:
+        self._system = system
+        self._clock = clock
+        self._log = log
+        self.is_active = log.is_active
+        self._lost = 0
+        self.unknown_count = 0
+        self.unexpected_count = 0
+        self.faults = 0
+        self.began_s = 0.0
+
+    def counters(self) -> Counters:
+        """The counters now."""
+        return Counters(self.unknown_count, self.unexpected_count, self.faults, self._lost + self._log.dropped)
+
+    def event(self, event: str, is_controllable: bool, data: Any) -> None:
+        """An event was taken. Worth calling only while the log is active."""
+        took_us = (self._clock.monotonic() - self.began_s) * 1e6
+        self._write(
+            {
+                "kind": "event",
+                "event": event,
+                "controllable": is_controllable,
+                "data": data,
+                "state": self._system.state(),
+                "decision_us": round(took_us, 1),
+            }
+        )
+
+    def unexpected(self, entry: Dict[str, Any]) -> None:
+        """Something came that the state, or nobody, waits for."""
+        self.unexpected_count += 1
+        self._write({"kind": "unexpected", **entry})
+
+    def unknown(self, event: str, what: Sequence[str]) -> None:
+        """Something was unknown at an event."""
+        self.unknown_count += len(what)
+        self._write({"kind": "unknown", "event": event, "unknown": list(what)})
+
+    def fault(self, what: str) -> None:
+        """A fault."""
+        self.faults += 1
+        self._write({"kind": "fault", "what": what})
+
+    def release(self, identifier: str) -> None:
+        """The default message goes out on an identifier."""
+        self._write({"kind": "release", "identifier": identifier})
+
+    def note(self, kind: str, what: str) -> None:
+        """A stop, its end, or a restart."""
+        self._write({"kind": kind, "what": what})
+
+    def _write(self, entry: Dict[str, Any]) -> None:
+        if self.is_active:
+            try:
+                self._log.write({"time": self._clock.wall(), **entry})
+            except Exception:
+                # Whatever a log does, it must not stop the robot's controller: counted, and the loop goes on.
+                self._lost += 1

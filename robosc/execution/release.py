@@ -1,0 +1,123 @@
+"""Messages that keep acting after they were sent, and when they must be released (semantics 3.6)."""
+
+from __future__ import annotations
+
+from typing import Dict, List, Optional, Sequence, Tuple
+
+from robosc.execution.edges import have_fallen, held_ever
+from robosc.execution.protocol import ControlledSystem
+
+
+class _Acting:
+    """The last message of an identifier, not the all-default one.
+
+    Attributes:
+        request: Name of the communication whose request sent it.
+        event: That request.
+        was_enabled: Whether the request was enabled in a stable state since.
+        held: For each conjunct of its requirements: whether it held in a stable state since.
+        is_due: Whether it is to be released; once due it stays so until something is sent there.
+    """
+
+    __slots__ = ("event", "held", "is_due", "request", "was_enabled")
+
+    def __init__(self, request: str, was_enabled: bool, held: Tuple[bool, ...]) -> None:
+        self.request = request
+        self.event = request + ".request"
+        self.was_enabled = was_enabled
+        self.held = held
+        self.is_due = False
+
+
+class Releases:
+    """Follows the last message of each release identifier.
+
+    Args:
+        system: Tells what is enabled and what holds.
+        identifiers: The release identifiers.
+        requests: For each of them its communications, in source order.
+    """
+
+    __slots__ = ("_acting", "_events", "_system", "identifiers", "waiting")
+
+    def __init__(
+        self, system: ControlledSystem, identifiers: Sequence[str], requests: Dict[str, Tuple[str, ...]]
+    ) -> None:
+        self._system = system
+        self.identifiers = tuple(identifiers)
+        self._events = {
+            identifier: tuple((name, name + ".request") for name in requests[identifier]) for identifier in identifiers
+        }
+        self._acting: Dict[str, _Acting] = {}
+        self.waiting: Tuple[str, ...] = ()
+
+    def judge(self, issuing: Optional[str] = None) -> List[str]:
+        """The identifiers to release now, in this stable state; the caller does it and tells `released`.
+
+        Args:
+            issuing: Communication whose request brought the system here and whose message is about to go out:
+                what it makes false does not release its own earlier message.
+        """
+        if not self._acting:
+            return []
+        now: List[str] = []
+        waiting: List[str] = []
+        for identifier, acting in self._acting.items():
+            if acting.request == issuing:
+                continue
+            self._observe(acting)
+            if acting.is_due:
+                (waiting if self._another_is_enabled(identifier, acting) else now).append(identifier)
+        self.waiting = tuple(waiting)
+        return now
+
+    def _observe(self, acting: _Acting) -> None:
+        """Judge one message in a stable state."""
+        is_enabled = self._system.enabled(acting.event)
+        holds = self._system.conjuncts(acting.request)
+        if (acting.was_enabled and not is_enabled) or have_fallen(acting.held, holds):
+            acting.is_due = True
+        acting.was_enabled = acting.was_enabled or is_enabled
+        acting.held = held_ever(acting.held, holds)
+
+    def _another_is_enabled(self, identifier: str, acting: _Acting) -> bool:
+        enabled = self._system.enabled
+        return any(name != acting.request and enabled(event) for name, event in self._events[identifier])
+
+    def alternatives(self, identifier: str) -> Tuple[str, ...]:
+        """Communications of an identifier whose message would end a waiting release."""
+        sender = self._acting[identifier].request
+        return tuple(name for name, _ in self._events[identifier] if name != sender)
+
+    def supersede(self, identifier: str) -> None:
+        """A request was decided whose message ends a release that waits here."""
+        if identifier in self.waiting:
+            self.released(identifier)
+
+    def sent(self, request: str, identifier: str, is_default: bool) -> None:
+        """A message went out on a release identifier; the system is in the stable state after its request."""
+        self.released(identifier)
+        if not is_default:
+            is_enabled = self._system.enabled(request + ".request")
+            self._acting[identifier] = _Acting(request, is_enabled, self._system.conjuncts(request))
+
+    def sent_unchanged(self, request: str, identifier: str, is_default: bool) -> None:
+        """The same, where the request changed nothing: what was enabled still is, with all that it takes."""
+        acting = self._acting.get(identifier)
+        if is_default or acting is None or acting.request != request or acting.is_due:
+            self.sent(request, identifier, is_default)
+
+    def is_acting(self, identifier: str) -> bool:
+        """Whether the last message sent on a release identifier still acts."""
+        return identifier in self._acting
+
+    def released(self, identifier: str) -> None:
+        """The default message went out on an identifier, or another message is about to."""
+        self._acting.pop(identifier, None)
+        if identifier in self.waiting:
+            self.waiting = tuple(item for item in self.waiting if item != identifier)
+
+    def clear(self) -> None:
+        """The default message went out everywhere."""
+        self._acting.clear()
+        self.waiting = ()

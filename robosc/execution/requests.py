@@ -1,0 +1,221 @@
+"""Decisions: which request is issued, and how (semantics 3.5 and 3.6)."""
+
+from __future__ import annotations
+
+from typing import Any, Dict, NamedTuple, Optional, Sequence, Tuple
+
+from robosc.execution.calls import Calls, Goals
+from robosc.execution.decision import Policy
+from robosc.execution.protocol import CommunicationInfo, ControlledSystem, DataDoesNotFit, Middleware
+from robosc.execution.recorder import Recorder
+from robosc.execution.release import Releases
+from robosc.execution.steps import Steps
+
+_MESSAGE = "incoming message"
+
+
+class Request(NamedTuple):
+    """A request.
+
+    Attributes:
+        name: Its communication.
+        event: Its event.
+        identifier: Where its message goes.
+        kind: `incoming message`, `service` or `action`.
+        keeps_acting: Whether that is a release identifier.
+    """
+
+    name: str
+    event: str
+    identifier: str
+    kind: str
+    keeps_acting: bool
+
+
+def requests_of(infos: Sequence[CommunicationInfo], released: Sequence[str]) -> Tuple[Request, ...]:
+    """The requests of a model, in source order.
+
+    Args:
+        infos: Its communications.
+        released: The release identifiers.
+    """
+    return tuple(
+        Request(
+            name=info.name,
+            event=info.name + ".request",
+            identifier=info.identifier,
+            kind=info.kind,
+            keeps_acting=info.kind == _MESSAGE and info.identifier in released,
+        )
+        for info in infos
+        if info.kind != "outgoing message"
+    )
+
+
+def by_identifier(requests: Sequence[Request]) -> Dict[str, Tuple[str, ...]]:
+    """The communications of each release identifier."""
+    found: Dict[str, Tuple[str, ...]] = {}
+    for request in requests:
+        if request.keeps_acting:
+            found[request.identifier] = (*found.get(request.identifier, ()), request.name)
+    return found
+
+
+class Decisions:
+    """Issues requests, at most one in a decision.
+
+    Args:
+        system: The controlled system.
+        middleware: Where requests go.
+        requests: All of them, in source order.
+        steps: Takes their events.
+        recorder: Is told about requests that cannot be issued.
+        releases: Messages that keep acting.
+        calls: Service calls under way.
+        goals: Goals under way.
+        policy: Decides between enabled requests, by number; may be replaced.
+    """
+
+    __slots__ = (
+        "_calls",
+        "_goals",
+        "_middleware",
+        "_recorder",
+        "_releases",
+        "_requests",
+        "_steps",
+        "_system",
+        "policy",
+    )
+
+    def __init__(
+        self,
+        system: ControlledSystem,
+        middleware: Middleware,
+        requests: Tuple[Request, ...],
+        steps: Steps,
+        recorder: Recorder,
+        releases: Releases,
+        calls: Calls,
+        goals: Goals,
+        policy: Policy,
+    ) -> None:
+        self._system = system
+        self._middleware = middleware
+        self._requests = requests
+        self._steps = steps
+        self._recorder = recorder
+        self._releases = releases
+        self._calls = calls
+        self._goals = goals
+        self.policy = policy
+
+    def decide(self, now_s: float) -> bool:
+        """Issue one of the enabled requests of this stable state, if there is any.
+
+        Returns:
+            Whether a service was called or a goal was sent, so that something new waits for time to pass.
+        """
+        enabled = self._steps.enabled
+        if enabled is None:
+            enabled = self._steps.enabled = self._find_enabled()
+        issued = None
+        if enabled:
+            if self._releases.waiting:
+                ending, others = self._split(enabled)
+                issued = self._issue_one_of(ending, now_s) or self._issue_one_of(others, now_s)
+            else:
+                issued = self._issue_one_of(enabled, now_s)
+        self.policy.close(enabled)
+        return issued is not None and issued.kind != _MESSAGE
+
+    def _find_enabled(self) -> Tuple[int, ...]:
+        """Numbers of the requests that may be issued; not of an action whose old goal may still be under way."""
+        enabled, goals = self._system.enabled, self._goals
+        return tuple(
+            [
+                number
+                for number, request in enumerate(self._requests)
+                if enabled(request.event) and not (goals and goals.is_open(request.name))
+            ]
+        )
+
+    def _split(self, enabled: Tuple[int, ...]) -> Tuple[Tuple[int, ...], Tuple[int, ...]]:
+        """The requests whose message would end a release that waits, and the others."""
+        names = {name for identifier in self._releases.waiting for name in self._releases.alternatives(identifier)}
+        ending = tuple([number for number in enabled if self._requests[number].name in names])
+        return ending, tuple([number for number in enabled if number not in ending])
+
+    def _issue_one_of(self, candidates: Tuple[int, ...], now_s: float) -> Optional[Request]:
+        """Issue what the policy chooses, or the next if its data is unknown or does not fit; what was issued."""
+        policy = self.policy
+        while candidates:
+            chosen = policy.choose(candidates)
+            request = self._requests[chosen]
+            if self._issue(request, now_s):
+                policy.issued(chosen)
+                return request
+            candidates = tuple([number for number in candidates if number != chosen])
+        return None
+
+    def _issue(self, request: Request, now_s: float) -> bool:
+        """Issue a request, unless its data is unknown or does not fit: whether it was."""
+        name, event, identifier, kind, keeps_acting = request
+        unchanging = self._steps.unchanging
+        known = unchanging.get(name)
+        if known is None:
+            is_known, data = self._system.provide(name)
+            if not is_known:
+                return self._withhold(request, "its data")
+        else:
+            data, is_default = known
+        middleware = self._middleware
+        try:
+            message = middleware.prepare(name, data)
+        except DataDoesNotFit as error:
+            return self._withhold(request, "its data does not fit: {}".format(error))
+        releases = self._releases
+        if known is None:
+            is_default = keeps_acting and middleware.is_default(name, message)
+            if keeps_acting and releases.waiting:
+                releases.supersede(identifier)
+        self._steps.take(event, data)
+        # A step that changed nothing in this state changes nothing the next time.
+        has_changed = known is None and self._steps.settle(name)
+        if kind == _MESSAGE:
+            if has_changed:
+                if keeps_acting:
+                    releases.sent(name, identifier, is_default)
+            else:
+                unchanging[name] = (data, is_default)
+                if keeps_acting:
+                    releases.sent_unchanged(name, identifier, is_default)
+            middleware.publish(name, message)
+        elif kind == "service":
+            self._call(name, message, now_s)
+        else:
+            self._send_goal(name, message, now_s)
+        return True
+
+    def _withhold(self, request: Request, reason: str) -> bool:
+        """A request cannot be issued: what acts on its identifier is released at once."""
+        self._recorder.unknown(request.event, (reason,))
+        if request.keeps_acting and self._releases.is_acting(request.identifier):
+            self._steps.release(request.identifier)
+        return False
+
+    def _call(self, service: str, message: Any, now_s: float) -> None:
+        number = self._calls.open(service, now_s)
+        try:
+            self._middleware.call(service, number, message)
+        except Exception:
+            self._calls.close(number)
+            raise
+
+    def _send_goal(self, action: str, message: Any, now_s: float) -> None:
+        goal = self._goals.open(action, now_s)
+        try:
+            self._middleware.send_goal(action, goal.number, message)
+        except Exception:
+            self._goals.close(goal.number)
+            raise

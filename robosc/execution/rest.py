@@ -1,0 +1,83 @@
+"""Coming to rest, whatever happens: default messages on release identifiers, goals cancelled (semantics 3.8)."""
+
+from __future__ import annotations
+
+from typing import Dict, List, Tuple
+
+from robosc.execution.calls import Goal, Goals
+from robosc.execution.protocol import Middleware
+from robosc.execution.release import Releases
+
+CANCEL_WAIT_S = 0.5
+
+
+def describe_error(error: BaseException) -> str:
+    """An exception in words."""
+    try:
+        text = str(error)
+    except Exception:
+        text = ""
+    return "{}: {}".format(type(error).__name__, text) if text else type(error).__name__
+
+
+def request_cancel(middleware: Middleware, goal: Goal) -> None:
+    """Ask for the cancel of a goal, once; before its acceptance it is only remembered."""
+    goal.is_cancel_wanted = True
+    if goal.is_accepted and not goal.is_cancel_sent:
+        middleware.cancel_goal(goal.action, goal.number)
+        goal.is_cancel_sent = True
+
+
+class Rest:
+    """The reasons why an executor rests, and what it does to come to rest.
+
+    Args:
+        middleware: Sends default messages and cancels.
+        releases: The release identifiers.
+        goals: Goals under way.
+
+    Attributes:
+        reasons: Why, in words, by a key; nothing may be requested while there is one.
+        awaited_until_s: Until when the goals' ends are awaited.
+        restless: Release identifiers whose default message could not be sent so far.
+    """
+
+    __slots__ = ("_goals", "_middleware", "_releases", "awaited_until_s", "reasons", "restless")
+
+    def __init__(self, middleware: Middleware, releases: Releases, goals: Goals) -> None:
+        self._middleware = middleware
+        self._releases = releases
+        self._goals = goals
+        self.reasons: Dict[str, str] = {}
+        self.awaited_until_s = 0.0
+        self.restless: Tuple[str, ...] = ()
+
+    def come_to_rest(self, now_s: float) -> List[str]:
+        """Send every default message and cancel every goal; what failed, in words. Never raises."""
+        self.restless = self._releases.identifiers
+        failures = self.retry()
+        self._releases.clear()
+        self.awaited_until_s = now_s + CANCEL_WAIT_S
+        for goal in self._goals.all():
+            try:
+                request_cancel(self._middleware, goal)
+            except Exception as error:
+                failures.append("cancel of {} failed: {}".format(goal.action, describe_error(error)))
+        return failures
+
+    def retry(self) -> List[str]:
+        """Send the default messages that are still owed; what failed, in words. Never raises."""
+        failures: List[str] = []
+        owed: List[str] = []
+        for identifier in self.restless:
+            try:
+                self._middleware.publish_default(identifier)
+            except Exception as error:
+                owed.append(identifier)
+                failures.append("the default message on {} failed: {}".format(identifier, describe_error(error)))
+        self.restless = tuple(owed)
+        return failures
+
+    def is_awaiting(self, now_s: float) -> bool:
+        """Whether goals may still end within the time that they are given."""
+        return bool(self._goals) and now_s < self.awaited_until_s

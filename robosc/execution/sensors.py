@@ -1,0 +1,77 @@
+"""Outgoing messages that must keep coming: those of identifiers with a `max_age` (semantics 3.8)."""
+
+from __future__ import annotations
+
+from typing import Dict, List, Mapping, Sequence, Tuple
+
+from robosc.execution.calls import FOREVER
+
+
+class _Sensor:
+    """An outgoing message with a maximum age.
+
+    Attributes:
+        identifier: Where it comes.
+        max_age_s: Seconds after which it is stale.
+        seen_s: When it came last; before the first time, when the executor started.
+        was_seen: Whether it came since the start.
+    """
+
+    __slots__ = ("identifier", "max_age_s", "name", "seen_s", "was_seen")
+
+    def __init__(self, name: str, identifier: str, max_age_s: float) -> None:
+        self.name = name
+        self.identifier = identifier
+        self.max_age_s = max_age_s
+        self.seen_s = 0.0
+        self.was_seen = False
+
+
+class Sensors:
+    """Tells which sensors are stale. Several messages of the model may come on one identifier.
+
+    Args:
+        messages: Name and identifier of every outgoing message, in source order.
+        max_age_s: Maximum age by identifier.
+    """
+
+    __slots__ = ("_sensors",)
+
+    def __init__(self, messages: Sequence[Tuple[str, str]], max_age_s: Mapping[str, float]) -> None:
+        self._sensors: Dict[str, _Sensor] = {
+            name: _Sensor(name, identifier, max_age_s[identifier])
+            for name, identifier in messages
+            if identifier in max_age_s
+        }
+
+    def start(self, now_s: float) -> None:
+        """Nothing was seen so far."""
+        for sensor in self._sensors.values():
+            sensor.seen_s = now_s
+            sensor.was_seen = False
+
+    def see(self, name: str, now_s: float) -> bool:
+        """A message came: whether it is one that is watched."""
+        sensor = self._sensors.get(name)
+        if sensor is None:
+            return False
+        sensor.seen_s = now_s
+        sensor.was_seen = True
+        return True
+
+    def are_all_seen(self) -> bool:
+        """Whether every one of them came at least once."""
+        return all(sensor.was_seen for sensor in self._sensors.values())
+
+    def stale(self, now_s: float) -> List[Tuple[str, str]]:
+        """Name and identifier of the messages whose maximum age has passed."""
+        return [
+            (sensor.name, sensor.identifier)
+            for sensor in self._sensors.values()
+            if now_s >= sensor.seen_s + sensor.max_age_s
+        ]
+
+    def deadline_s(self, now_s: float) -> float:
+        """When the next of those that are not stale will be."""
+        ages = (sensor.seen_s + sensor.max_age_s for sensor in self._sensors.values())
+        return min((age for age in ages if age > now_s), default=FOREVER)

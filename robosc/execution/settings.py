@@ -1,0 +1,167 @@
+"""Settings of a deployment, checked by themselves and against the model they are meant for."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from typing import Any, Dict, Iterable, Mapping, NamedTuple, Optional, Tuple
+
+from robosc.execution.protocol import Description
+
+POLICIES = ("fair", "priority", "random")
+EVERY = ("period", "event")
+ON_UNKNOWN = ("default", "keep", "fault")
+
+MINIMUM_PERIOD_S = 0.0001
+_REQUEST_KINDS = ("incoming message", "service", "action")
+_ACTING_TYPES = ("Twist", "TwistStamped")
+
+
+class SettingsError(ValueError):
+    """A setting has no such name or a wrong value; says which and what it may be."""
+
+
+class Settings(NamedTuple):
+    """What a deployment may choose; `validated` makes one out of plain values.
+
+    Attributes:
+        period_s: Time between decisions, in seconds.
+        policy: Which enabled request is issued: `fair`, `priority` or `random`.
+        priority: Names of communications, most urgent first, for the policy `priority`.
+        seed: Seed of the policy `random`.
+        every: When to decide: each `period`, or after each batch as well (`event`).
+        release_identifiers: Identifiers whose last message keeps acting; None: every incoming message
+            that is linked to geometry_msgs Twist or TwistStamped.
+        max_age_s: By identifier of an outgoing message, the seconds without a message after which it is stale.
+        service_timeout_s: Seconds until a service call without a reply counts as failed; None: never.
+        action_timeout_s: Seconds until a goal without a result counts as failed; None: never.
+        on_unknown: What happens when an enum falls to its default past an unknown rule: `default`, `keep`, `fault`.
+    """
+
+    period_s: float = 0.1
+    policy: str = "fair"
+    priority: Tuple[str, ...] = ()
+    seed: int = 0
+    every: str = "period"
+    release_identifiers: Optional[Tuple[str, ...]] = None
+    max_age_s: Mapping[str, float] = {}
+    service_timeout_s: Optional[float] = 10.0
+    action_timeout_s: Optional[float] = None
+    on_unknown: str = "default"
+
+
+def settings_from(given: Mapping[str, Any]) -> Settings:
+    """Valid settings from named plain values; what is not given has its default.
+
+    Raises:
+        SettingsError: A name is unknown or a value is wrong.
+    """
+    for name in given:
+        if name not in Settings._fields:
+            raise SettingsError("there is no setting '{}'; {}".format(name, _hint(name, Settings._fields)))
+    return validated(Settings(**given))
+
+
+def validated(settings: Settings) -> Settings:
+    """The same settings with numbers as floats and lists as tuples.
+
+    Raises:
+        SettingsError: A value is wrong.
+    """
+    release = settings.release_identifiers
+    return Settings(
+        period_s=_seconds("period_s", settings.period_s, MINIMUM_PERIOD_S),
+        policy=_choice("policy", settings.policy, POLICIES),
+        priority=_names("priority", settings.priority),
+        seed=_integer("seed", settings.seed),
+        every=_choice("every", settings.every, EVERY),
+        release_identifiers=None if release is None else _names("release_identifiers", release),
+        max_age_s=_ages(settings.max_age_s),
+        service_timeout_s=_optional_seconds("service_timeout_s", settings.service_timeout_s),
+        action_timeout_s=_optional_seconds("action_timeout_s", settings.action_timeout_s),
+        on_unknown=_choice("on_unknown", settings.on_unknown, ON_UNKNOWN),
+    )
+
+
+def settings_for(settings: Settings, description: Description) -> Settings:
+    """Valid settings with every name known to the model and the release identifiers spelled out.
+
+    Raises:
+        SettingsError: A value is wrong, or a name is none of the model's.
+    """
+    checked = validated(settings)
+    infos = description.communications
+    _require_known("priority", checked.priority, [i.name for i in infos if i.kind in _REQUEST_KINDS], "a request")
+    received = [info.identifier for info in infos if info.kind == "outgoing message"]
+    _require_known("max_age_s", checked.max_age_s, received, "the identifier of an outgoing message")
+    published = [info.identifier for info in infos if info.kind == "incoming message"]
+    release = checked.release_identifiers
+    if release is None:
+        return checked._replace(release_identifiers=default_release_identifiers(description))
+    _require_known("release_identifiers", release, published, "the identifier of an incoming message")
+    return checked
+
+
+def default_release_identifiers(description: Description) -> Tuple[str, ...]:
+    """Identifiers of incoming messages linked to geometry_msgs Twist or TwistStamped, in source order."""
+    found = (
+        info.identifier
+        for info in description.communications
+        if info.kind == "incoming message" and info.package == "geometry_msgs" and info.interface in _ACTING_TYPES
+    )
+    return tuple(dict.fromkeys(found))
+
+
+def _wrong(name: str, value: Any, expected: str) -> SettingsError:
+    return SettingsError("setting '{}' is {!r}; it must be {}".format(name, value, expected))
+
+
+def _hint(name: Any, known: Iterable[str]) -> str:
+    there = sorted(set(known))
+    close = difflib.get_close_matches(str(name), there, 1)
+    if close:
+        return "did you mean '{}'?".format(close[0])
+    return "there is " + ", ".join(there) if there else "there is none"
+
+
+def _require_known(setting: str, names: Iterable[str], known: Iterable[str], what: str) -> None:
+    there = list(known)
+    for name in names:
+        if name not in there:
+            raise SettingsError("setting '{}': '{}' is not {}; {}".format(setting, name, what, _hint(name, there)))
+
+
+def _seconds(name: str, value: Any, least: float = 0.0) -> float:
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not is_number or not 0 < value < math.inf or value < least:
+        expected = "a number of seconds above 0" if least == 0.0 else "{:g} seconds or more".format(least)
+        raise _wrong(name, value, expected)
+    return float(value)
+
+
+def _optional_seconds(name: str, value: Any) -> Optional[float]:
+    return None if value is None else _seconds(name, value)
+
+
+def _integer(name: str, value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise _wrong(name, value, "an integer")
+    return value
+
+
+def _choice(name: str, value: Any, choices: Tuple[str, ...]) -> str:
+    if value not in choices:
+        raise _wrong(name, value, "one of " + ", ".join(choices))
+    return str(value)
+
+
+def _names(name: str, value: Any) -> Tuple[str, ...]:
+    if not isinstance(value, (list, tuple)) or not all(isinstance(item, str) for item in value):
+        raise _wrong(name, value, "a list of names")
+    return tuple(dict.fromkeys(value))
+
+
+def _ages(value: Any) -> Dict[str, float]:
+    if not isinstance(value, Mapping):
+        raise _wrong("max_age_s", value, "seconds by identifier")
+    return {identifier: _seconds("max_age_s of {}".format(identifier), age) for identifier, age in value.items()}

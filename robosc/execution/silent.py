@@ -1,0 +1,53 @@
+"""Runs of silent steps that do not end (semantics 3.3).
+
+A run is deterministic: equal states are followed by equal steps. It ends if and only if no state comes
+twice, which R. P. Brent's algorithm finds with one remembered state ("An improved Monte Carlo
+factorization algorithm", BIT 20, 1980, pp. 176-184, section 7).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+PATIENCE = 8
+"""Steps that are not watched: almost every run is shorter."""
+
+
+class EndlessRun(Exception):
+    """A run of silent steps does not end."""
+
+
+class RunWatch:
+    """Watches one run.
+
+    Args:
+        bound: More steps than this can only be a run that does not end.
+    """
+
+    __slots__ = ("_bound", "_distance", "_power", "_remembered", "_steps")
+
+    def __init__(self, bound: int) -> None:
+        self._bound = bound
+        self._steps = 0
+        self._power = 1
+        self._distance = 0
+        self._remembered: Any = None
+
+    def check(self, signature: Any, event: str) -> None:
+        """Look at the state after one more step, taken by `event`.
+
+        Raises:
+            EndlessRun: The state is one that the run was in before, or the bound is passed.
+        """
+        self._steps += 1
+        if self._steps > self._bound:
+            raise EndlessRun("silent steps do not end: more than {} in a row, the last {}".format(self._bound, event))
+        if self._steps <= PATIENCE:
+            return
+        if signature == self._remembered:
+            raise EndlessRun("silent steps do not end: a state came twice, the last step was {}".format(event))
+        self._distance += 1
+        if self._distance == self._power:
+            self._remembered = signature
+            self._power *= 2
+            self._distance = 0

@@ -1,0 +1,210 @@
+"""Events of the environment, and the silent steps that follow them (semantics 3.1 and 3.3).
+
+A state is *stable* when no silent step is enabled in it. What must be judged there, releases and the
+requirements of running goals, is judged once for each stable state that is new.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Dict, Optional, Tuple
+
+from robosc.execution.calls import Goals
+from robosc.execution.protocol import ControlledSystem, Middleware, Reading
+from robosc.execution.recorder import Recorder
+from robosc.execution.release import Releases
+from robosc.execution.rest import request_cancel
+from robosc.execution.silent import RunWatch
+
+
+class ExecutionError(Exception):
+    """Something that must not happen did; it becomes a fault."""
+
+
+class Steps:
+    """Takes events of a controlled system.
+
+    Args:
+        system: The controlled system.
+        middleware: Where default messages and cancels go.
+        recorder: Is told everything that happens.
+        releases: Messages that keep acting.
+        goals: Goals under way.
+        on_unknown: What an unknown enum means: `default`, `keep` or `fault`.
+
+    Attributes:
+        enabled: Which requests the stable state enables, by number, once somebody worked it out, else None.
+        unchanging: Messages whose request was issued in this stable state and changed nothing: their data, and
+            whether that is the default. A request's data and its step depend on nothing but the state.
+    """
+
+    __slots__ = (
+        "_goals",
+        "_middleware",
+        "_on_unknown",
+        "_pending",
+        "_recorder",
+        "_releases",
+        "_silent_events",
+        "_stable",
+        "_system",
+        "enabled",
+        "unchanging",
+    )
+
+    def __init__(
+        self,
+        system: ControlledSystem,
+        middleware: Middleware,
+        recorder: Recorder,
+        releases: Releases,
+        goals: Goals,
+        on_unknown: str,
+    ) -> None:
+        self._system = system
+        self._middleware = middleware
+        self._recorder = recorder
+        self._releases = releases
+        self._goals = goals
+        self._on_unknown = on_unknown
+        self._silent_events = system.description.resets + system.description.taus
+        self.enabled: Optional[Tuple[int, ...]] = None
+        self.unchanging: Dict[str, Tuple[Any, bool]] = {}
+        # Signature of the last stable state, or None if the state may not be stable.
+        self._stable: Any = None
+        # A fault that waits for the end of its batch, because on_unknown is `fault`.
+        self._pending: Optional[str] = None
+
+    def restart(self) -> None:
+        """Back to the initial state, which may not be stable."""
+        self._system.restart()
+        self._stable = None
+        self.enabled = None
+        self.unchanging.clear()
+        self._pending = None
+
+    def happen_with_data(self, event: str, data: Any, may_keep: bool = False) -> bool:
+        """Convert data and take the event that it came with.
+
+        Args:
+            event: An uncontrollable event.
+            data: What came.
+            may_keep: Whether the setting `keep` applies: it does to messages.
+
+        Returns:
+            Whether anything counts as having come; not if the data is unknown and `keep` applies.
+        """
+        reading = self._system.read(event, data)
+        if reading.unknown:
+            self._recorder.unknown(event, reading.unknown)
+            if reading.enum_unknown:
+                if may_keep and self._on_unknown == "keep":
+                    return False
+                self._judge_unknown(event, reading.unknown)
+        self.happen(event, reading, reading.data)
+        return True
+
+    def happen(self, event: str, reading: Optional[Reading], data: Any) -> None:
+        """Take an uncontrollable event, if the state accepts it.
+
+        Args:
+            event: The event.
+            reading: Its converted data, if it carries any.
+            data: What the log tells about it.
+        """
+        skipped = self._system.step(event, reading)
+        if skipped is None:
+            self._recorder.unexpected({"event": event, "data": data})
+            return
+        if self._recorder.is_active:
+            self._recorder.event(event, False, data)
+        if skipped:
+            self._skip(event, skipped)
+
+    def take(self, event: str, data: Any) -> None:
+        """Take a controllable event that is enabled.
+
+        Raises:
+            ExecutionError: The state does not accept it.
+        """
+        skipped = self._system.step(event)
+        if skipped is None:
+            raise ExecutionError("{} is enabled, but the state does not accept it".format(event))
+        if self._recorder.is_active:
+            self._recorder.event(event, True, data)
+        if skipped:
+            self._skip(event, skipped)
+
+    def settle(self, issuing: Optional[str] = None) -> bool:
+        """Silent steps to the end; then releases and running goals are judged, if the stable state is another one.
+
+        Args:
+            issuing: Communication whose request was just taken and whose message is about to go out, if any.
+
+        Returns:
+            Whether the stable state is another one.
+
+        Raises:
+            EndlessRun: They do not end.
+            ExecutionError: Something was unknown, and that is a fault.
+        """
+        signature = self._system.signature()
+        has_changed: bool = signature != self._stable
+        if has_changed:
+            # Should anything raise on the way, the state does not count as stable.
+            self._stable = None
+            self.enabled = None
+            self.unchanging.clear()
+            event = self._silent_step()
+            if event is not None:
+                signature = self._run_on(event)
+            self._stable = signature
+            if self._goals:
+                self._goals.observe_stable_state()
+            for identifier in self._releases.judge(issuing):
+                self.release(identifier)
+        if self._pending is not None:
+            pending, self._pending = self._pending, None
+            raise ExecutionError(pending)
+        return has_changed
+
+    def release(self, identifier: str) -> None:
+        """Send the default message on an identifier."""
+        self._middleware.publish_default(identifier)
+        self._releases.released(identifier)
+        self._recorder.release(identifier)
+
+    def _run_on(self, event: Optional[str]) -> Any:
+        """Silent steps after the first one, `event`: the signature of the state where none is enabled."""
+        watch = RunWatch(self._system.description.silent_bound)
+        signature = self._system.signature()
+        while event is not None:
+            watch.check(signature, event)
+            event = self._silent_step()
+            signature = self._system.signature()
+        return signature
+
+    def _silent_step(self) -> Optional[str]:
+        """Take one silent step, cancels first, then resets, then taus: its event, or None if there is none."""
+        if self._goals:
+            goal = self._goals.to_cancel()
+            if goal is not None:
+                event = goal.action + ".cancel"
+                self.take(event, None)
+                goal.is_running = False
+                request_cancel(self._middleware, goal)
+                return event
+        enabled = self._system.enabled
+        for event in self._silent_events:
+            if enabled(event):
+                self.take(event, None)
+                return event
+        return None
+
+    def _skip(self, event: str, skipped: Tuple[str, ...]) -> None:
+        """Updates were skipped."""
+        self._recorder.unknown(event, skipped)
+        self._judge_unknown(event, skipped)
+
+    def _judge_unknown(self, event: str, what: Tuple[str, ...]) -> None:
+        if self._on_unknown == "fault":
+            self._pending = "unknown at {}: {}".format(event, ", ".join(what))

@@ -1,0 +1,375 @@
+"""Semantics 3.2 and 3.4: services, goals, timeouts and cancels."""
+
+import pytest
+from support.execution import Bench, Sent, bench, example_system, system_of
+
+from robosc.execution.executor import DeploymentError, Status
+from robosc.model.structure import Deployment
+
+SERVICE = """
+robot Caller {
+  interface trigger use Trigger from std_srvs
+  datatype object Answer { success: boolean }
+  component A {
+    service ask with request: none, response: Answer links trigger
+    behaviour {
+      variable good: boolean
+      variable errors: integer(0..9)
+      initial marked state ready { on request to ask goto asking }
+      state asking {
+        on response from ask do good := value.success goto ready
+        on error from ask do errors := errors + 1 goto ready
+      }
+    }
+  }
+}
+"""
+
+
+def test_a_reply_is_a_response_then_a_reset() -> None:
+    b = bench(SERVICE)
+    assert b.tick() == [("call", "ask", 1, None)]
+    assert b.system.location("ask") == "waiting"
+    assert b.tick() == []
+    b.executor.on_reply(1, {"success": True})
+    assert b.events == ["ask.request", "ask.response", "ask.reset"]
+    assert b.variable("A", "good") is True
+    assert b.tick() == [("call", "ask", 2, None)]
+
+
+def test_a_reply_to_no_call_is_unexpected() -> None:
+    b = bench(SERVICE)
+    b.tick()
+    b.executor.on_reply(7, {"success": True})
+    assert b.events == ["ask.request"]
+    b.executor.on_reply(1, {"success": True})
+    b.executor.on_reply(1, {"success": True})
+    b.executor.on_call_failed(1, "gone")
+    assert b.executor.counters.unexpected == 3
+    assert b.executor.status is Status.RUNNING
+
+
+def test_a_failed_call_is_an_error() -> None:
+    b = bench(SERVICE)
+    b.tick()
+    b.executor.on_call_failed(1, "no server")
+    assert b.events == ["ask.request", "ask.error", "ask.reset"]
+    assert b.entries("event")[1]["data"] == "no server"
+
+
+@pytest.mark.parametrize(("timeout_s", "periods"), [(10.0, 100), (0.25, 3)])
+def test_no_reply_in_time_is_an_error_and_a_late_one_is_unexpected(timeout_s: float, periods: int) -> None:
+    b = bench(SERVICE, service_timeout_s=timeout_s)
+    b.tick()
+    b.tick(periods - 2)
+    assert b.variable("A", "errors") == 0
+    b.tick(3)
+    assert b.variable("A", "errors") == 1
+    b.executor.on_reply(1, {"success": True})
+    assert b.executor.counters.unexpected == 1
+    assert b.variable("A", "good") is False
+
+
+def test_ten_seconds_is_the_default_and_none_means_never() -> None:
+    assert bench(SERVICE).executor.settings.service_timeout_s == 10.0
+    assert bench(SERVICE).executor.settings.action_timeout_s is None
+    b = bench(SERVICE, service_timeout_s=None)
+    b.tick(10_000)
+    assert b.variable("A", "errors") == 0
+
+
+def test_a_timeout_counts_before_whatever_comes_at_the_same_moment() -> None:
+    b = bench(SERVICE, service_timeout_s=1.0)
+    b.tick()
+    b.clock.advance(1.0)
+    b.executor.on_reply(1, {"success": True})
+    assert b.events[:2] == ["ask.request", "ask.error"]
+    assert b.executor.counters.unexpected == 1
+
+
+ACTION = """
+robot Driver {
+  interface navigate use NavigateToPose from nav2_msgs
+  datatype object Goal { x: double }
+  datatype object Result { code: integer }
+  datatype object Feedback { left: double }
+  component Sensor {
+    outgoing message safe with type: boolean
+    outgoing message near with type: boolean
+    behaviour {
+      variable is_safe: boolean = true
+      variable is_near: boolean = false
+      on response from safe do is_safe := value
+      on response from near do is_near := value
+      initial marked state watching { }
+    }
+  }
+  component Driver {
+    action drive with request: Goal, response: Result, feedback: Feedback links navigate
+    behaviour {
+      variable left: double
+      variable code: integer = 99
+      on feedback from drive do left := value.left
+      initial marked state home { on request to drive goto away }
+      marked state away {
+        on response from drive do code := value.code goto home
+        on error from drive goto failed
+        on cancel to drive goto home
+      }
+      marked state failed { on response from near goto home }
+    }
+  }
+  requirement drive needs Sensor.is_safe and Driver.home
+  requirement Sensor.is_near disables drive
+  provide drive with { x: 1.5 }
+}
+""".replace("requirement drive needs Sensor.is_safe and Driver.home", "requirement drive needs Sensor.is_safe")
+GOAL: Sent = ("goal", "drive", 1, {"x": 1.5})
+CANCEL: Sent = ("cancel", "drive", 1)
+
+
+def driving(**settings: object) -> Bench:
+    b = bench(ACTION, **settings)
+    assert b.tick() == [GOAL]
+    return b
+
+
+def test_a_goal_that_succeeds() -> None:
+    b = driving()
+    b.executor.on_goal_accepted(1)
+    b.executor.on_feedback(1, {"left": 0.75})
+    assert b.variable("Driver", "left") == 0.75
+    b.executor.on_goal_ended(1, "succeeded", {"code": 3})
+    assert b.events == ["drive.request", "drive.feedback", "drive.response", "drive.reset"]
+    assert b.variable("Driver", "code") == 3
+    assert b.tick() == [("goal", "drive", 2, {"x": 1.5})]
+
+
+@pytest.mark.parametrize("outcome", ["rejected", "aborted", "cancelled", "lost"])
+def test_every_other_end_is_an_error(outcome: str) -> None:
+    b = driving()
+    b.executor.on_goal_ended(1, outcome)
+    assert b.events == ["drive.request", "drive.error", "drive.reset"]
+    assert b.state("Driver") == "failed"
+
+
+def test_replies_that_match_no_goal_are_unexpected() -> None:
+    b = driving()
+    b.executor.on_goal_accepted(9)
+    b.executor.on_feedback(9, {"left": 1.0})
+    b.executor.on_goal_ended(9, "succeeded", {"code": 1})
+    b.executor.on_cancel_refused(9, ended=False)
+    assert b.executor.counters.unexpected == 4
+    assert b.events == ["drive.request"]
+    assert b.executor.status is Status.RUNNING
+
+
+def test_an_end_that_does_not_exist_is_a_fault() -> None:
+    b = driving()
+    b.executor.on_goal_ended(1, "vanished")
+    assert b.executor.is_faulty
+
+
+def test_a_goal_has_no_timeout_by_default() -> None:
+    b = driving()
+    b.executor.on_goal_accepted(1)
+    assert b.tick(100_000) == []
+
+
+def test_a_goal_that_takes_too_long_is_an_error_and_is_cancelled() -> None:
+    b = driving(action_timeout_s=1.0)
+    b.executor.on_goal_accepted(1)
+    assert b.tick(11) == [CANCEL]
+    assert b.events == ["drive.request", "drive.error", "drive.reset"]
+    b.executor.on_goal_ended(1, "cancelled")
+    assert b.events[-1] == "drive.reset"
+    assert b.executor.counters.unexpected == 0
+
+
+def test_a_timed_out_goal_that_was_not_accepted_is_cancelled_on_acceptance() -> None:
+    b = driving(action_timeout_s=1.0)
+    assert b.tick(11) == []
+    b.executor.on_goal_accepted(1)
+    assert b.middleware.sent[-1] == CANCEL
+
+
+def test_a_result_after_the_timeout_is_unexpected() -> None:
+    b = driving(action_timeout_s=1.0)
+    b.executor.on_goal_accepted(1)
+    b.tick(11)
+    b.executor.on_goal_ended(1, "succeeded", {"code": 4})
+    assert b.executor.counters.unexpected == 1
+    assert b.variable("Driver", "code") == 99
+
+
+def test_a_requirement_that_turns_cancels_the_goal() -> None:
+    b = driving()
+    b.executor.on_goal_accepted(1)
+    assert b.receive("safe", False) == [CANCEL]
+    assert b.events == ["drive.request", "safe.response", "drive.cancel"]
+    assert b.state("Driver") == "home"
+    assert b.system.location("drive") == "idle"
+
+
+def test_each_requirement_cancels_by_itself_also_one_that_disables() -> None:
+    b = driving()
+    b.executor.on_goal_accepted(1)
+    assert b.receive("near", True) == [CANCEL]
+
+
+def test_a_cancel_before_acceptance_is_sent_on_acceptance() -> None:
+    b = driving()
+    assert b.receive("safe", False) == []
+    assert b.events[-1] == "drive.cancel"
+    b.executor.on_goal_accepted(1)
+    assert b.middleware.sent[-1] == CANCEL
+    b.executor.on_goal_accepted(1)
+    assert b.middleware.sent.count(CANCEL) == 1
+
+
+def test_what_the_request_itself_makes_false_never_cancels() -> None:
+    text = ACTION.replace("needs Sensor.is_safe", "needs Sensor.is_safe and Driver.home")
+    b = bench(text)
+    assert b.tick() == [GOAL]
+    b.executor.on_goal_accepted(1)
+    assert b.tick(3) == []
+    assert b.receive("safe", True) == []
+    # This requirement was false since the request: its other half turning changes nothing.
+    assert b.receive("safe", False) == []
+    # The other requirement held.
+    assert b.receive("near", True) == [CANCEL]
+
+
+def test_an_action_without_requirements_is_never_cancelled_by_the_executor() -> None:
+    text = ACTION.replace("requirement drive needs Sensor.is_safe", "").replace(
+        "requirement Sensor.is_near disables drive", ""
+    )
+    b = bench(text)
+    b.tick()
+    b.executor.on_goal_accepted(1)
+    assert b.system.enabled("drive.cancel")
+    assert b.receive("safe", False) + b.receive("near", True) == []
+
+
+def test_no_request_while_the_old_goal_may_still_run() -> None:
+    b = driving()
+    b.executor.on_goal_accepted(1)
+    b.receive("safe", False)
+    b.receive("safe", True)
+    assert b.system.enabled("drive.request")
+    assert b.tick(5) == []
+    b.executor.on_goal_ended(1, "cancelled")
+    assert b.tick() == [("goal", "drive", 2, {"x": 1.5})]
+
+
+def test_the_old_goal_is_over_when_its_server_is_lost() -> None:
+    b = driving()
+    b.receive("safe", False)
+    b.receive("safe", True)
+    assert b.tick() == []
+    b.executor.on_goal_ended(1, "lost")
+    assert b.tick() == [("goal", "drive", 2, {"x": 1.5})]
+    assert b.events.count("drive.error") == 0
+
+
+def test_a_refused_cancel_of_an_ended_goal_means_nothing() -> None:
+    b = driving()
+    b.executor.on_goal_accepted(1)
+    b.receive("safe", False)
+    b.executor.on_cancel_refused(1, ended=True)
+    assert b.executor.status is Status.RUNNING
+    assert b.executor.counters.unexpected == 0
+
+
+def test_a_refused_cancel_of_a_running_goal_is_a_fault() -> None:
+    b = driving()
+    b.executor.on_goal_accepted(1)
+    b.receive("safe", False)
+    b.executor.on_cancel_refused(1, ended=False)
+    assert b.executor.is_faulty
+    assert "refused" in b.executor.reasons[0]
+
+
+def test_feedback_and_results_of_a_cancelled_goal_are_unexpected() -> None:
+    b = driving()
+    b.executor.on_goal_accepted(1)
+    b.receive("safe", False)
+    b.executor.on_feedback(1, {"left": 2.0})
+    b.executor.on_goal_ended(1, "succeeded", {"code": 1})
+    assert b.executor.counters.unexpected == 2
+    assert b.variable("Driver", "left") == 0.0
+
+
+def test_cancels_come_before_resets_and_resets_before_taus() -> None:
+    b = bench(
+        """
+        robot Order {
+          interface navigate use NavigateToPose from nav2_msgs
+          interface trigger use Trigger from std_srvs
+          datatype object Empty { }
+          component Early {
+            outgoing message noise with type: none
+            behaviour {
+              initial marked state low { on response from ask goto high }
+              marked state high { transition goto higher }
+              marked state higher { }
+            }
+          }
+          component Asker { service ask with request: none, response: Empty links trigger }
+          component Driver { action drive with request: Empty, response: Empty, feedback: Empty links navigate }
+          requirement drive needs Early.low
+        }
+        """,
+        policy="priority",
+        priority=("drive", "ask"),
+    )
+    assert [sent[1] for sent in b.tick(2)] == ["drive", "ask"]
+    b.executor.on_reply(1, {})
+    assert b.events[2:] == ["ask.response", "drive.cancel", "ask.reset", "Early.tau_1"]
+
+
+def test_the_navigation_example() -> None:
+    b = Bench(example_system("navigation/navigation"))
+    assert b.tick(2) == [("call", "calibrate", 1, None)]
+    b.executor.on_reply(1, {"success": True})
+    assert b.state("Localisation") == "known"
+    assert b.tick() == []
+    b.receive("/person/distance", 3.0)
+    assert b.tick() == [("goal", "navigate", 1, {"pose": {"pose": {"position": {"x": 2.0, "y": 0.5}}}})]
+    b.executor.on_goal_accepted(1)
+    b.executor.on_feedback(1, {"distance_remaining": 1.0, "number_of_recoveries": 2})
+    assert b.variable("Navigator", "recoveries") == "making_progress"
+    b.executor.on_feedback(1, {"distance_remaining": 1.0, "number_of_recoveries": 3})
+    assert b.middleware.sent[-1] == ("cancel", "navigate", 1)
+    b.executor.on_goal_ended(1, "cancelled")
+    # Its own request sets the recoveries back, but nothing else does: it may not start again.
+    assert b.tick(3) == []
+
+
+def test_three_failures_then_the_button() -> None:
+    b = Bench(example_system("navigation/navigation"))
+    b.tick()
+    b.executor.on_reply(1, {"success": True})
+    b.receive("/person/distance", 3.0)
+    for goal in (1, 2, 3):
+        assert b.tick()[0][:3] == ("goal", "navigate", goal)
+        b.executor.on_goal_ended(goal, "aborted")
+    assert b.state("Navigator") == "given_up"
+    assert b.tick(3) == []
+    b.receive("/button")
+    assert b.tick()[0][:3] == ("goal", "navigate", 4)
+
+
+def test_a_supervisor_for_a_layer_is_refused_if_the_model_has_actions() -> None:
+    with pytest.raises(DeploymentError, match="layer"):
+        Bench(system_of(ACTION, Deployment.LAYER))
+    Bench(system_of(SERVICE, Deployment.LAYER))
+
+
+def test_the_layer_supervisor_leaves_cancel_to_the_caller() -> None:
+    system = system_of(ACTION, Deployment.LAYER)
+    system.step("drive.request")
+    assert system.enabled("drive.cancel")
+    own = system_of(ACTION)
+    own.step("drive.request")
+    assert not own.enabled("drive.cancel")

@@ -1,0 +1,119 @@
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robosc.execution.decision import FairPolicy, Policy, make_policy
+
+NAMES = ("a", "b", "c")
+
+
+def run(policy: Policy, *decisions: tuple[int, ...]) -> list[int]:
+    """What is issued when these requests are enabled, one decision after the other."""
+    issued = []
+    for enabled in decisions:
+        if enabled:
+            chosen = policy.choose(enabled)
+            policy.issued(chosen)
+            issued.append(chosen)
+        policy.close(enabled)
+    return issued
+
+
+def test_fair_goes_around_in_source_order() -> None:
+    assert run(FairPolicy(3), *[(0, 1, 2)] * 6) == [0, 1, 2, 0, 1, 2]
+
+
+def test_fair_prefers_what_was_not_enabled_at_the_previous_decision() -> None:
+    # 1 was never issued, yet 2, issued at the start and newly enabled since, comes first.
+    assert run(FairPolicy(3), (2,), (), (), (0, 1), (0, 1, 2)) == [2, 0, 2]
+
+
+def test_fair_takes_the_longest_ago_issued_of_those_that_are_not_new() -> None:
+    assert run(FairPolicy(2), (0,), (0, 1), (0, 1), (0, 1)) == [0, 1, 0, 1]
+
+
+def test_a_request_is_favoured_for_being_new_once_in_n_decisions() -> None:
+    # 0 blinks; 1 waits. With N = 2 request 0 may not use its newness at two decisions in a row of two.
+    policy = FairPolicy(2)
+    assert run(policy, (0,), (1,), (0, 1), (1,), (0, 1)) == [0, 1, 0, 1, 0]
+    # Favoured at decision 4 it may be so again at 6, not at 5.
+    assert run(policy, (0, 1)) == [1]
+
+
+def test_a_favour_used_up_leaves_the_waiting_one_first() -> None:
+    policy = FairPolicy(3)
+    # 0: new at decision 0. Absent at 1, new again at 2: fewer than N = 3 decisions later, so it counts as old.
+    assert run(policy, (0, 1), (1, 2), (0, 1, 2)) == [0, 2, 1]
+
+
+def test_a_decision_with_nothing_enabled_counts_as_a_decision() -> None:
+    assert run(FairPolicy(2), (0, 1), (), (0, 1)) == [0, 1]
+    # After the empty decision both are new again, and the never-issued one comes first.
+    assert run(FairPolicy(2), (1,), (), (), (0, 1)) == [1, 0]
+
+
+def test_what_could_not_be_issued_has_not_used_its_favour() -> None:
+    policy = FairPolicy(2)
+    assert policy.choose((0, 1)) == 0
+    assert policy.choose((1,)) == 1
+    policy.issued(1)
+    policy.close((0, 1))
+    assert run(policy, (0, 1)) == [0]
+
+
+@settings(deadline=None)
+@given(
+    st.integers(2, 5).flatmap(lambda n: st.tuples(st.just(n), st.lists(st.sets(st.integers(0, n - 1)), max_size=120)))
+)
+def test_no_request_starves(case: tuple[int, list[set[int]]]) -> None:
+    count, enabled_sets = case
+    policy = FairPolicy(count)
+    waiting = [0] * count
+    for enabled_set in enabled_sets:
+        # Request 0 waits all the time, while the others come and go as they like.
+        enabled = tuple(sorted(enabled_set | {0}))
+        chosen = policy.choose(enabled)
+        policy.issued(chosen)
+        policy.close(enabled)
+        for request in range(count):
+            waiting[request] = waiting[request] + 1 if request in enabled and request != chosen else 0
+        # Of N decisions at most N - 1 go to others for being new; each of the others is longest-ago issued once.
+        assert waiting[0] <= count * count
+
+
+@settings(deadline=None)
+@given(st.lists(st.sets(st.integers(0, 3)), max_size=60))
+def test_fair_agrees_with_the_words(enabled_sets: list[set[int]]) -> None:
+    count = 4
+    policy = FairPolicy(count)
+    previous: set[int] = set()
+    issued_at: dict[int, int] = {}
+    favoured_at: dict[int, int] = {}
+    for number, enabled in enumerate(enabled_sets):
+        candidates = tuple(sorted(enabled))
+        if candidates:
+            new = [c for c in candidates if c not in previous and number - favoured_at.get(c, -count) >= count]
+            expected = min(new or candidates, key=lambda c: (issued_at.get(c, -1), c))
+            assert policy.choose(candidates) == expected
+            policy.issued(expected)
+            issued_at[expected] = number
+            if new:
+                favoured_at[expected] = number
+        policy.close(candidates)
+        previous = enabled
+
+
+def test_priority_takes_the_list_first_then_fair() -> None:
+    policy = make_policy("priority", NAMES, ("c",), 0)
+    assert run(policy, (0, 1, 2), (0, 1), (0, 1), (0, 1, 2), (0, 1)) == [2, 0, 1, 2, 0]
+
+
+def test_priority_starves_on_purpose() -> None:
+    assert run(make_policy("priority", NAMES, ("b", "a"), 0), *[(0, 1, 2)] * 4) == [1] * 4
+
+
+def test_random_is_the_same_for_the_same_seed() -> None:
+    decisions = [(0, 1, 2)] * 50
+    first = run(make_policy("random", NAMES, (), 7), *decisions)
+    assert first == run(make_policy("random", NAMES, (), 7), *decisions)
+    assert first != run(make_policy("random", NAMES, (), 8), *decisions)
+    assert set(first) == {0, 1, 2}

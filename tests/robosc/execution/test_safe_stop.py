@@ -1,0 +1,335 @@
+"""Semantics 3.8: wheels stop whatever happens."""
+
+from typing import Any
+
+import pytest
+from support.execution import Bench, Sent, bench, system_of
+
+from robosc.execution.executor import Status
+
+ROBOT = """
+robot Robot {
+  interface twist use Twist from geometry_msgs
+  interface navigate use NavigateToPose from nav2_msgs
+  interface trigger use Trigger from std_srvs
+  datatype object Vector { x: double }
+  datatype object Twist { linear: Vector }
+  datatype object Empty { }
+  component Sensor {
+    outgoing message scan with identifier: "/scan", type: boolean
+    outgoing message shape with identifier: "/scan", type: boolean
+    outgoing message battery with identifier: "/battery", type: double
+    behaviour {
+      variable seen: boolean
+      variable volt: double
+      on response from scan do seen := value
+      on response from battery do volt := value
+      initial marked state awake { }
+    }
+  }
+  component Wheels {
+    incoming message move with identifier: "/cmd_vel", type: Twist links twist
+    incoming message spin with identifier: "/spin", type: Twist links twist
+    action go with request: Empty, response: Empty, feedback: Empty links navigate
+    service ask with request: none, response: Empty links trigger
+    behaviour {
+      variable asked: boolean
+      on response from ask do asked := true
+      initial marked state awake { on request to move  on request to spin  on request to go goto going }
+      state going { on error from go goto awake  on response from go goto awake  on cancel to go goto awake }
+    }
+  }
+  provide move with { linear: { x: 0.5 } }
+  provide spin with { linear: { x: 0.5 } }
+}
+"""
+MOVE: Sent = ("publish", "move", {"linear": {"x": 0.5}})
+ZEROS: list[Sent] = [("default", "/cmd_vel"), ("default", "/spin")]
+
+
+def moving(**settings: Any) -> Bench:
+    b = bench(ROBOT, **{"policy": "priority", "priority": ("move",), **settings})
+    assert b.tick() == [MOVE]
+    b.middleware.sent.clear()
+    return b
+
+
+def going() -> Bench:
+    b = bench(ROBOT, policy="priority", priority=("go",))
+    assert b.tick() == [("goal", "go", 1, None)]
+    b.middleware.sent.clear()
+    return b
+
+
+def test_a_stop_sends_the_default_everywhere_and_requests_nothing() -> None:
+    b = moving()
+    b.executor.stop("SIGINT")
+    # Also where nothing was sent: whatever acts there must stop.
+    assert b.middleware.sent == ZEROS
+    assert b.executor.status is Status.STOPPED
+    assert b.executor.reasons == ("SIGINT",)
+    assert not b.executor.is_faulty
+    assert b.tick(10) == []
+    assert b.executor.counters.faults == 0
+
+
+def test_a_fault_found_by_the_adapter() -> None:
+    b = moving()
+    b.executor.stop("lost the bus", is_fault=True)
+    assert b.middleware.sent == ZEROS
+    assert b.executor.is_faulty
+    assert b.executor.counters.faults == 1
+    assert [entry["what"] for entry in b.entries("fault")] == ["lost the bus"]
+
+
+def test_sensor_data_and_replies_are_still_handled() -> None:
+    b = bench(ROBOT, policy="priority", priority=("ask",))
+    assert b.tick() == [("call", "ask", 1, None)]
+    b.executor.stop("SIGTERM")
+    b.receive("/scan", True)
+    b.executor.on_reply(1, {})
+    assert b.variable("Sensor", "seen") is True
+    assert b.variable("Wheels", "asked") is True
+    assert b.events[-1] == "ask.reset"
+    assert b.tick(3) == []
+
+
+@pytest.mark.parametrize("method", ["publish", "prepare", "is_default"])
+def test_an_exception_of_the_middleware_stops_the_robot(method: str) -> None:
+    b = bench(ROBOT, policy="priority", priority=("move",))
+    b.middleware.failing.add(method)
+    assert b.tick() == ZEROS
+    assert b.executor.is_faulty
+    assert "RuntimeError" in b.executor.reasons[0]
+    assert b.tick(5) == []
+
+
+@pytest.mark.parametrize(("request_", "method"), [("go", "send_goal"), ("ask", "call")])
+def test_a_call_that_cannot_be_made_stops_the_robot(request_: str, method: str) -> None:
+    b = bench(ROBOT, policy="priority", priority=(request_,))
+    b.middleware.failing.add(method)
+    assert b.tick() == ZEROS
+    assert b.executor.is_faulty
+    # Nothing is awaited from a call that was never made.
+    assert b.executor.status is Status.STOPPED
+    b.middleware.failing.clear()
+    b.executor.restart()
+    assert b.tick()[0][:2] == ("goal" if request_ == "go" else "call", request_)
+
+
+class Broken:
+    """A system of which one method raises."""
+
+    def __init__(self, system: Any, method: str) -> None:
+        self._system = system
+        self._method = method
+        self.is_broken = False
+
+    def __getattr__(self, name: str) -> Any:
+        if self.is_broken and name == self._method:
+            raise RuntimeError(f"{name} broke")
+        return getattr(self._system, name)
+
+
+@pytest.mark.parametrize("method", ["enabled", "read", "step", "provide", "signature", "conjuncts", "state"])
+def test_an_exception_of_the_system_stops_the_robot(method: str) -> None:
+    system = Broken(system_of(ROBOT), method)
+    b = Bench(system)
+    b.tick(2)
+    b.middleware.sent.clear()
+    system.is_broken = True
+    b.receive("/scan", True)
+    b.tick()
+    assert b.executor.is_faulty
+    assert b.middleware.sent[-2:] == ZEROS
+    assert b.executor.status is Status.STOPPED
+
+
+def test_a_default_message_that_fails_keeps_no_other_from_going_out() -> None:
+    b = moving()
+    b.middleware.failing.add(("publish_default", "/cmd_vel"))
+    b.executor.stop("SIGINT")
+    assert b.middleware.sent == [("default", "/spin")]
+    assert b.executor.is_faulty
+    # It is tried again each period until it went out.
+    assert b.tick(2) == []
+    b.middleware.failing.clear()
+    assert b.tick(2) == [("default", "/cmd_vel")]
+
+
+def test_a_robot_that_cannot_be_brought_to_rest_is_not_restarted() -> None:
+    b = moving()
+    b.middleware.failing.add("publish_default")
+    b.executor.stop("SIGINT")
+    b.executor.restart()
+    assert b.executor.status is Status.STOPPED
+    b.middleware.failing.clear()
+    b.executor.restart()
+    assert b.executor.status is Status.RUNNING
+
+
+def test_a_log_that_raises_does_not_stop_the_robot() -> None:
+    b = moving()
+
+    def broken(entry: object) -> None:
+        raise OSError("disk")
+
+    b.log.write = broken  # type: ignore[method-assign]
+    assert b.tick() == [MOVE]
+    assert b.executor.status is Status.RUNNING
+    assert b.executor.counters.dropped == 1
+
+
+def test_running_goals_are_cancelled_and_awaited_for_half_a_second() -> None:
+    b = going()
+    b.executor.on_goal_accepted(1)
+    b.executor.stop("SIGINT")
+    assert b.middleware.sent == [*ZEROS, ("cancel", "go", 1)]
+    assert b.events == ["go.request"]
+    assert b.executor.status is Status.STOPPING
+    b.clock.advance(0.49)
+    assert b.executor.status is Status.STOPPING
+    b.clock.advance(0.02)
+    assert b.executor.status is Status.STOPPED
+
+
+def test_the_goal_then_ends_as_an_error() -> None:
+    b = going()
+    b.executor.on_goal_accepted(1)
+    b.executor.stop("SIGINT")
+    b.executor.on_goal_ended(1, "cancelled")
+    assert b.executor.status is Status.STOPPED
+    assert b.events == ["go.request", "go.error", "go.reset"]
+
+
+def test_a_goal_that_is_not_accepted_yet_is_cancelled_on_acceptance() -> None:
+    b = going()
+    b.executor.stop("SIGINT")
+    assert b.middleware.sent == ZEROS
+    b.executor.on_goal_accepted(1)
+    assert b.middleware.sent[-1] == ("cancel", "go", 1)
+
+
+def test_a_cancel_that_fails_keeps_nothing_else_from_stopping() -> None:
+    b = going()
+    b.executor.on_goal_accepted(1)
+    b.middleware.failing.add("cancel_goal")
+    b.executor.stop("SIGINT")
+    assert b.middleware.sent == ZEROS
+    assert b.executor.is_faulty
+
+
+def test_after_a_fault_it_stays_stopped_until_a_restart_in_the_initial_state() -> None:
+    b = moving()
+    b.receive("/scan", True)
+    b.executor.stop("broken", is_fault=True)
+    b.receive("/scan", True)
+    assert b.tick(50) == []
+    b.middleware.sent.clear()
+    b.executor.restart()
+    assert b.middleware.sent == []
+    assert b.variable("Sensor", "seen") is False
+    assert b.executor.status is Status.RUNNING
+    assert b.executor.reasons == ()
+    assert b.tick() == [MOVE]
+
+
+def test_a_restart_without_a_stop_brings_the_robot_to_rest_first() -> None:
+    b = moving()
+    b.executor.restart()
+    assert b.middleware.sent == ZEROS
+    assert b.tick() == [MOVE]
+
+
+def test_goals_of_the_old_run_are_nothing_to_the_new_one_but_must_end() -> None:
+    b = going()
+    b.executor.on_goal_accepted(1)
+    b.executor.stop("broken", is_fault=True)
+    b.executor.restart()
+    assert ("goal", "go", 2, None) not in b.tick(3)
+    before = len(b.events)
+    b.executor.on_goal_ended(1, "cancelled")
+    assert b.events[before:] == []
+    assert b.tick()[-1] == ("goal", "go", 2, None)
+
+
+def test_calls_of_the_old_run_are_forgotten() -> None:
+    b = bench(ROBOT, policy="priority", priority=("ask",))
+    b.tick()
+    b.executor.restart()
+    b.executor.on_reply(1, {})
+    assert b.executor.counters.unexpected == 1
+    assert b.tick()[0] == ("call", "ask", 2, None)
+
+
+def test_nothing_is_requested_before_the_first_message_of_a_sensor_with_a_maximum_age() -> None:
+    b = bench(ROBOT, policy="priority", priority=("move",), max_age_s={"/scan": 1.0})
+    assert b.executor.status is Status.WAITING
+    assert b.tick(3) == []
+    b.receive("/battery", 12.0)
+    assert b.tick() == []
+    b.receive("/scan", True)
+    assert b.executor.status is Status.RUNNING
+    assert b.tick() == [MOVE]
+
+
+def test_a_sensor_that_never_comes_is_stale_after_its_maximum_age() -> None:
+    b = bench(ROBOT, max_age_s={"/scan": 1.0})
+    b.tick(9)
+    assert b.executor.status is Status.WAITING
+    assert b.tick(2) == ZEROS * 2
+    assert b.executor.status is Status.STOPPED
+    assert not b.executor.is_faulty
+
+
+def test_a_stale_sensor_stops_the_robot_and_its_return_ends_that() -> None:
+    b = bench(ROBOT, policy="priority", priority=("move",), max_age_s={"/scan": 0.25})
+    b.receive("/scan", True)
+    assert b.tick(2) == [MOVE, MOVE]
+    assert b.tick() == ZEROS * 2
+    assert b.executor.status is Status.STOPPED
+    assert len(b.executor.reasons) == 2
+    assert "stale" in b.executor.reasons[0]
+    assert b.tick(3) == []
+    b.receive("/scan", True)
+    assert b.executor.status is Status.RUNNING
+    assert b.tick() == [MOVE]
+    assert b.executor.counters.faults == 0
+
+
+def test_the_return_of_a_sensor_ends_no_other_stop() -> None:
+    b = bench(ROBOT, max_age_s={"/scan": 0.25, "/battery": 0.25})
+    b.receive("/scan", True)
+    b.receive("/battery", 12.0)
+    b.tick(4)
+    b.receive("/scan", True)
+    assert b.executor.reasons == ("battery on /battery is stale",)
+    b.executor.stop("broken", is_fault=True)
+    b.receive("/battery", 12.0)
+    assert b.executor.reasons == ("broken",)
+    assert b.tick(2) == []
+
+
+def test_a_late_message_is_stale_even_if_no_period_passed() -> None:
+    b = bench(ROBOT, policy="priority", priority=("move",), max_age_s={"/scan": 0.05}, every="event")
+    b.receive("/scan", True)
+    b.middleware.sent.clear()
+    b.clock.advance(0.06)
+    # Another message must not lead to a decision on data that is too old.
+    assert b.receive("/battery", 12.0) == ZEROS * 2
+
+
+def test_a_restart_waits_for_the_sensors_again() -> None:
+    b = bench(ROBOT, max_age_s={"/scan": 1.0})
+    b.receive("/scan", True)
+    assert b.executor.status is Status.RUNNING
+    b.executor.restart()
+    assert b.executor.status is Status.WAITING
+
+
+def test_a_stop_before_the_start_holds_afterwards() -> None:
+    b = Bench(system_of(ROBOT), start=False)
+    b.executor.stop("SIGINT")
+    assert b.middleware.sent == ZEROS
+    b.executor.start()
+    assert b.tick(3) == []

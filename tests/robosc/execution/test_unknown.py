@@ -1,0 +1,306 @@
+"""Language B.4 at run time: what a sensor sends can neither crash a controller nor reach a motor as a non-number."""
+
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.execution import Bench, bench, example_system, system_of
+
+from robosc.execution.executor import Status
+
+NAN, INFINITY = math.nan, math.inf
+
+RADAR = """
+robot Radar {
+  interface twist use Twist from geometry_msgs
+  interface scan use LaserScan from sensor_msgs
+  interface trigger use Trigger from std_srvs
+  datatype object Vector { x: double }
+  datatype object Twist { linear: Vector }
+  datatype object Scan { ranges: array(double) }
+  datatype object Answer { width: Width level: integer(0..5) }
+  datatype enum Clearance from Scan to {
+    value.ranges[0] < 0.2 -> touching
+    value.ranges[0] > 1.0 and value.ranges[1] > 1.0 -> clear
+    default -> near
+  }
+  datatype enum Width from double to { value > 1.0 -> wide default -> narrow }
+  component Sensor {
+    outgoing message scan with identifier: "/scan", type: Clearance links scan
+    outgoing message level with type: integer(0..5)
+    outgoing message speed with type: double
+    outgoing message label with type: string
+    service ask with request: none, response: Answer links trigger
+    behaviour {
+      variable clearance: Clearance = touching
+      variable width: Width = narrow
+      variable n: integer(0..5)
+      variable v: double
+      variable text: string
+      on response from scan do clearance := value
+      on response from level do n := value
+      on response from speed do v := value * 2.0
+      on response from label do text := value
+      on response from ask do width := value.width
+      initial marked state awake { }
+    }
+  }
+  component Wheels { incoming message move with identifier: "/cmd_vel", type: Twist links twist }
+  requirement move needs Sensor.clearance = clear
+  requirement ask needs Sensor.n = 5
+  provide move with { linear: { x: Sensor.v } }
+}
+"""
+
+
+def scan(*ranges: Any) -> dict[str, Any]:
+    return {"ranges": list(ranges)}
+
+
+@pytest.mark.parametrize(
+    ("data", "expected", "unknown"),
+    [
+        (scan(2.0, 2.0), "clear", 0),
+        (scan(0.1, 2.0), "touching", 0),
+        (scan(0.5, 0.5), "near", 0),
+        (scan(INFINITY, INFINITY), "clear", 0),
+        (scan(-INFINITY, 2.0), "touching", 0),
+        # The first rule is false, the second unknown.
+        (scan(2.0, NAN), "near", 1),
+        (scan(2.0), "near", 1),
+        # Kleene: false and unknown is false, so nothing was unknown that matters.
+        (scan(0.5, NAN), "near", 0),
+        (scan(0.5), "near", 0),
+        # An earlier rule is true: later ones are not asked.
+        (scan(0.1), "touching", 0),
+        (scan(NAN, 2.0), "near", 1),
+        (scan(), "near", 1),
+        (scan(None, "far"), "near", 1),
+        ({}, "near", 1),
+        (None, "near", 1),
+        (7, "near", 1),
+    ],
+)
+def test_an_enum_takes_the_first_true_rule_else_its_default(data: Any, expected: str, unknown: int) -> None:
+    b = bench(RADAR)
+    b.receive("/scan", data)
+    assert b.variable("Sensor", "clearance") == expected
+    assert b.executor.counters.unknown == unknown
+    assert len(b.entries("unknown")) == unknown
+    assert b.executor.status is Status.RUNNING
+
+
+def test_keep_means_as_if_nothing_had_come() -> None:
+    b = bench(RADAR, on_unknown="keep", max_age_s={"/scan": 0.35})
+    b.receive("/scan", scan(2.0, 2.0))
+    b.tick(2)
+    b.receive("/scan", scan(2.0, NAN))
+    assert b.variable("Sensor", "clearance") == "clear"
+    assert b.events.count("scan.response") == 1
+    assert b.executor.counters.unknown == 1
+    # For the maximum age, too.
+    b.tick(2)
+    assert b.executor.status is Status.STOPPED
+    b.receive("/scan", scan(NAN))
+    assert b.executor.status is Status.STOPPED
+    b.receive("/scan", scan(2.0, 2.0))
+    assert b.executor.status is Status.RUNNING
+
+
+def test_keep_keeps_no_reply() -> None:
+    b = bench(RADAR, on_unknown="keep")
+    b.receive("level", 5)
+    b.tick()
+    b.executor.on_reply(1, {"width": NAN})
+    assert b.variable("Sensor", "width") == "narrow"
+    assert "ask.response" in b.events
+    assert b.executor.counters.unknown == 1
+
+
+def test_fault_stops_at_an_unknown_enum() -> None:
+    b = bench(RADAR, on_unknown="fault")
+    b.receive("/scan", scan(0.5, NAN))
+    assert b.executor.status is Status.RUNNING
+    b.receive("/scan", scan(2.0, NAN))
+    assert b.executor.is_faulty
+    assert b.middleware.sent == [("default", "/cmd_vel")]
+    assert b.variable("Sensor", "clearance") == "near"
+
+
+@pytest.mark.parametrize("value", [NAN, INFINITY, 1e308, "fast", None])
+def test_fault_stops_at_a_skipped_update(value: Any) -> None:
+    b = bench(RADAR, on_unknown="fault")
+    b.receive("speed", value)
+    assert b.executor.is_faulty
+    assert "Sensor.v" in b.executor.reasons[0]
+
+
+@pytest.mark.parametrize("value", [NAN, INFINITY, -INFINITY, 1e308, "fast", None, True, [], 10**400])
+def test_an_update_that_is_unknown_leaves_its_variable(value: Any) -> None:
+    b = bench(RADAR)
+    b.receive("speed", 1.5)
+    b.receive("speed", value)
+    assert b.variable("Sensor", "v") == 3.0
+    assert b.executor.counters.unknown == 1
+    assert b.entries("unknown")[0]["unknown"] == ["Sensor.v"]
+    assert b.executor.status is Status.RUNNING
+
+
+@pytest.mark.parametrize(
+    ("value", "expected", "unknown"),
+    [(3, 3, 0), (9, 5, 1), (-4, 0, 1), (2**31, 3, 1), (2.0, 3, 1), (True, 3, 1), ("4", 3, 1), (NAN, 3, 1)],
+)
+def test_a_received_integer_is_moved_into_its_range(value: Any, expected: int, unknown: int) -> None:
+    b = bench(RADAR)
+    b.receive("level", 3)
+    b.receive("level", value)
+    assert b.variable("Sensor", "n") == expected
+    assert b.executor.counters.unknown == unknown
+
+
+def test_a_clamped_integer_is_no_fault_even_where_unknown_is() -> None:
+    b = bench(RADAR, on_unknown="fault")
+    b.receive("level", 99)
+    assert b.executor.status is Status.RUNNING
+    assert b.variable("Sensor", "n") == 5
+
+
+def test_only_what_updates_read_is_converted() -> None:
+    b = bench(RADAR)
+    b.receive("level", 5)
+    b.tick()
+    b.executor.on_reply(1, {"width": 2.0, "level": 99})
+    assert b.executor.counters.unknown == 0
+    assert b.variable("Sensor", "width") == "wide"
+
+
+def test_objects_with_attributes_are_read_like_mappings() -> None:
+    class Message:
+        ranges = (2.0, 2.0)
+
+    b = bench(RADAR)
+    b.receive("/scan", Message())
+    assert b.variable("Sensor", "clearance") == "clear"
+
+
+def test_an_integer_overflow_and_a_range_of_a_code_only_variable_skip_the_update() -> None:
+    b = bench(
+        """
+        robot Count {
+          component A {
+            outgoing message m with type: integer
+            outgoing message big with type: integer
+            behaviour {
+              variable total: integer = 2147483600
+              variable small: integer(0..3) = 1
+              on response from m do total := total + value, small := value
+              initial marked state only { }
+            }
+          }
+        }
+        """
+    )
+    b.receive("m", 3)
+    assert (b.variable("A", "total"), b.variable("A", "small")) == (2147483603, 3)
+    b.receive("m", 100)
+    assert (b.variable("A", "total"), b.variable("A", "small")) == (2147483603, 3)
+    assert b.entries("unknown")[0]["unknown"] == ["A.total", "A.small"]
+
+
+def test_a_synthesis_variable_out_of_range_disables_a_controllable_event() -> None:
+    system = system_of(
+        """
+        robot Tank {
+          interface trigger use Trigger from std_srvs
+          datatype object Empty { }
+          component A {
+            service fill with request: none, response: Empty links trigger
+            behaviour {
+              variable level: integer(0..1)
+              initial marked state only { on request to fill do level := level + 1 }
+            }
+          }
+          requirement fill needs A.level >= 0
+        }
+        """
+    )
+    for expected in (True, False):
+        assert system.enabled("fill.request") is expected
+        assert (system.step("fill.request") is not None) is expected
+        system.step("fill.response")
+        system.step("fill.reset")
+
+
+class Nasty:
+    """Raises at every touch."""
+
+    def __getattr__(self, name: str) -> Any:
+        raise RuntimeError(name)
+
+    def __len__(self) -> int:
+        raise RuntimeError("len")
+
+    def __getitem__(self, index: object) -> Any:
+        raise RuntimeError("item")
+
+
+def hostile() -> st.SearchStrategy[Any]:
+    """Everything that a sensor, or somebody on its topic, might send."""
+    leaves = st.one_of(
+        st.none(),
+        st.booleans(),
+        st.integers(),
+        st.floats(),
+        st.text(max_size=5),
+        st.binary(max_size=5),
+        st.just(10**400),
+        st.builds(Nasty),
+        st.builds(object),
+    )
+    names = st.sampled_from(["ranges", "width", "level", "x", "data"])
+    return st.recursive(
+        leaves, lambda inner: st.one_of(st.lists(inner, max_size=3), st.dictionaries(names, inner, max_size=3))
+    )
+
+
+@settings(deadline=None, max_examples=300)
+@given(st.lists(st.tuples(st.sampled_from(["/scan", "level", "speed", "label"]), hostile()), max_size=6))
+def test_no_data_ever_raises_or_gets_through(messages: list[tuple[str, Any]]) -> None:
+    b = Bench(RADAR_SYSTEM)
+    b.executor.restart()
+    for identifier, data in messages:
+        b.receive(identifier, data)
+        for sent in b.tick():
+            if sent[0] == "publish":
+                assert math.isfinite(sent[2]["linear"]["x"])
+    b.receive("level", 5)
+    b.tick(2)
+    b.executor.on_reply(1, messages[0][1] if messages else None)
+    assert b.executor.counters.faults == 0
+    assert isinstance(b.variable("Sensor", "text"), str)
+    assert 0 <= b.variable("Sensor", "n") <= 5
+    assert math.isfinite(b.variable("Sensor", "v"))
+
+
+RADAR_SYSTEM = system_of(RADAR)
+
+
+@pytest.mark.parametrize("name", ["line_follower/line_follower", "maze_solver/maze_solver", "navigation/navigation"])
+@settings(deadline=None, max_examples=60)
+@given(data=hostile())
+def test_the_examples_stand_hostile_data(name: str, data: Any) -> None:
+    b = Bench(SYSTEMS[name])
+    for info in b.system.description.communications:
+        if info.kind == "outgoing message":
+            b.receive(info.identifier, data)
+            b.receive(info.identifier, {"ranges": [data] * 360})
+    b.tick(3)
+    assert b.executor.counters.faults == 0
+
+
+SYSTEMS = {
+    name: example_system(name)
+    for name in ("line_follower/line_follower", "maze_solver/maze_solver", "navigation/navigation")
+}

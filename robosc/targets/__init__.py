@@ -1,0 +1,29 @@
+"""Targets: what a finished supervisor is turned into.
+
+A target reads a supervisor and returns files as text (`GeneratedFiles`); `write_files` is the one place
+that writes them. Same supervisor, same bytes: no time, no machine path, everything sorted.
+"""
+
+from robosc.targets.files import GeneratedFiles, OverwriteError, write_files
+from robosc.targets.registry import (
+    GenerateOptions,
+    TargetInfo,
+    UnknownTargetError,
+    available_targets,
+    generate,
+    register,
+    require_target,
+)
+
+__all__ = [
+    "GenerateOptions",
+    "GeneratedFiles",
+    "OverwriteError",
+    "TargetInfo",
+    "UnknownTargetError",
+    "available_targets",
+    "generate",
+    "register",
+    "require_target",
+    "write_files",
+]

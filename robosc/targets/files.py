@@ -1,0 +1,196 @@
+"""Generated files as values, and the one place that writes them.
+
+A manifest beside the files remembers what was generated, so that generating again replaces files that
+nobody touched and never loses a user's change.
+"""
+
+import contextlib
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path, PurePosixPath
+
+from robosc.errors import RoboscError
+
+MANIFEST = ".robosc-manifest.json"
+"""Name of the manifest in the folder written to: {"version": 1, "files": {path: SHA-256}}."""
+
+_MANIFEST_VERSION = 1
+_MAXIMUM_LISTED = 10
+
+
+class OverwriteError(RoboscError):
+    """Writing would lose something of the user's; nothing was written."""
+
+
+class GeneratedFiles(Mapping[str, str]):
+    """Texts by relative path (with `/`), sorted; frozen.
+
+    Attributes:
+        executables: Paths of the files that are programs.
+    """
+
+    __slots__ = ("_texts", "executables")
+
+    def __init__(self, texts: Mapping[str, str], executables: frozenset[str] = frozenset()) -> None:
+        """Sort and check the paths.
+
+        Raises:
+            ValueError: A path is absolute, leads out of the folder, or names the manifest.
+        """
+        for path in texts:
+            _check_path(path)
+        if not executables <= texts.keys():
+            raise ValueError(f"not among the files: {', '.join(sorted(executables - texts.keys()))}")
+        self._texts = {path: texts[path] for path in sorted(texts)}
+        self.executables = executables
+
+    def __getitem__(self, path: str) -> str:
+        return self._texts[path]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._texts)
+
+    def __len__(self) -> int:
+        return len(self._texts)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, GeneratedFiles):
+            return NotImplemented
+        return self._texts == other._texts and self.executables == other.executables
+
+    def __hash__(self) -> int:
+        return hash((tuple(self._texts.items()), self.executables))
+
+    def __repr__(self) -> str:
+        return f"GeneratedFiles({list(self._texts)})"
+
+
+def _check_path(path: str) -> None:
+    """Refuse whatever could leave the folder, on any system."""
+    parts = PurePosixPath(path).parts
+    usable = parts and not path.startswith("/") and str(PurePosixPath(path)) == path and ".." not in parts
+    if not usable or any(char in path for char in '\\:\0\n<>|"?*') or path == MANIFEST:
+        raise ValueError(f"not a relative path inside the folder: {path!r}")
+
+
+def write_files(files: GeneratedFiles, directory: Path, force: bool = False) -> tuple[Path, ...]:
+    """Write files into a folder, each atomically, and the manifest last.
+
+    A file that is there is replaced if it is what an earlier run generated, or if `force` is set. Files of an
+    earlier run that are no longer generated are removed if nobody changed them. A file that already has
+    the right content is left alone.
+
+    Returns:
+        The path of every generated file, sorted.
+
+    Raises:
+        OverwriteError: A file was changed by somebody, or the place cannot be written; nothing was written
+            in the first case.
+    """
+    try:
+        earlier = _read_manifest(directory)
+        _refuse_links(files, directory)
+        if not force:
+            _refuse_changed(files, directory, earlier)
+        _remove_obsolete(files, directory, earlier)
+        for path, text in files.items():
+            _write_atomically(directory / path, text, path in files.executables)
+        _write_atomically(directory / MANIFEST, _manifest_text(files), is_executable=False)
+    except OSError as error:
+        place = error.filename or directory
+        raise OverwriteError(f"cannot write to {place}: {(error.strerror or str(error)).lower()}") from error
+    return tuple(directory / path for path in files)
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def _manifest_text(files: GeneratedFiles) -> str:
+    digests = {path: _digest(text.encode("utf-8")) for path, text in files.items()}
+    return json.dumps({"version": _MANIFEST_VERSION, "files": digests}, indent=2) + "\n"
+
+
+def _read_manifest(directory: Path) -> dict[str, str]:
+    """Digest by path of what an earlier run generated; empty where there is no readable manifest.
+
+    The manifest lies in the user's folder, so nothing in it is trusted: a path that leads out of the folder
+    is dropped.
+    """
+    try:
+        content = json.loads((directory / MANIFEST).read_text(encoding="utf-8"))
+        entries = content["files"].items() if content["version"] == _MANIFEST_VERSION else ()
+    except FileNotFoundError:
+        return {}
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return {}
+    manifest = {}
+    for path, digest in entries:
+        with contextlib.suppress(ValueError):
+            _check_path(path)
+            manifest[path] = str(digest)
+    return manifest
+
+
+def _content(place: Path) -> bytes | None:
+    """What a file holds, or None if there is none."""
+    try:
+        return place.read_bytes()
+    except FileNotFoundError:
+        return None
+
+
+def _refuse_links(files: GeneratedFiles, directory: Path) -> None:
+    """No folder below the target folder may be a link: it could lead anywhere."""
+    for path in files:
+        for folder in list(PurePosixPath(path).parents)[:-1]:
+            if (directory / folder).is_symlink():
+                raise OverwriteError(f"{directory / folder} is a symbolic link; nothing was written")
+
+
+def _refuse_changed(files: GeneratedFiles, directory: Path, earlier: Mapping[str, str]) -> None:
+    changed = []
+    for path, text in files.items():
+        content = _content(directory / path)
+        if content is not None and content != text.encode("utf-8") and _digest(content) != earlier.get(path):
+            changed.append(path)
+    if changed:
+        listed = ", ".join(changed[:_MAXIMUM_LISTED]) + (", ..." if len(changed) > _MAXIMUM_LISTED else "")
+        raise OverwriteError(
+            f"{directory}: not overwritten, because changed since generated (or not generated by RoboSC): {listed}; "
+            "nothing was written; use --force to overwrite"
+        )
+
+
+def _remove_obsolete(files: GeneratedFiles, directory: Path, earlier: Mapping[str, str]) -> None:
+    """Remove what an earlier run generated and this one does not, if it is as it was."""
+    for path, digest in earlier.items():
+        place = directory / path
+        inside = not any((directory / folder).is_symlink() for folder in list(PurePosixPath(path).parents)[:-1])
+        if path not in files and inside and place.is_file() and _digest(place.read_bytes()) == digest:
+            place.unlink()
+            for folder in list(PurePosixPath(path).parents)[:-1]:
+                with contextlib.suppress(OSError):  # Still holds something else.
+                    (directory / folder).rmdir()
+
+
+def _write_atomically(place: Path, text: str, is_executable: bool) -> None:
+    """Write a file so that a reader sees the old or the new text, never half of one."""
+    content = text.encode("utf-8")
+    mode = 0o755 if is_executable else 0o644
+    if not place.is_symlink() and _content(place) == content:
+        place.chmod(mode)
+        return
+    place.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(prefix=f".{place.name[:50]}.", dir=place.parent)
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content)
+        Path(temporary).chmod(mode)
+        Path(temporary).replace(place)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise

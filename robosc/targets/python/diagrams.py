@@ -1,0 +1,76 @@
+"""The supervisor's added conditions in Python: a formula where it is short, else functions that share nodes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from robosc.automata import System
+from robosc.expressions import Value
+from robosc.expressions.text import expression_text
+from robosc.supervisor.diagram import diagram_domains, to_expression
+from robosc.supervisor.structure import DecisionDiagram, DecisionNode
+from robosc.targets.python.expressions import FALSE_CODE, TRUE_CODE, Code, Scope, truth
+from robosc.targets.python.text import docstring, indent
+
+FORMULA_LIMIT = 40
+"""Operands up to which a condition is written as a formula."""
+
+
+@dataclass(slots=True)
+class Diagrams:
+    """Writes decision diagrams; equal nodes of all diagrams share one method.
+
+    Attributes:
+        system: Gives the domains of what the nodes test.
+        scope: Gives the names of what the nodes test.
+        methods: Name and lines of each node's method so far.
+    """
+
+    system: System
+    scope: Scope
+    methods: list[tuple[str, list[str]]] = field(default_factory=list)
+    _names: dict[tuple[object, ...], str] = field(default_factory=dict)
+
+    def condition(self, diagram: DecisionDiagram) -> tuple[str, Code]:
+        """A diagram in words and as Python."""
+        expression = to_expression(diagram, diagram_domains(self.system), limit=FORMULA_LIMIT)
+        if expression is not None:
+            return expression_text(expression), truth(expression, self.scope)
+        codes = [FALSE_CODE, TRUE_CODE]
+        for node in diagram.nodes:
+            codes.append(self._node(node, codes))
+        return f"a decision diagram of {len(diagram.nodes)} nodes", codes[diagram.root]
+
+    def _node(self, node: DecisionNode, codes: list[Code]) -> Code:
+        branches = tuple(codes[child].text for child in node.children)
+        key = (node.automaton, node.variable, node.starts, branches)
+        if key not in self._names:
+            name = f"_node_{len(self._names)}"
+            self._names[key] = name
+            self.methods.append((name, self._method(name, node, branches)))
+        return Code(f"self.{self._names[key]}()")
+
+    def _method(self, name: str, node: DecisionNode, branches: tuple[str, ...]) -> list[str]:
+        values = diagram_domains(self.system)[node.automaton, node.variable]
+        if node.variable is None:
+            subject = self.scope.location(node.automaton)
+        else:
+            subject = self.scope.variable(node.automaton, node.variable)[0]
+        ends = [*node.starts[1:], len(values)]
+        body = []
+        # The last branch needs no test: a subject always has a value of its domain.
+        for start, end, branch in list(zip(node.starts, ends, branches, strict=True))[:-1]:
+            body += [f"if {_test(subject, values, start, end)}:", f"    return {branch}"]
+        body.append(f"return {branches[-1]}")
+        words = node.automaton if node.variable is None else f"{node.automaton}.{node.variable}"
+        return [f"def {name}(self):", f"    {docstring(f'Node of the decision diagrams: {words}.')}", *indent(body)]
+
+
+def _test(subject: str, values: Sequence[Value], start: int, end: int) -> str:
+    """Whether the subject has one of `values[start:end]`, all earlier ones being excluded already."""
+    if isinstance(values[0], bool):
+        return f"not {subject}" if not values[end - 1] else subject
+    if isinstance(values[0], int):
+        return f"{subject} < {values[end]!r}"
+    if end - start == 1:
+        return f"{subject} == {values[start]!r}"
+    return f"{subject} in {tuple(values[start:end])!r}"

@@ -1,0 +1,143 @@
+"""What everything of a model is called in the generated class."""
+
+from dataclasses import dataclass
+
+from robosc.automata.plants import communication_plant_name
+from robosc.expressions import Type
+from robosc.model.structure import (
+    CONTROLLABLE_KINDS,
+    EVENT_KINDS,
+    Behaviour,
+    Communication,
+    CommunicationKind,
+    EventKind,
+    Model,
+    is_tau,
+)
+from robosc.supervisor.structure import Supervisor
+from robosc.targets.python.naming import Namer
+
+PROTOCOL_NAMES = (
+    "conjuncts",
+    "description",
+    "enabled",
+    "location",
+    "provide",
+    "read",
+    "requirements",
+    "restart",
+    "signature",
+    "state",
+    "step",
+)
+"""The methods of `ControlledSystem`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Names of attributes, methods and functions.
+
+    Attributes:
+        supervisor: What is generated.
+        locations: Attribute of each automaton's location: components by name, `service s`, `action a`.
+        variables: Attribute and type of each variable, by component and variable.
+        methods: Method by (purpose, event or communication); purposes are `allow`, `read`, `step`,
+            `provide`, `requirements`, `conjuncts`.
+        converters: Function that makes each enum out of received data.
+    """
+
+    supervisor: Supervisor
+    locations: dict[str, str]
+    variables: dict[tuple[str, str], tuple[str, Type]]
+    methods: dict[tuple[str, str], str]
+    converters: dict[str, str]
+
+    @property
+    def model(self) -> Model:
+        """The model."""
+        return self.supervisor.model
+
+    @property
+    def behaviours(self) -> tuple[tuple[str, Behaviour], ...]:
+        """Components that have a behaviour, in source order."""
+        return tuple((item.name, item.behaviour) for item in self.model.components if item.behaviour)
+
+    @property
+    def controllable(self) -> tuple[str, ...]:
+        """Events the executor may cause: requests, cancels, resets in source order, then taus."""
+        return tuple(event for event in events(self.model) if is_controllable(event))
+
+    @property
+    def uncontrollable(self) -> tuple[str, ...]:
+        """Events of the environment, in source order."""
+        return tuple(event for event in events(self.model) if not is_controllable(event))
+
+
+def events(model: Model) -> tuple[str, ...]:
+    """Every event of a model: of its communications in source order, then its taus."""
+    return tuple(event for item in model.communications for event in item.events) + model.taus
+
+
+def split(event: str) -> tuple[str, str]:
+    """`move.request` -> (`move`, `request`)."""
+    name, _, kind = event.rpartition(".")
+    return name, kind
+
+
+def is_controllable(event: str) -> bool:
+    """Whether an event is caused by the executor rather than the environment."""
+    return is_tau(event) or split(event)[1] in CONTROLLABLE_KINDS
+
+
+def has_plant_location(communication: Communication) -> bool:
+    """Whether its plant has more than one location."""
+    return communication.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
+
+
+def plant_step(communication: Communication, kind: EventKind) -> tuple[tuple[str, ...], str | None]:
+    """Locations from which an event is possible, and the one it leads to (None: it stays); semantics part 1."""
+    busy = "waiting" if communication.kind is CommunicationKind.SERVICE else "executing"
+    return {
+        EventKind.REQUEST: (("idle",), busy),
+        EventKind.RESPONSE: ((busy,), "ready"),
+        EventKind.ERROR: ((busy,), "failed"),
+        EventKind.FEEDBACK: ((busy,), None),
+        EventKind.CANCEL: ((busy,), "idle"),
+        EventKind.RESET: (("ready", "failed"), "idle"),
+    }[kind]
+
+
+def make_layout(supervisor: Supervisor) -> Layout:
+    """Choose all names, in source order, so that the same supervisor gives the same names."""
+    model = supervisor.model
+    members = Namer(PROTOCOL_NAMES)
+    locations, variables = {}, {}
+    for component in model.components:
+        if component.behaviour is None:
+            continue
+        locations[component.name] = members.name(f"{component.name}__state")
+        for variable in component.behaviour.variables:
+            attribute = members.name(f"{component.name}__{variable.name}")
+            variables[component.name, variable.name] = (attribute, variable.type)
+    for item in model.communications:
+        if has_plant_location(item):
+            locations[communication_plant_name(item)] = members.name(f"{item.name}__location")
+    return Layout(supervisor, locations, variables, _method_names(model, members), _converter_names(model))
+
+
+def _method_names(model: Model, members: Namer) -> dict[tuple[str, str], str]:
+    methods = {}
+    for event in events(model):
+        purposes = ("allow", "step") if is_controllable(event) else ("read", "step")
+        for purpose in purposes:
+            methods[purpose, event] = members.name(f"{purpose}_{event.replace('.', '_')}")
+    for item in model.communications:
+        if EventKind.REQUEST in EVENT_KINDS[item.kind]:
+            for purpose in ("provide", "requirements", "conjuncts"):
+                methods[purpose, item.name] = members.name(f"{purpose}_{item.name}")
+    return methods
+
+
+def _converter_names(model: Model) -> dict[str, str]:
+    functions = Namer()
+    return {item.name: functions.name(f"convert_{item.name}") for item in model.enums}

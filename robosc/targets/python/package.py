@@ -1,0 +1,81 @@
+"""The target `python`: a package with the supervisor, the executor and nothing else to install."""
+
+from importlib import resources
+
+from robosc.errors import UnsupportedModelError
+from robosc.supervisor.structure import Supervisor
+from robosc.targets.files import GeneratedFiles
+from robosc.targets.python.generate import header, supervisor_module
+from robosc.targets.python.naming import snake_case
+from robosc.targets.registry import GenerateOptions
+
+_NOT_COPIED = frozenset({"__init__.py"})
+_MAXIMUM_NAME = 100
+
+# How the copies import each other.
+_REWRITES = (
+    ("from robosc.execution import ", "from . import "),
+    ("from robosc.execution.", "from ."),
+    ("from robosc.expressions import values", "from . import values"),
+    ("from robosc.expressions.values import ", "from .values import "),
+)
+
+
+def package_name(supervisor: Supervisor, options: GenerateOptions, suffix: str) -> str:
+    """The chosen name, or one made from the robot's: `line_follower_<suffix>`.
+
+    Raises:
+        UnsupportedModelError: The chosen name is no name for a package.
+    """
+    if options.package is None:
+        return f"{snake_case(supervisor.model.name)[:_MAXIMUM_NAME].rstrip('_')}_{suffix}"
+    if snake_case(options.package) != options.package or len(options.package) > 2 * _MAXIMUM_NAME:
+        raise UnsupportedModelError(
+            f"'{options.package}' is no name for a package: lower-case letters, digits and single underscores, "
+            "starting with a letter"
+        )
+    return options.package
+
+
+def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles:
+    """The files of the target `python`, below a folder with the package's name."""
+    name = package_name(supervisor, options, "supervisor")
+    files = {f"{name}/{path}": text for path, text in python_files(supervisor).items()}
+    return GeneratedFiles(files)
+
+
+def python_files(supervisor: Supervisor) -> dict[str, str]:
+    """The files of a package that holds a supervisor and its executor, by path inside the package."""
+    top = header(supervisor)
+    files = {
+        "__init__.py": f'{top}"""The supervisor of the robot {supervisor.model.name} and its executor."""\n',
+        "supervisor.py": supervisor_module(supervisor, ".runtime"),
+        "runtime/__init__.py": f'{top}"""What the supervisor runs on: no part of it depends on the model."""\n',
+    }
+    for module, text in _runtime_modules().items():
+        files[f"runtime/{module}"] = top + text
+    return files
+
+
+def _runtime_modules() -> dict[str, str]:
+    """Copies of the modules that generated code runs on, importing each other instead of RoboSC."""
+    texts = {
+        "values.py": resources.files("robosc.expressions").joinpath("values.py").read_text(encoding="utf-8"),
+        "reading.py": resources.files("robosc.targets.python.runtime").joinpath("reading.py").read_text(encoding="utf-8"),
+    }
+    for entry in sorted(resources.files("robosc.execution").iterdir(), key=lambda item: item.name):
+        if entry.name.endswith(".py") and entry.name not in _NOT_COPIED:
+            texts[entry.name] = entry.read_text(encoding="utf-8")
+    return {name: with_relative_imports(text) for name, text in texts.items()}
+
+
+def with_relative_imports(text: str) -> str:
+    """A runtime module's text as it stands in a generated package: importing its neighbours, not RoboSC."""
+    lines = []
+    for line in text.splitlines(keepends=True):
+        for old, new in _REWRITES:
+            if line.lstrip().startswith(old):
+                line = line.replace(old, new, 1)
+                break
+        lines.append(line)
+    return "".join(lines)

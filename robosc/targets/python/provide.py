@@ -1,0 +1,58 @@
+"""Generated methods that compute the data of a request at the moment it is made."""
+
+from robosc.expressions.text import expression_text
+from robosc.model.structure import ObjectValue, Provide, ProvidedValue
+from robosc.targets.python.expressions import TRUE_CODE, Unknown, truth, value
+from robosc.targets.python.text import comment, docstring, indent
+from robosc.targets.python.writer import Writer
+
+
+def provide_method(writer: Writer, communication: str) -> list[str]:
+    """The method that gives the data of a request: of the first statement whose condition is true, else none."""
+    lines = [
+        f"def {writer.layout.methods['provide', communication]}(self):",
+        f"    {docstring(f'Data of a request of {communication}: (is known, data); None is the default message.')}",
+    ]
+    for statement in writer.model.provides_for(communication):
+        condition = TRUE_CODE if statement.condition is None else truth(statement.condition, writer.scope)
+        lines += indent(comment(provide_text(statement)))
+        result = _result(writer, statement.value)
+        if condition == TRUE_CODE:
+            return [*lines, *indent(result)]
+        lines += [f"    if {condition.text}:", *indent(result, 2)]
+    return [*lines, "    return True, None"]
+
+
+def provide_text(statement: Provide) -> str:
+    """A provide statement as a user writes it."""
+    condition = f" if {expression_text(statement.condition)}" if statement.condition is not None else ""
+    return f"provide {statement.communication} with {_value_text(statement.value)}{condition}"
+
+
+def _value_text(provided: ProvidedValue) -> str:
+    if isinstance(provided, ObjectValue):
+        return "{ " + ", ".join(f"{name}: {_value_text(item)}" for name, item in provided.properties) + " }"
+    return expression_text(provided)
+
+
+def _result(writer: Writer, provided: ProvidedValue) -> list[str]:
+    """Statements that return the data; where a part may be unknown, it is computed and tested first."""
+    locals_: list[tuple[str, str]] = []
+    text = _literal(writer, provided, locals_)
+    lines = [f"{name} = {code}" for name, code in locals_]
+    if locals_:
+        tests = " or ".join(f"{name} is None" for name, _ in locals_)
+        lines += [f"if {tests}:", "    return False, None"]
+    return [*lines, f"return True, {text}"]
+
+
+def _literal(writer: Writer, provided: ProvidedValue, locals_: list[tuple[str, str]]) -> str:
+    if isinstance(provided, ObjectValue):
+        entries = (f"{name!r}: {_literal(writer, item, locals_)}" for name, item in provided.properties)
+        return "{" + ", ".join(entries) + "}"
+    code = value(provided, writer.scope)
+    if code.unknown is Unknown.NEVER:
+        return code.text
+    name = f"data_{len(locals_) + 1}"
+    locals_.append((name, code.text))
+    return name

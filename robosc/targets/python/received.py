@@ -1,0 +1,217 @@
+"""Generated code that reads received data: properties, array elements, conversions to enums and ranges."""
+
+from dataclasses import dataclass, field
+
+from robosc.errors import InternalError
+from robosc.expressions import (
+    ArrayType,
+    BooleanType,
+    DoubleType,
+    EnumType,
+    Expression,
+    IntegerType,
+    ObjectType,
+    PathStep,
+    Received,
+    StringType,
+    Type,
+    leaves,
+)
+from robosc.expressions.text import expression_text
+from robosc.model.structure import EnumDefinition, Model
+from robosc.targets.python.expressions import (
+    TRUE_CODE,
+    Code,
+    Scope,
+    Sort,
+    Unknown,
+    both,
+    code_for,
+    falsity,
+    truth,
+)
+from robosc.targets.python.layout import Layout
+from robosc.targets.python.naming import Namer
+from robosc.targets.python.text import comment, indent
+
+Path = tuple[PathStep, ...]
+
+
+def received_paths(expressions: list[Expression]) -> tuple[Path, ...]:
+    """Every path of received data that the expressions read, each once, in order of appearance."""
+    return tuple(
+        dict.fromkeys(leaf.path for expression in expressions for leaf in leaves(expression) if isinstance(leaf, Received))
+    )
+
+
+def path_text(path: Path) -> str:
+    """A path as a user writes it: `value.ranges[0]`."""
+    return "value" + "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
+
+
+def path_type(model: Model, root: Type, path: Path) -> Type:
+    """The type at the end of a path."""
+    type_ = root
+    for step in path:
+        match type_, step:
+            case ObjectType(name=name), str():
+                type_ = next(item.type for item in model.object(name).properties if item.name == step)
+            case ArrayType(element=element), int():
+                type_ = element
+            case _:
+                raise InternalError(f"{path_text(path)} does not fit its type")
+    return type_
+
+
+@dataclass(slots=True)
+class Reader:
+    """Writes statements that read paths of one received datum into local variables.
+
+    Attributes:
+        layout: Names of the converters.
+        root_type: Type of the datum.
+        used: Functions of the runtime modules that the statements call.
+        words: Texts of tuples that say what was unknown, so far.
+        enum_flags: Locals that tell whether an enum fell to its default past an unknown rule, so far.
+    """
+
+    layout: Layout
+    root_type: Type
+    used: set[str]
+    words: list[str] = field(default_factory=list)
+    enum_flags: list[str] = field(default_factory=list)
+    _lines: list[str] = field(default_factory=list)
+    _namer: Namer = field(default_factory=lambda: Namer(("data", "path", "self")))
+    _sources: dict[Path, str] = field(default_factory=dict)
+    _codes: dict[Path, Code] = field(default_factory=dict)
+
+    def read(self, path: Path) -> Code:
+        """The code of a path; its statements are written on first use."""
+        if path not in self._codes:
+            self._codes[path] = self._read(path, path_type(self.layout.model, self.root_type, path))
+        return self._codes[path]
+
+    def seen(self, path: Path) -> str:
+        """Text of a path's value as the event log shows it: as it came, None where nothing fitting came."""
+        code = self.read(path)
+        if code.unknown is not Unknown.NAN:
+            return code.text
+        if code.sort is Sort.INTEGER:
+            return self._call("known", code.text)
+        # A NaN that came is shown as one.
+        return f"{code.text} if {code.text} == {code.text} else {self._call('read_double', self._access(path))}"
+
+    def take_lines(self) -> list[str]:
+        """The statements since the last call."""
+        lines, self._lines = self._lines, []
+        return lines
+
+    def _local(self, path: Path, suffix: str = "") -> str:
+        return self._namer.name("_".join(["value", *map(str, path)]) + suffix)
+
+    def _call(self, function: str, *arguments: str) -> str:
+        self.used.add(function)
+        return f"{function}({', '.join(arguments)})"
+
+    def _source(self, path: Path) -> str:
+        """Local of the raw datum at a path that leads on."""
+        if not path:
+            return "data"
+        if path not in self._sources:
+            name = self._local(path, "_raw")
+            self._lines.append(f"{name} = {self._access(path)}")
+            self._sources[path] = name
+        return self._sources[path]
+
+    def _access(self, path: Path) -> str:
+        """Text of the raw datum at a path."""
+        if not path:
+            return "data"
+        function = "element" if isinstance(path[-1], int) else "member"
+        return self._call(function, self._source(path[:-1]), repr(path[-1]))
+
+    def _read(self, path: Path, type_: Type) -> Code:
+        match type_:
+            case DoubleType() if path and isinstance(path[-1], int):
+                text = self._call("number_at", self._source(path[:-1]), repr(path[-1]))
+                return self._assign(path, type_, text, Unknown.NAN)
+            case DoubleType():
+                return self._assign(path, type_, self._call("number", self._access(path)), Unknown.NAN)
+            case IntegerType(low=int(low), high=int(high)):
+                received = self._local(path, "_received")
+                self._lines.append(f"{received} = {self._call('integer', self._access(path))}")
+                self.words.append(self._call("moved", repr(path_text(path)), received, repr(low), repr(high)))
+                text = self._call("clamped", received, repr(low), repr(high))
+                return self._assign(path, type_, text, Unknown.NAN)
+            case IntegerType():
+                return self._assign(path, type_, self._call("integer", self._access(path)), Unknown.NAN)
+            case BooleanType():
+                return self._assign(path, type_, self._call("read_boolean", self._access(path)), Unknown.NONE)
+            case StringType():
+                return self._assign(path, type_, self._call("read_string", self._access(path)), Unknown.NONE)
+            case EnumType(name=enum):
+                return self._read_enum(path, type_, enum)
+        raise InternalError(f"{path_text(path)} is no single value")
+
+    def _read_enum(self, path: Path, type_: Type, enum: str) -> Code:
+        name, words, flag = self._local(path), self._local(path, "_words"), self._local(path, "_unknown")
+        call = f"{self.layout.converters[enum]}({self._access(path)}, {path_text(path)!r})"
+        self._lines.append(f"{name}, {words}, {flag} = {call}")
+        self.words.append(words)
+        self.enum_flags.append(flag)
+        return code_for(name, type_)
+
+    def _assign(self, path: Path, type_: Type, text: str, unknown: Unknown) -> Code:
+        name = self._local(path)
+        self._lines.append(f"{name} = {text}")
+        return code_for(name, type_, unknown)
+
+
+def converter(layout: Layout, enum: EnumDefinition, used: set[str]) -> list[str]:
+    """The function that makes an enum out of received data, as a readable chain of conditions."""
+    reader = Reader(layout, enum.source, used)
+    scope = Scope(_no_variable, _no_location, reader.read, used.add)
+    body: list[str] = []
+    all_false = TRUE_CODE
+    for rule in enum.rules:
+        fires = truth(rule.condition, scope)
+        all_false = both(all_false, falsity(rule.condition, scope))
+        # What only a later rule needs is not read before that rule's turn.
+        body += reader.take_lines()
+        body += comment(f"{expression_text(rule.condition)} -> {rule.value}")
+        body += [f"if {fires.text}:", f"    return {rule.value!r}, {_words(reader)}, {_flags(reader)}"]
+    body += comment(f"default -> {enum.default}")
+    if _may_be_unknown([rule.condition for rule in enum.rules]):
+        words = f"path + {f' is {enum.default} by default: an earlier rule is unknown'!r}"
+        earlier = [*reader.words, f"({words},)"]
+        body.append(f"if not ({all_false.text}):")
+        body.append(f"    return {enum.default!r}, {' + '.join(earlier)}, True")
+    body.append(f"return {enum.default!r}, {_words(reader)}, {_flags(reader)}")
+    return [
+        f"def {layout.converters[enum.name]}(data, path):",
+        f'    """{enum.name} from received data; in words what was unknown; whether that decided an enum."""',
+        *indent(body),
+    ]
+
+
+def _words(reader: Reader) -> str:
+    return " + ".join(reader.words) or "()"
+
+
+def _flags(reader: Reader) -> str:
+    return " or ".join(reader.enum_flags) or "False"
+
+
+def _may_be_unknown(conditions: list[Expression]) -> bool:
+    return any(isinstance(leaf, Received) for condition in conditions for leaf in leaves(condition))
+
+
+def _no_variable(component: str, variable: str) -> tuple[str, Type]:
+    raise InternalError(f"an enum rule reads the variable {component}.{variable}")
+
+
+def _no_location(automaton: str) -> str:
+    raise InternalError(f"an enum rule reads the state of {automaton}")
+
+
+__all__ = ["Path", "Reader", "converter", "path_text", "path_type", "received_paths"]

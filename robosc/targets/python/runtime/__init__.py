@@ -1,0 +1,1 @@
+"""Modules that generated packages carry copies of, beside those of `robosc.execution`."""

@@ -1,0 +1,75 @@
+"""Received numbers, with NaN for whatever is unknown: comparisons with NaN are false, so conditions stay plain Python.
+
+A copy of this module stands in generated packages, which run on Python 3.8 and later.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from robosc.expressions import values
+
+NAN = float("nan")
+
+
+def member(value: Any, name: str) -> Any:
+    """A property of received data; None if it has none."""
+    try:
+        return values.read_property(value, name)
+    except Exception:  # Foreign objects may do anything when they are asked for a part.
+        return None
+
+
+def element(array: Any, index: int) -> Any:
+    """An element of a received array; None outside the array."""
+    try:
+        return values.read_element(array, index)
+    except Exception:  # As above.
+        return None
+
+
+def number(value: Any) -> Any:
+    """A received number as a double; NaN where something else came."""
+    if type(value) is float:
+        return value
+    result = values.read_double(value)
+    return NAN if result is None else result
+
+
+def number_at(array: Any, index: int) -> Any:
+    """An element of a received array as a double; NaN outside the array or where something else came."""
+    try:
+        value = array[index] if index < len(array) else None
+    except Exception:  # As above.
+        return NAN
+    return value if type(value) is float else number(value)
+
+
+def integer(value: Any) -> Any:
+    """A received integer; NaN where something else came or it needs more than 32 bits."""
+    result = values.read_integer(value)
+    return NAN if result is None else result
+
+
+def clamped(value: Any, low: int, high: int) -> Any:
+    """A received integer moved into its declared range; NaN stays NaN."""
+    if value < low:
+        return low
+    return high if value > high else value
+
+
+def moved(path: str, value: Any, low: int, high: int) -> Any:
+    """In words, that a received integer was moved into its declared range; no words if it was not."""
+    if value < low or value > high:
+        return ("{} is {}, outside {}..{}".format(path, value, low, high),)
+    return ()
+
+
+def known(value: Any) -> Any:
+    """A received integer as the rest of the world sees it: None where it is unknown."""
+    return None if value != value else value
+
+
+def stays_in_range(value: Any, low: int, high: int) -> bool:
+    """Whether assigning a value leaves a range alone; an unknown value is not assigned at all."""
+    return value is None or not (value < low or value > high)

@@ -1,0 +1,290 @@
+"""Generated methods that read the data of an event and take it: move and update, all at once.
+
+All updates of a step read the state before it. The generated code writes attributes one after the
+other, so whatever is read after it may have been written is first copied to a local variable.
+"""
+
+from collections.abc import Iterator
+
+from robosc.automata.plants import communication_plant_name
+from robosc.expressions import (
+    MAXIMUM_INTEGER,
+    MINIMUM_INTEGER,
+    BooleanType,
+    DoubleType,
+    Expression,
+    IntegerType,
+    PathStep,
+    StateTest,
+    StringType,
+    Type,
+    VariableRead,
+    leaves,
+)
+from robosc.expressions.text import expression_text
+from robosc.model.structure import Behaviour, EventKind, Transition, Update, Variable, is_tau
+from robosc.targets.python.allow import accepted
+from robosc.targets.python.expressions import TRUE_CODE, Code, Scope, Sort, Unknown, code_for, negated, value
+from robosc.targets.python.layout import has_plant_location, is_controllable, plant_step, split
+from robosc.targets.python.naming import Namer
+from robosc.targets.python.received import Path, Reader, path_text, path_type, received_paths
+from robosc.targets.python.text import comment, docstring, indent
+from robosc.targets.python.writer import Writer
+
+_Branch = tuple[tuple[str, ...], Transition]
+"""States (all of a behaviour's: no test is needed) and the transition taken in them."""
+
+
+def read_method(writer: Writer, event: str) -> list[str]:
+    """The method that converts what came with an uncontrollable event."""
+    paths = event_paths(writer, event)
+    head = [f"def {writer.layout.methods['read', event]}(self, data):"]
+    if not paths:
+        return [*head, f"    {docstring(f'{event}: no update reads its data.')}", "    return NO_DATA"]
+    reader = Reader(writer.layout, _event_type(writer, event), writer.used)
+    codes = [reader.read(path) for path in paths]
+    entries = ", ".join(f"{path_text(path)!r}: {reader.seen(path)}" for path in paths)
+    values = "".join(f"{code.text}, " for code in codes).strip()
+    words, flags = " + ".join(reader.words) or "()", " or ".join(reader.enum_flags) or "False"
+    return [
+        *head,
+        f"    {docstring(f'Convert the data of {event}.')}",
+        *indent(reader.take_lines()),
+        f"    return Reading(({values}), {{{entries}}}, {words}, {flags})",
+    ]
+
+
+def event_paths(writer: Writer, event: str) -> tuple[Path, ...]:
+    """The paths of received data that updates on an event read, in order of appearance."""
+    return received_paths([update.expression for _, _, update in _updates(writer, event)])
+
+
+def _updates(writer: Writer, event: str) -> Iterator[tuple[str, Transition, Update]]:
+    for component, behaviour in writer.layout.behaviours:
+        for transition in behaviour.transitions:
+            if transition.event == event:
+                for update in transition.updates:
+                    yield component, transition, update
+
+
+def _event_type(writer: Writer, event: str) -> Type:
+    name, kind = split(event)
+    type_ = writer.model.communication(name).received_type(EventKind(kind))
+    assert type_ is not None  # noqa: S101  # An update may read data only where data comes (language A.3).
+    return type_
+
+
+def step_method(writer: Writer, event: str) -> list[str]:
+    """The method that takes an event; it returns the skipped updates, or None if it cannot happen now."""
+    return _StepWriter(writer, event).method()
+
+
+class _StepWriter:
+    """Writes the step method of one event."""
+
+    def __init__(self, writer: Writer, event: str) -> None:
+        self.writer = writer
+        self.event = event
+        self.namer = Namer(("self", "values", "skipped", "reading"))
+        self.paths = event_paths(writer, event)
+        self.received: dict[Path, Code] = {}
+        self.copies: dict[str, str] = {}
+        self.may_skip = False
+        self.scope = Scope(self._variable, self._location, self._received, writer.used.add)
+        self._protocol = _protocol(writer, event)
+
+    def method(self) -> list[str]:
+        """The whole method."""
+        self._name_received()
+        blocks = self._blocks()
+        self._copy_what_is_overwritten(blocks)
+        body = [line for component, behaviour, branches in blocks for line in self._block(component, behaviour, branches)]
+        parameter = "" if is_controllable(self.event) else ", values"
+        lines = [f"def {self.writer.layout.methods['step', self.event]}(self{parameter}):"]
+        lines.append(f"    {docstring(f'Take {self.event}.')}")
+        lines += indent([*self._refusals(), *self._plant(), *self._unpacked(), *self._copied()])
+        if self.may_skip:
+            lines.append("    skipped = ()")
+        return [*lines, *indent(body), f"    return {'skipped' if self.may_skip else '()'}"]
+
+    def _name_received(self) -> None:
+        if not self.paths:
+            return
+        root = _event_type(self.writer, self.event)
+        for path in self.paths:
+            name = self.namer.name("_".join(["value", *map(str, path)]))
+            type_ = path_type(self.writer.model, root, path)
+            self.received[path] = code_for(name, type_, received_unknown(type_))
+
+    def _unpacked(self) -> list[str]:
+        names = [code.text for code in self.received.values()]
+        return [f"{', '.join(names)}{',' if len(names) == 1 else ''} = values"] if names else []
+
+    def _refusals(self) -> list[str]:
+        """Return None where the event is not accepted, before anything changes."""
+        lines = []
+        if self._protocol is not None:
+            location, sources, _ = self._protocol
+            test = f"!= {sources[0]!r}" if len(sources) == 1 else f"not in {sources!r}"
+            lines += [f"if {location} {test}:", "    return None"]
+        if is_controllable(self.event):
+            for words, code in accepted(self.writer, self.event):
+                if code != TRUE_CODE:
+                    lines += [*comment(words), f"if {negated(code).text}:", "    return None"]
+        return lines
+
+    def _plant(self) -> list[str]:
+        """Move the plant of a service or action."""
+        if self._protocol is None or self._protocol[2] is None:
+            return []
+        location, _, target = self._protocol
+        return [f"{location} = {target!r}"]
+
+    def _blocks(self) -> list[tuple[str, Behaviour, list[_Branch]]]:
+        """Which transition each component takes, by state."""
+        blocks = []
+        for component, behaviour in self.writer.layout.behaviours:
+            by_transition: dict[int, list[str]] = {}
+            for state in behaviour.states:
+                transition = self.writer.chosen(behaviour, self.event, state.name)
+                if transition is not None:
+                    by_transition.setdefault(behaviour.transitions.index(transition), []).append(state.name)
+            branches = [(tuple(states), behaviour.transitions[index]) for index, states in by_transition.items()]
+            if branches:
+                blocks.append((component, behaviour, branches))
+        return blocks
+
+    def _copy_what_is_overwritten(self, blocks: list[tuple[str, Behaviour, list[_Branch]]]) -> None:
+        """Find attributes that are read after a place that may write them; a superset is fine."""
+        written: set[str] = set()
+        overwritten: dict[str, None] = {}
+        for component, behaviour, branches in blocks:
+            location = self.writer.scope.location(component)
+            in_block: set[str] = set()
+            for _, transition in branches:
+                for update in transition.updates:
+                    for text in self._reads(update.expression):
+                        if text in written or text in in_block:
+                            overwritten[text] = None
+                    in_block.add(self.writer.scope.variable(component, update.variable)[0])
+                if transition.target is not None:
+                    in_block.add(location)
+            written |= in_block
+        for text in overwritten:
+            self.copies[text] = self.namer.name(f"old_{text.removeprefix('self.')}")
+
+    def _reads(self, expression: Expression) -> Iterator[str]:
+        for leaf in leaves(expression):
+            match leaf:
+                case VariableRead(component=component, variable=variable):
+                    yield self.writer.scope.variable(component, variable)[0]
+                case StateTest(component=component):
+                    yield self.writer.scope.location(component)
+
+    def _copied(self) -> list[str]:
+        return [f"{copy} = {text}" for text, copy in self.copies.items()]
+
+    def _variable(self, component: str, variable: str) -> tuple[str, Type]:
+        text, type_ = self.writer.scope.variable(component, variable)
+        return self.copies.get(text, text), type_
+
+    def _location(self, automaton: str) -> str:
+        text = self.writer.scope.location(automaton)
+        return self.copies.get(text, text)
+
+    def _received(self, path: tuple[PathStep, ...]) -> Code:
+        return self.received[path]
+
+    def _block(self, component: str, behaviour: Behaviour, branches: list[_Branch]) -> list[str]:
+        """What one component does."""
+        lines: list[str] = []
+        location = self.writer.scope.location(component)
+        tested: set[str] = set()
+        for states, transition in branches:
+            body = self._transition(component, behaviour, states, transition)
+            if not body:
+                continue
+            if len(states) == len(behaviour.states):
+                lines += body
+            elif len(tested) + len(states) == len(behaviour.states):
+                lines += ["else:", *indent(body)]
+            else:
+                test = f"== {states[0]!r}" if len(states) == 1 else f"in {states!r}"
+                lines += [f"{'elif' if tested else 'if'} {location} {test}:", *indent(body)]
+                tested.update(states)
+        return lines
+
+    def _transition(
+        self, component: str, behaviour: Behaviour, states: tuple[str, ...], transition: Transition
+    ) -> list[str]:
+        variables = {variable.name: variable for variable in behaviour.variables}
+        lines = []
+        for update in transition.updates:
+            lines += self._update(component, variables[update.variable], update)
+        if transition.target is not None and states != (transition.target,):
+            lines.append(f"{self.writer.scope.location(component)} = {transition.target!r}")
+        return lines
+
+    def _update(self, component: str, variable: Variable, update: Update) -> list[str]:
+        place, _ = self.writer.scope.variable(component, variable.name)
+        code, may_skip = self._assigned(variable.type, value(update.expression, self.scope))
+        words = comment(f"{component}: do {variable.name} := {expression_text(update.expression)}")
+        if not may_skip:
+            return [*words, f"{place} = {code}"]
+        self.may_skip = True
+        new = self.namer.name(f"new_{variable.name}")
+        skipped = f"{component}.{variable.name}"
+        return [
+            *words,
+            f"{new} = {code}",
+            f"if {new} is None:",
+            f"    skipped += ({skipped!r},)",
+            "else:",
+            f"    {place} = {new}",
+        ]
+
+    def _assigned(self, type_: Type, code: Code) -> tuple[str, bool]:
+        """The value that a variable takes, and whether it can be None: the update is then skipped."""
+        match type_:
+            case DoubleType():
+                return self._assigned_double(code)
+            case IntegerType():
+                low = MINIMUM_INTEGER if type_.low is None else type_.low
+                high = MAXIMUM_INTEGER if type_.high is None else type_.high
+                if code.unknown is Unknown.NEVER and low <= code.low and code.high <= high:
+                    return code.text, False
+                self.writer.used.add("assignable_integer")
+                return f"assignable_integer({code.text}, {low}, {high})", True
+            case BooleanType() | StringType():
+                return code.text, code.unknown is not Unknown.NEVER
+            case _:
+                return code.text, False
+
+    def _assigned_double(self, code: Code) -> tuple[str, bool]:
+        if code.unknown is not Unknown.NEVER:
+            self.writer.used.add("assignable_double")
+            return f"assignable_double({code.text})", True
+        return (f"float({code.text})" if code.sort is Sort.INTEGER else code.text), False
+
+
+def _protocol(writer: Writer, event: str) -> tuple[str, tuple[str, ...], str | None] | None:
+    """Attribute of the event's service or action, the locations that it is possible in, and where it leads."""
+    name, kind = split(event)
+    if is_tau(event):
+        return None
+    communication = writer.model.communication(name)
+    if not has_plant_location(communication):
+        return None
+    sources, target = plant_step(communication, EventKind(kind))
+    return writer.scope.location(communication_plant_name(communication)), sources, target
+
+
+def received_unknown(type_: Type) -> Unknown:
+    """How received data of a type is unknown."""
+    match type_:
+        case DoubleType() | IntegerType():
+            return Unknown.NAN
+        case BooleanType() | StringType():
+            return Unknown.NONE
+        case _:
+            return Unknown.NEVER

@@ -1,0 +1,66 @@
+"""What all parts of the Python generator share: the names, the scope of expressions, the diagrams."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from robosc.automata import System, to_automata
+from robosc.errors import InternalError
+from robosc.expressions import PathStep, Type
+from robosc.model.structure import Behaviour, Model, Transition
+from robosc.supervisor.structure import Supervisor
+from robosc.targets.python.diagrams import Diagrams
+from robosc.targets.python.expressions import Code, Scope
+from robosc.targets.python.layout import Layout, make_layout
+
+
+def _no_received(path: Sequence[PathStep]) -> Code:
+    raise InternalError("a condition on the state reads received data")
+
+
+@dataclass(slots=True)
+class Writer:
+    """The state of one run of the generator.
+
+    Attributes:
+        layout: Names.
+        system: The automata, for the domains of decision diagrams.
+        used: Functions of the runtime modules that the generated code calls.
+        scope: How expressions over the state are written.
+        diagrams: Writes the supervisor's added conditions.
+    """
+
+    layout: Layout
+    system: System
+    used: set[str] = field(default_factory=set)
+    scope: Scope = field(init=False)
+    diagrams: Diagrams = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.scope = Scope(self._variable, self._location, _no_received, self.used.add)
+        self.diagrams = Diagrams(self.system, self.scope)
+
+    @property
+    def model(self) -> Model:
+        """The model."""
+        return self.layout.model
+
+    def _variable(self, component: str, variable: str) -> tuple[str, Type]:
+        attribute, type_ = self.layout.variables[component, variable]
+        return f"self.{attribute}", type_
+
+    def _location(self, automaton: str) -> str:
+        if automaton in self.layout.locations:
+            return f"self.{self.layout.locations[automaton]}"
+        return repr(self.system.automaton(automaton).initial)  # A message's plant has one location.
+
+    @staticmethod
+    def chosen(behaviour: Behaviour, event: str, state: str) -> Transition | None:
+        """The transition that takes an event in a state: the state's own first, then the behaviour's."""
+        fitting = [item for item in behaviour.transitions if item.event == event and item.source in (state, None)]
+        own = [item for item in fitting if item.source is not None]
+        return next(iter([*own, *fitting]), None)
+
+
+def make_writer(supervisor: Supervisor) -> Writer:
+    """A writer for one supervisor."""
+    return Writer(make_layout(supervisor), to_automata(supervisor.model, supervisor.deployment))

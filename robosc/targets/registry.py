@@ -1,0 +1,121 @@
+"""The registry of targets: found by name, imported when they are used.
+
+Built-in targets are listed here; an installed distribution adds its own through the entry-point group
+`robosc.targets` (name = target, value = `module:attribute` of a `Target`), a program through `register`.
+"""
+
+import importlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from difflib import get_close_matches
+from importlib.metadata import entry_points
+
+from robosc.errors import RoboscError
+from robosc.supervisor.structure import Supervisor
+from robosc.targets.files import GeneratedFiles
+
+ENTRY_POINT_GROUP = "robosc.targets"
+
+
+@dataclass(frozen=True, slots=True)
+class GenerateOptions:
+    """What a user may choose about generated files.
+
+    Attributes:
+        package: Name of the generated package, or None for one made from the robot's name.
+    """
+
+    package: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TargetInfo:
+    """A target as users see it."""
+
+    name: str
+    description: str
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A target: what it is, and its generator.
+
+    Attributes:
+        info: Name and description.
+        generate: Makes the files; raises UnsupportedModelError for a model outside what it handles.
+    """
+
+    info: TargetInfo
+    generate: Callable[[Supervisor, GenerateOptions], GeneratedFiles]
+
+
+class UnknownTargetError(RoboscError, LookupError):
+    """There is no target of that name."""
+
+
+# Name, description and place of the built-in targets: listing them imports none.
+_BUILT_IN: dict[str, tuple[str, str]] = {
+    "python": (
+        "the supervisor and its executor as a Python package without any dependency",
+        "robosc.targets.python:TARGET",
+    ),
+    "ros2": (
+        "a complete ROS 2 package (ament_python): controller node, launch file, parameters",
+        "robosc.targets.ros2:TARGET",
+    ),
+}
+
+_registered: dict[str, Target] = {}
+
+
+def register(target: Target) -> None:
+    """Make a target known to this process; one of the same name is replaced."""
+    _registered[target.info.name] = target
+
+
+def available_targets() -> tuple[TargetInfo, ...]:
+    """Every target that can be generated, by name."""
+    infos = {name: TargetInfo(name, description) for name, (description, _) in _BUILT_IN.items()}
+    for entry in entry_points(group=ENTRY_POINT_GROUP):
+        infos.setdefault(entry.name, TargetInfo(entry.name, f"plug-in {entry.value}"))
+    infos.update((name, target.info) for name, target in _registered.items())
+    return tuple(infos[name] for name in sorted(infos))
+
+
+def require_target(name: str) -> None:
+    """Do nothing if there is a target called `name`.
+
+    Raises:
+        UnknownTargetError: There is none; the message says what there is.
+    """
+    names = [info.name for info in available_targets()]
+    if name in names:
+        return
+    close = get_close_matches(name, names, n=1)
+    hint = f"; did you mean '{close[0]}'?" if close else f"; there is {', '.join(names)}"
+    raise UnknownTargetError(f"unknown target '{name}'{hint}")
+
+
+def generate(supervisor: Supervisor, target: str, options: GenerateOptions | None = None) -> GeneratedFiles:
+    """The files of a target for a supervisor.
+
+    Raises:
+        UnknownTargetError: There is no such target.
+        UnsupportedModelError: The model is outside what the target handles.
+    """
+    require_target(target)
+    return _load(target).generate(supervisor, options or GenerateOptions())
+
+
+def _load(name: str) -> Target:
+    """The target itself; imports it."""
+    if name in _registered:
+        return _registered[name]
+    if name in _BUILT_IN:
+        module, _, attribute = _BUILT_IN[name][1].partition(":")
+        loaded = getattr(importlib.import_module(module), attribute)
+    else:
+        loaded = next(iter(entry_points(group=ENTRY_POINT_GROUP, name=name))).load()
+    if not isinstance(loaded, Target):
+        raise UnknownTargetError(f"the plug-in of target '{name}' is not a robosc.targets.registry.Target")
+    return loaded

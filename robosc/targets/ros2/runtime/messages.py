@@ -1,0 +1,305 @@
+"""Between the model's data and ROS messages: every field is checked at start-up, every value before it is sent.
+
+ROS messages check nothing themselves: a number too large is wrapped, a None becomes garbage. So each field
+that is sent gets a conversion of its own, chosen from the message's own list of fields.
+
+A *shape* is what the model says about a datum: `boolean`, `integer`, `double` or `string`; a dict of
+shapes by property; a list with the shape of an array's elements; or None for no data.
+
+A copy of this module stands in generated packages, which run on Python 3.8 and later.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Tuple  # noqa: UP035  # Python 3.8
+
+from robosc.execution.protocol import DataDoesNotFit
+
+Path = Tuple[str, ...]
+
+MAXIMUM_FLOAT32 = 3.4028234663852886e38
+_INFINITY = float("inf")
+_INTEGER = re.compile(r"(u?)int(8|16|32|64)\Z")
+_SEQUENCE = re.compile(r"sequence<(?P<element>.+?)(, [0-9]+)?>\Z|(?P<fixed>.+)\[[0-9]+\]\Z")
+_STRING = re.compile(r"w?string(<(?P<bound>[0-9]+)>)?\Z")
+
+
+class Topic(NamedTuple):
+    """A topic of the node.
+
+    Attributes:
+        identifier: Its name in the model.
+        package: Package of its message type.
+        type: Name of its message type.
+        published: Messages of the model that go out on it.
+        received: Messages of the model that come in on it.
+    """
+
+    identifier: str
+    package: str
+    type: str
+    published: Tuple[str, ...]
+    received: Tuple[str, ...]
+
+
+class SetupError(Exception):
+    """The model and the installed message types do not fit together; says what and where."""
+
+
+def load_message(package: str, name: str) -> Any:
+    """The class of a message type.
+
+    Raises:
+        SetupError: It cannot be imported.
+    """
+    try:
+        return getattr(importlib.import_module(package + ".msg"), name)
+    except (ImportError, AttributeError) as error:
+        raise SetupError(
+            "the message type {0}/msg/{1} is not installed; build {0} and source its workspace".format(package, name)
+        ) from error
+
+
+def message_name(message_class: Any) -> str:
+    """A message class as ROS names it: `geometry_msgs/msg/Twist`."""
+    return "{}/msg/{}".format(message_class.__module__.split(".")[0], message_class.__name__)
+
+
+def basic_field(message_class: Any) -> str:
+    """The field that stands for a basic type: `data`, else the only one.
+
+    Raises:
+        SetupError: There are several, or none.
+    """
+    fields = message_class.get_fields_and_field_types()
+    if "data" in fields:
+        return "data"
+    if len(fields) == 1:
+        return str(next(iter(fields)))
+    raise SetupError(
+        "the message {} has {}, so a basic type can stand for none of them: use an object type".format(
+            message_name(message_class), "the fields " + ", ".join(fields) if fields else "no field"
+        )
+    )
+
+
+def check_shape(message_class: Any, shape: Any, subject: str) -> None:
+    """Do nothing if a message has every field that the model speaks of, with a type that fits.
+
+    Args:
+        message_class: The message's class.
+        shape: What the model says about the data.
+        subject: What it is about, for the error message, e.g. `message scan`.
+
+    Raises:
+        SetupError: It does not.
+    """
+    if isinstance(shape, dict):
+        _check_object(message_class, shape, subject, ())
+    elif shape is not None:
+        name = basic_field(message_class)
+        field_type = message_class.get_fields_and_field_types()[name]
+        _check_field(field_type, shape, subject, message_class, (name,))
+
+
+def _check_object(message_class: Any, shape: Dict[str, Any], subject: str, path: Path) -> None:
+    fields = message_class.get_fields_and_field_types()
+    for name, inner in shape.items():
+        if name not in fields:
+            raise SetupError(
+                "{}: {} has no field '{}'; it has {}".format(
+                    subject, message_name(message_class), ".".join((*path, name)), ", ".join(fields) or "none"
+                )
+            )
+        _check_field(fields[name], inner, subject, message_class, (*path, name))
+
+
+def _check_field(field_type: str, shape: Any, subject: str, message_class: Any, path: Path) -> None:
+    array = _SEQUENCE.match(field_type)
+    if isinstance(shape, list):
+        if array is None:
+            raise _misfit(field_type, "an array", subject, message_class, path)
+        _check_field(array.group("element") or array.group("fixed"), shape[0], subject, message_class, path)
+    elif isinstance(shape, dict):
+        if "/" not in field_type or array is not None:
+            raise _misfit(field_type, "an object", subject, message_class, path)
+        _check_object(_nested_class(field_type), shape, subject, path)
+    elif shape is not None and not _fits(field_type, shape):
+        raise _misfit(field_type, shape, subject, message_class, path)
+
+
+def _misfit(field_type: str, shape: str, subject: str, message_class: Any, path: Path) -> SetupError:
+    return SetupError(
+        "{}: the field '{}' of {} is {}, in the model it is {}".format(
+            subject, ".".join(path), message_name(message_class), field_type, shape
+        )
+    )
+
+
+def _nested_class(field_type: str) -> Any:
+    package, _, name = field_type.partition("/")
+    return load_message(package, name)
+
+
+def _fits(field_type: str, shape: str) -> bool:
+    if shape == "boolean":
+        return field_type == "boolean"
+    if shape == "string":
+        return _STRING.match(field_type) is not None
+    if shape == "double":
+        return field_type in ("float", "double")
+    return _INTEGER.match(field_type) is not None
+
+
+def converter(field_type: str, shape: str) -> Callable[[Any], Any]:
+    """The function that turns a value of the model into one of a field.
+
+    It raises DataDoesNotFit for a value that the field cannot hold, NaN and infinities included.
+    """
+    if shape == "boolean":
+        return _to_boolean
+    if shape == "string":
+        match = _STRING.match(field_type)
+        return _to_string(int(match.group("bound"))) if match and match.group("bound") else _to_any_string
+    if shape == "double":
+        return _to_float(MAXIMUM_FLOAT32 if field_type == "float" else None)
+    match = _INTEGER.match(field_type)
+    if match is None:
+        raise SetupError("no integer fits into a field of type {}".format(field_type))
+    bits = int(match.group(2))
+    return _to_integer(0, 2**bits - 1) if match.group(1) else _to_integer(-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+
+
+def _to_boolean(value: Any) -> bool:
+    if value is True or value is False:
+        return bool(value)
+    raise DataDoesNotFit("{!r} is not a boolean".format(value))
+
+
+def _to_any_string(value: Any) -> str:
+    if isinstance(value, str):
+        return value
+    raise DataDoesNotFit("{!r} is not a string".format(value))
+
+
+def _to_string(bound: int) -> Callable[[Any], str]:
+    def convert(value: Any) -> str:
+        text = _to_any_string(value)
+        if len(text.encode("utf-8", "surrogatepass")) > bound:
+            raise DataDoesNotFit("a string of more than {} bytes".format(bound))
+        return text
+
+    return convert
+
+
+def _to_float(limit: Optional[float]) -> Callable[[Any], float]:
+    greatest = limit if limit is not None else _INFINITY
+
+    def convert(value: Any) -> float:
+        if not isinstance(value, (int, float)) or value is True or value is False:
+            raise DataDoesNotFit("{!r} is not a number".format(value))
+        number = float(value)
+        # False for NaN, too.
+        if -greatest <= number <= greatest and -_INFINITY < number < _INFINITY:
+            return number
+        raise DataDoesNotFit("{!r} does not fit into the field".format(number))
+
+    return convert
+
+
+def _to_integer(low: int, high: int) -> Callable[[Any], int]:
+    def convert(value: Any) -> int:
+        if not isinstance(value, int) or value is True or value is False:
+            raise DataDoesNotFit("{!r} is not an integer".format(value))
+        if low <= value <= high:
+            return value
+        raise DataDoesNotFit("{} is outside {}..{}".format(value, low, high))
+
+    return convert
+
+
+class _Slot(NamedTuple):
+    """A field that requests set: where it is, how a value gets there, and its default."""
+
+    path: Path
+    owner: Any
+    field: str
+    convert: Callable[[Any], Any]
+    default: Any
+
+
+class Sender:
+    """The one message object of a communication, filled anew for each request.
+
+    Args:
+        message_class: The message's class.
+        shape: What the model says about the data.
+        paths: Every property that some request sets; the empty path for a basic type.
+        subject: What it is about, for error messages.
+
+    Attributes:
+        message: The message.
+        is_default: Whether it is the all-default one.
+
+    Raises:
+        SetupError: The message does not fit the model.
+    """
+
+    def __init__(self, message_class: Any, shape: Any, paths: Tuple[Path, ...], subject: str) -> None:
+        check_shape(message_class, shape, subject)
+        self.message = message_class()
+        self.is_default = True
+        self._slots: List[_Slot] = [_slot(self.message, shape, path) for path in paths]
+
+    def fill(self, data: Any) -> None:
+        """Put data into the message; what it does not mention gets its default.
+
+        Raises:
+            DataDoesNotFit: A value does not fit its field.
+        """
+        is_default = True
+        for path, owner, field, convert, default in self._slots:
+            value = _part(data, path)
+            if value is None:
+                setattr(owner, field, default)
+            else:
+                try:
+                    converted = convert(value)
+                except DataDoesNotFit as error:
+                    raise DataDoesNotFit("{}: {}".format(".".join(path) or field, error)) from None
+                setattr(owner, field, converted)
+                is_default = is_default and converted == default
+        self.is_default = is_default
+
+
+def _part(data: Any, path: Path) -> Any:
+    """The part of nested data at a path; None where it is not given."""
+    for name in path:
+        if data is None:
+            return None
+        data = data.get(name)
+    return data
+
+
+def _slot(message: Any, shape: Any, path: Path) -> _Slot:
+    owner = message
+    names = path or (basic_field(type(message)),)
+    for name in names[:-1]:
+        owner = getattr(owner, name)
+    inner = shape
+    for name in path:
+        inner = inner[name]
+    field_type = owner.get_fields_and_field_types()[names[-1]]
+    return _Slot(path, owner, names[-1], converter(field_type, inner), getattr(owner, names[-1]))
+
+
+def received_field(message_class: Any, shape: Any, subject: str) -> Optional[str]:
+    """The field of a received message that holds the model's datum; None if the whole message does.
+
+    Raises:
+        SetupError: The message does not fit the model.
+    """
+    check_shape(message_class, shape, subject)
+    return None if shape is None or isinstance(shape, dict) else basic_field(message_class)

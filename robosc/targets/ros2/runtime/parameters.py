@@ -1,0 +1,173 @@
+"""The parameters of a generated node: names, defaults, descriptions, and one clear error for a wrong value.
+
+A copy of this module stands in generated packages, which run on Python 3.8 and later.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple  # noqa: UP035  # Python 3.8
+
+from robosc.execution.protocol import Description
+from robosc.execution.settings import Settings, SettingsError, settings_for
+
+_PREFIX = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+\Z")
+
+MAXIMUM_PERIOD_S = 3600.0
+
+# Settings that have another name as parameters.
+_SETTING_NAMES = {"period": "period_s", "max_age": "max_age_s"}
+
+
+class ParameterError(Exception):
+    """A parameter has a wrong value; says which and what it may be."""
+
+
+class Parameter(NamedTuple):
+    """A parameter as users see it."""
+
+    name: str
+    default: Any
+    description: str
+
+
+class Parameters(NamedTuple):
+    """Valid values.
+
+    Attributes:
+        settings: Those of the executor.
+        topic_prefix: What is put before every topic name.
+        log_folder: Folder of the event log; empty for none.
+        publish_state: Whether the state is published on `/state`.
+    """
+
+    settings: Settings
+    topic_prefix: str
+    log_folder: str
+    publish_state: bool
+
+
+def declarations(release_identifiers: Sequence[str]) -> Tuple[Parameter, ...]:
+    """Every parameter, given the release identifiers that the model suggests."""
+    return (
+        Parameter("period", 0.1, "Seconds between decisions: at most one request is issued each time."),
+        Parameter("policy", "fair", "Which enabled request is issued: fair, priority (the list below, then fair), random."),
+        Parameter("priority", [""], "Messages in order of urgency, for the policy priority."),
+        Parameter("seed", 0, "Seed of the policy random."),
+        Parameter("every", "period", "When to decide: each period, or after each event as well (event)."),
+        Parameter(
+            "release_identifiers",
+            list(release_identifiers) or [""],
+            "Topics that keep acting after a message (velocities): the all-default message is sent there as soon as the "
+            'last one is no longer allowed, and at every stop; [""] for none.',
+        ),
+        Parameter(
+            "max_age",
+            [""],
+            "Received topics that count as stale after so many seconds without a message, each as topic=seconds; "
+            "a stale topic stops the robot until it is back.",
+        ),
+        Parameter(
+            "on_unknown",
+            "default",
+            "What happens when received data leaves an enum unknown: default (it takes its default value), keep (as if "
+            "nothing had come), fault (stop).",
+        ),
+        Parameter("topic_prefix", "", 'Put before every topic name, such as "/robot1".'),
+        Parameter("log_folder", "", "Folder for the event log (JSON Lines); empty for none."),
+        Parameter("publish_state", False, "Whether state and transitions are published on /state each period."),
+    )
+
+
+def validate(given: Mapping[str, Any], description: Description) -> Parameters:
+    """Valid parameters.
+
+    Args:
+        given: Value of every declared parameter.
+        description: The system that they are for.
+
+    Raises:
+        ParameterError: A value is wrong.
+    """
+    settings = Settings(
+        period_s=given["period"],
+        policy=given["policy"],
+        priority=_texts(given, "priority"),
+        seed=given["seed"],
+        every=given["every"],
+        release_identifiers=_texts(given, "release_identifiers"),
+        max_age_s=_ages(given),
+        on_unknown=given["on_unknown"],
+    )
+    try:
+        checked = settings_for(settings, description)
+    except SettingsError as error:
+        raise ParameterError(_in_words_of_parameters(str(error))) from error
+    if checked.period_s > MAXIMUM_PERIOD_S:
+        raise _wrong("period", checked.period_s, "at most {:g} seconds".format(MAXIMUM_PERIOD_S))
+    return Parameters(checked, _prefix(given), _text(given, "log_folder"), _boolean(given, "publish_state"))
+
+
+def _in_words_of_parameters(text: str) -> str:
+    for parameter, setting in _SETTING_NAMES.items():
+        text = text.replace("setting '" + setting, "setting '" + parameter, 1)
+    return text.replace("setting '", "parameter '", 1)
+
+
+def _wrong(name: str, value: Any, expected: str) -> ParameterError:
+    return ParameterError("parameter '{}' is {!r}; it must be {}".format(name, value, expected))
+
+
+def _boolean(given: Mapping[str, Any], name: str) -> bool:
+    value = given[name]
+    if not isinstance(value, bool):
+        raise _wrong(name, value, "true or false")
+    return value
+
+
+def _text(given: Mapping[str, Any], name: str) -> str:
+    value = given[name]
+    if not isinstance(value, str):
+        raise _wrong(name, value, "a string")
+    return value
+
+
+def _texts(given: Mapping[str, Any], name: str) -> Tuple[str, ...]:
+    """A list of strings without the empty ones: ROS parameter files know no empty list."""
+    value = given[name]
+    if not isinstance(value, (list, tuple)) or not all(isinstance(item, str) for item in value):
+        raise _wrong(name, value, "a list of strings")
+    texts: List[str] = [item for item in value if item]
+    return tuple(texts)
+
+
+def _ages(given: Mapping[str, Any]) -> Dict[str, float]:
+    ages = {}
+    for entry in _texts(given, "max_age"):
+        identifier, _, text = entry.rpartition("=")
+        age = _number(text)
+        if not identifier or age is None:
+            raise _wrong("max_age", entry, "topic=seconds, such as /scan=0.5")
+        ages[identifier] = age
+    return ages
+
+
+def _number(text: str) -> Optional[float]:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def _prefix(given: Mapping[str, Any]) -> str:
+    prefix = _text(given, "topic_prefix").rstrip("/")
+    if prefix and not _PREFIX.match(prefix):
+        raise _wrong("topic_prefix", prefix, 'empty or the beginning of a topic name, such as "/robot1"')
+    return prefix
+
+
+def prefixed(prefix: str, identifier: str) -> str:
+    """A topic's name on the wire; private names (`~/x`) already belong to the node and get no prefix."""
+    if not prefix or identifier.startswith("~"):
+        return identifier
+    return prefix + "/" + identifier.lstrip("/")

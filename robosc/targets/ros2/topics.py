@@ -1,0 +1,207 @@
+"""What a model means on ROS 2 topics, and what of it this target cannot do."""
+
+import re
+from dataclasses import dataclass
+
+from robosc.errors import UnsupportedModelError
+from robosc.expressions import (
+    ArrayType,
+    BooleanType,
+    DoubleType,
+    EnumType,
+    IntegerType,
+    NoneType,
+    ObjectType,
+    StringType,
+    Type,
+    type_text,
+)
+from robosc.model.structure import (
+    Communication,
+    CommunicationKind,
+    Deployment,
+    Interface,
+    Model,
+    ObjectValue,
+    ProvidedValue,
+)
+from robosc.supervisor.structure import Supervisor
+
+Shape = None | str | dict[str, "Shape"] | list["Shape"]
+"""See `robosc.targets.ros2.runtime.messages`."""
+
+_BASIC_INTERFACES: dict[type[Type], Interface] = {
+    NoneType: Interface("Empty", "std_msgs"),
+    BooleanType: Interface("Bool", "std_msgs"),
+    StringType: Interface("String", "std_msgs"),
+    IntegerType: Interface("Int16", "std_msgs"),
+    DoubleType: Interface("Float32", "std_msgs"),
+}
+"""What crosses the middleware without `links` (language A.5)."""
+
+_BASIC_SHAPES: dict[type[Type], str] = {
+    BooleanType: "boolean",
+    StringType: "string",
+    IntegerType: "integer",
+    DoubleType: "double",
+}
+
+_TOPIC = re.compile(r"(~/|/)?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*\Z")
+_MAXIMUM_TOPIC = 200  # rmw takes 247 characters; the rest is left for a namespace.
+_PACKAGE = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*\Z")
+_MESSAGE = re.compile(r"[A-Z][A-Za-z0-9]*\Z")
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """One identifier.
+
+    Attributes:
+        identifier: Topic name, as in the model.
+        interface: Its message type.
+        published: Communications whose requests are published on it, in source order.
+        received: Communications that it stands for, in source order.
+    """
+
+    identifier: str
+    interface: Interface
+    published: tuple[Communication, ...]
+    received: tuple[Communication, ...]
+
+    @property
+    def is_sensor(self) -> bool:
+        """Whether it is received best effort, as sensor drivers send."""
+        return self.interface.package == "sensor_msgs"
+
+
+def topics(supervisor: Supervisor) -> tuple[Topic, ...]:
+    """Every topic of a controller, in source order of first use.
+
+    Raises:
+        UnsupportedModelError: The model has something that this target cannot do; the message names it.
+    """
+    model = supervisor.model
+    _require_supported(supervisor)
+    by_identifier: dict[str, list[Communication]] = {}
+    for communication in model.communications:
+        _require_valid(communication)
+        by_identifier.setdefault(communication.identifier, []).append(communication)
+    return tuple(_topic(model, identifier, items) for identifier, items in by_identifier.items())
+
+
+def _require_supported(supervisor: Supervisor) -> None:
+    if supervisor.deployment is not Deployment.CONTROLLER:
+        raise UnsupportedModelError(
+            f"target ros2: the supervisor of {supervisor.model.name} was made for the deployment "
+            f"'{supervisor.deployment}', and this version generates controllers only"
+        )
+    for communication in supervisor.model.communications:
+        if communication.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION):
+            raise UnsupportedModelError(
+                f"target ros2: '{communication.name}' of {communication.component} is {_article(communication.kind)} "
+                f"{communication.kind}, and this version generates messages only"
+            )
+
+
+def _article(kind: str) -> str:
+    return "an" if kind[0] in "aeiou" else "a"
+
+
+def _require_valid(communication: Communication) -> None:
+    identifier, interface = communication.identifier, communication.interface
+    if not _TOPIC.match(identifier) or len(identifier) > _MAXIMUM_TOPIC:
+        raise UnsupportedModelError(
+            f"target ros2: the identifier {_quoted(identifier)} of '{communication.name}' is no ROS 2 topic name: "
+            "letters, digits and underscores between slashes, no part starting with a digit"
+        )
+    if interface and not (_PACKAGE.match(interface.package) and _MESSAGE.match(interface.type)):
+        raise UnsupportedModelError(
+            f"target ros2: {interface.type} from {interface.package}, linked by '{communication.name}', is no name of "
+            "a ROS 2 message type such as Twist from geometry_msgs"
+        )
+
+
+def _quoted(text: str) -> str:
+    return ascii(text if len(text) <= _MAXIMUM_TOPIC else text[:_MAXIMUM_TOPIC] + "...")
+
+
+def message_data_type(communication: Communication) -> Type:
+    """The type of what a message carries."""
+    is_incoming = communication.kind is CommunicationKind.INCOMING_MESSAGE
+    type_ = communication.request if is_incoming else communication.response
+    return NoneType() if type_ is None else type_
+
+
+def message_interface(model: Model, communication: Communication) -> Interface:
+    """The message type of a communication: the linked one, else the one for its basic type (language A.5)."""
+    if communication.interface is not None:
+        return communication.interface
+    type_ = message_data_type(communication)
+    source = model.enum(type_.name).source if isinstance(type_, EnumType) else type_
+    if type(source) not in _BASIC_INTERFACES:
+        raise UnsupportedModelError(
+            f"target ros2: '{communication.name}' of type {type_text(type_)} needs a link to a message type"
+        )
+    return _BASIC_INTERFACES[type(source)]
+
+
+def _topic(model: Model, identifier: str, items: list[Communication]) -> Topic:
+    interface = message_interface(model, items[0])
+    for item in items[1:]:
+        other = message_interface(model, item)
+        if other != interface:
+            raise UnsupportedModelError(
+                f"target ros2: the topic {identifier} has two types: {interface.package}/{interface.type} for "
+                f"'{items[0].name}' and {other.package}/{other.type} for '{item.name}'"
+            )
+    return Topic(
+        identifier,
+        interface,
+        tuple(item for item in items if item.kind is CommunicationKind.INCOMING_MESSAGE),
+        tuple(item for item in items if item.kind is CommunicationKind.OUTGOING_MESSAGE),
+    )
+
+
+def shape_of(model: Model, communication: Communication) -> Shape:
+    """What the model says about a message's data: every property that its types declare.
+
+    Raises:
+        UnsupportedModelError: It sends an enum, or an object type contains itself.
+    """
+    sends = communication.kind is CommunicationKind.INCOMING_MESSAGE
+    return _shape(model, communication, message_data_type(communication), (), sends)
+
+
+def _shape(model: Model, communication: Communication, type_: Type, inside: tuple[str, ...], sends: bool) -> Shape:
+    match type_:
+        case NoneType():
+            return None
+        case EnumType(name=name) if sends:
+            raise UnsupportedModelError(
+                f"target ros2: '{communication.name}' sends the enum {name}, which is made from received data and "
+                "cannot be turned back into it"
+            )
+        case EnumType(name=name):
+            return _shape(model, communication, model.enum(name).source, inside, sends)
+        case ArrayType(element=element):
+            return [_shape(model, communication, element, inside, sends)]
+        case ObjectType(name=name):
+            if name in inside:
+                raise UnsupportedModelError(f"target ros2: the object type {name} contains itself, as no message can")
+            return {
+                item.name: _shape(model, communication, item.type, (*inside, name), sends)
+                for item in model.object(name).properties
+            }
+        case _:
+            return _BASIC_SHAPES[type(type_)]
+
+
+def sent_paths(model: Model, communication: Communication) -> tuple[tuple[str, ...], ...]:
+    """Every property that some provide statement sets, sorted; the empty path for a basic type."""
+    return tuple(sorted({path for item in model.provides_for(communication.name) for path in _paths(item.value)}))
+
+
+def _paths(value: ProvidedValue) -> list[tuple[str, ...]]:
+    if isinstance(value, ObjectValue):
+        return [(name, *path) for name, inner in value.properties for path in _paths(inner)]
+    return [()]

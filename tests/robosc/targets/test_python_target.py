@@ -1,0 +1,371 @@
+"""The generated Python supervisor does what the interpreter does, step by step, whatever the model and the data."""
+
+import ast
+import itertools
+import re
+from collections import Counter
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.generated import example_supervisor, imported, load_system, python_text, same
+from support.models import EXAMPLE_NAMES, model_of
+from support.random_supervisors import CERTIFICATE, random_data, random_supervisor
+
+from robosc.errors import UnsupportedModelError
+from robosc.execution.clock import ManualClock
+from robosc.execution.event_log import MemoryLog
+from robosc.execution.interpreter import InterpretedSystem
+from robosc.expressions import Binary, BooleanType, Constant, DoubleType, Received
+from robosc.model.structure import (
+    Behaviour,
+    Communication,
+    CommunicationKind,
+    Component,
+    Deployment,
+    Model,
+    State,
+    Transition,
+    Update,
+    Variable,
+)
+from robosc.supervisor.structure import Supervisor
+from robosc.targets import GenerateOptions, generate
+from robosc.targets.python.layout import events, is_controllable
+
+STEPS = 25
+FULL_SCAN = {"ranges": [1.0] * 360}
+
+
+class Twins:
+    """A generated and an interpreted system that must never differ."""
+
+    def __init__(self, supervisor: Supervisor) -> None:
+        self.model = supervisor.model
+        self.generated = load_system(supervisor)
+        self.interpreted = InterpretedSystem(supervisor)
+        self.seen: Counter[str] = Counter()
+        assert tuple(self.generated.description) == tuple(self.interpreted.description)
+
+    def compare(self) -> None:
+        """Everything that can be asked without changing anything."""
+        assert same(self.generated.state(), self.interpreted.state())
+        for event in filter(is_controllable, events(self.model)):
+            allowed = self.interpreted.enabled(event)
+            assert self.generated.enabled(event) is allowed, event
+            self.seen["enabled" if allowed else "disabled"] += 1
+        for item in self.model.communications:
+            if item.kind is not CommunicationKind.OUTGOING_MESSAGE:
+                for question in ("provide", "requirements", "conjuncts"):
+                    answers = [getattr(system, question)(item.name) for system in (self.generated, self.interpreted)]
+                    assert same(*answers), (question, item.name, answers)
+            if item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION):
+                assert self.generated.location(item.name) == self.interpreted.location(item.name)
+
+    def step(self, event: str, data: Any = None) -> tuple[str, ...] | None:
+        """Take an event, with data if it is one of the environment."""
+        readings: list[Any] = [None, None]
+        if not is_controllable(event):
+            readings = [system.read(event, data) for system in (self.generated, self.interpreted)]
+            left, right = readings
+            assert same(left.data, right.data), (event, data)
+            assert left.unknown == right.unknown, (event, data)
+            assert left.enum_unknown is right.enum_unknown, (event, data)
+            self.seen["unknown"] += bool(left.unknown)
+            self.seen["unknown enum"] += left.enum_unknown
+        before = self.generated.signature()
+        results = [
+            system.step(event, reading)
+            for system, reading in zip((self.generated, self.interpreted), readings, strict=True)
+        ]
+        assert results[0] == results[1], (event, data)
+        if results[0] is None:
+            assert self.generated.signature() == before
+        self.seen["skipped"] += bool(results[0])
+        self.seen["refused" if results[0] is None else "taken"] += 1
+        return results[0]  # type: ignore[no-any-return]
+
+    def run(self, dice: Random, steps: int) -> None:
+        """A random walk that takes what is enabled more often than not."""
+        names = events(self.model)
+        telling = [item.events[0] for item in self.model.communications if item.request is None] * 3
+        for _ in range(steps if names else 0):
+            self.compare()
+            event = dice.choice([*names, *telling])
+            if is_controllable(event) and dice.random() < 0.8:
+                enabled = [name for name in names if is_controllable(name) and self.interpreted.enabled(name)]
+                event = dice.choice(enabled) if enabled else event
+            self.step(event, random_data(dice))
+        self.compare()
+        self.generated.restart()
+        self.interpreted.restart()
+        self.compare()
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.integers(0, 2**32))
+def test_a_random_supervisor_behaves_as_interpreted(seed: int) -> None:
+    twins = Twins(random_supervisor(seed))
+    twins.run(Random(seed), STEPS)
+
+
+def test_the_random_supervisors_show_everything() -> None:
+    """The fixed seeds below are checked as above; what they meet shows that the check is worth something."""
+    total: Counter[str] = Counter()
+    for seed in range(100):
+        twins = Twins(random_supervisor(seed))
+        twins.run(Random(seed), STEPS)
+        total.update(twins.seen)
+    print(dict(total))
+    assert all(
+        total[what] > least
+        for what, least in {"enabled": 500, "disabled": 500, "unknown": 10, "unknown enum": 10, "skipped": 50}.items()
+    )
+
+
+@pytest.mark.parametrize("deployment", list(Deployment))
+@pytest.mark.parametrize("name", EXAMPLE_NAMES)
+def test_an_example_behaves_as_interpreted(name: str, deployment: Deployment) -> None:
+    twins = Twins(example_supervisor(name, deployment))
+    twins.run(Random(1), 200)
+    for data in (FULL_SCAN, {"ranges": [0.1] * 360}, {"ranges": []}, None, {"success": True}, 0.7, 2.0):
+        for event in events(twins.model):
+            twins.step(event, data)
+            twins.compare()
+
+
+def test_received_objects_and_mappings_are_read_alike() -> None:
+    class Scan:
+        ranges = FULL_SCAN["ranges"]
+
+    system = load_system(example_supervisor("line_follower/line_follower"))
+    for data in (Scan(), FULL_SCAN):
+        reading = system.read("scan.response", data)
+        assert reading == (("clear",), {"value": "clear"}, (), False)
+    (text,) = system.read("scan.response", {"ranges": [1.0] * 5}).unknown
+    assert text == "value is obstructed by default: an earlier rule is unknown"
+
+
+def test_a_foreign_object_may_do_anything() -> None:
+    class Bomb:
+        def __getattr__(self, name: str) -> Any:
+            raise RuntimeError(name)
+
+        def __len__(self) -> int:
+            raise RuntimeError("len")
+
+        def __getitem__(self, index: int) -> Any:
+            raise RuntimeError("item")
+
+    twins = Twins(example_supervisor("line_follower/line_follower"))
+    twins.step("scan.response", Bomb())
+    twins.step("scan.response", {"ranges": Bomb()})
+    twins.step("correction.response", Bomb())
+    twins.compare()
+
+
+def test_it_reads_like_the_model() -> None:
+    text = python_text(example_supervisor("line_follower/line_follower"))
+    for line in (
+        "# value.ranges[0] > 0.4 and value.ranges[20] > 0.4 and value.ranges[340] > 0.4 -> clear",
+        "if value_ranges_0 > 0.4 and value_ranges_20 > 0.4 and value_ranges_340 > 0.4:",
+        "# requirement move needs LineDetector.line_found and LidarSensor.safe and EmergencyStop.in_service",
+        "self.LidarSensor__ahead = value",
+        "return True, {'linear': {'x': 0.15}, 'angular': {'z': self.LineDetector__current_correction}}",
+    ):
+        assert any(line == found.strip() for found in text.splitlines()), line
+
+
+def test_what_the_supervisor_adds_is_explained() -> None:
+    text = python_text(example_supervisor("navigation/navigation"))
+    assert re.search(r"# added by the supervisor: .*Navigator\.", text)
+
+
+@pytest.mark.parametrize("name", EXAMPLE_NAMES)
+def test_all_files_are_python_3_8_and_depend_on_nothing(name: str) -> None:
+    files = generate(example_supervisor(name), "python")
+    for path, text in files.items():
+        tree = ast.parse(text, feature_version=(3, 8))
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Import):
+                assert not any(alias.name.startswith("robosc") for alias in node.names), path
+            if isinstance(node, ast.ImportFrom):
+                assert node.level or not (node.module or "").startswith("robosc"), path
+
+
+def test_the_same_supervisor_gives_the_same_bytes() -> None:
+    first = example_supervisor("maze_solver/maze_solver")
+    second = example_supervisor.__wrapped__("maze_solver/maze_solver", Deployment.CONTROLLER)
+    assert generate(first, "python") == generate(second, "python")
+
+
+def test_every_file_says_where_it_comes_from() -> None:
+    supervisor = example_supervisor("line_follower/line_follower")
+    for path, text in generate(supervisor, "python").items():
+        head = text.splitlines()[:2]
+        assert head[0].startswith("# Generated by RoboSC ") and " LineFollower;" in head[0], path
+        assert head[1] == f"# Model files SHA-256: {supervisor.certificate.bundle_sha256}", path
+
+
+def test_the_package_drives_an_executor_of_its_own(tmp_path: Path) -> None:
+    """Nothing of RoboSC is used but the files themselves."""
+    files = generate(example_supervisor("line_follower/line_follower"), "python", GenerateOptions(package="follower"))
+    sent: list[tuple[str, Any]] = []
+
+    class Middleware:
+        def prepare(self, communication: str, data: Any) -> Any:
+            return data
+
+        def is_default(self, communication: str, message: Any) -> bool:
+            return not message["linear"]["x"]
+
+        def publish(self, communication: str, message: Any) -> None:
+            sent.append((communication, message))
+
+        def publish_default(self, identifier: str) -> None:
+            sent.append((identifier, None))
+
+    with imported(files, tmp_path, "follower.supervisor") as module, imported(
+        files, tmp_path, "follower.runtime.executor"
+    ) as runtime:
+        log, clock = MemoryLog(), ManualClock()
+        executor = runtime.Executor(module.Supervisor(), Middleware(), None, clock, log)
+        executor.start()
+        executor.tick()
+        executor.receive("/line/correction", 0.5)
+        executor.receive("/scan", FULL_SCAN)
+        executor.tick()
+        executor.stop("test")
+    assert [what for what, _ in sent] == ["halt", "move", "/cmd_vel"]
+    assert sent[1][1] == {"linear": {"x": 0.15}, "angular": {"z": 0.5}}
+    happened = [entry["event"] for entry in log.entries if entry["kind"] == "event"]
+    assert happened == ["halt.request", "correction.response", "scan.response", "LidarSensor.tau_1", "move.request"]
+
+
+def test_a_package_may_be_called_as_one_likes() -> None:
+    supervisor = example_supervisor("line_follower/line_follower")
+    assert all(path.startswith("my_robot/") for path in generate(supervisor, "python", GenerateOptions("my_robot")))
+    for name in ("My", "1a", "a b", "../x", "a__b", "", "a" * 300):
+        with pytest.raises(UnsupportedModelError, match="is no name for a package"):
+            generate(supervisor, "python", GenerateOptions(name))
+
+
+HOSTILE = """
+robot class {
+    datatype enum None from double to { value > 0.5 -> self  default -> lambda }
+    datatype object ^import { from_: double }
+    component True {
+        outgoing message def with identifier: "it's \\"quoted\\" \\\\ #", type: None
+        incoming message pass with type: string
+        service read with request: none, response: ^import links x
+        behaviour {
+            variable ^state: None = lambda
+            variable enabled: boolean
+            variable values: string = "'''\\"\\"\\"\\\\"
+            variable skipped: integer(0..3)
+            on response from def do ^state := value
+            on response from read do enabled := value.from_ > 1.0, skipped := skipped + 1
+            initial marked state return {
+                on request to pass
+                on request to read
+                transition if True.^state = self goto _
+            }
+            marked state _ { transition if ^state = lambda goto return }
+        }
+    }
+    interface x use Trigger from std_srvs
+    requirement pass needs True.skipped < 3
+    provide pass with "a\\nb'c\\"d\\\\ {{ x }} {% y %} é"
+}
+"""
+
+
+def test_names_that_are_python_words_work() -> None:
+    supervisor = Supervisor(model_of(HOSTILE), Deployment.CONTROLLER, (), CERTIFICATE)
+    twins = Twins(supervisor)
+    twins.run(Random(3), 200)
+    assert twins.seen["enabled"] and twins.seen["taken"]
+    for path, text in generate(supervisor, "python").items():
+        ast.parse(text, filename=path, feature_version=(3, 8))
+
+
+def _boolean_model(expression: Any) -> Supervisor:
+    """A model with one update of a code-only boolean by an expression over a received double."""
+    transition = Transition(None, "m.response", None, (Update("b", expression),), None)
+    behaviour = Behaviour((Variable("b", BooleanType(), False, False),), (State("s", True, True),), (transition,))
+    message = Communication("m", "C", CommunicationKind.OUTGOING_MESSAGE, "m", response=DoubleType())
+    model = Model("Deep", (Component("C", behaviour),), (message,), (), (), (), ())
+    return Supervisor(model, Deployment.CONTROLLER, (), CERTIFICATE)
+
+
+def test_a_long_chain_of_operators_is_no_problem() -> None:
+    expression: Any = Binary(">", Received(), Constant(0.0))
+    for _ in range(150):
+        expression = Binary("and", expression, Binary(">", Received(), Constant(0.0)))
+    twins = Twins(_boolean_model(expression))
+    for data in (1.0, -1.0, float("nan")):
+        twins.step("m.response", data)
+        twins.compare()
+
+
+def test_an_expression_too_deep_for_python_is_one_clear_error() -> None:
+    expression: Any = Binary(">", Received(), Constant(0.0))
+    for _ in range(5000):
+        expression = Binary("and", Binary("=", Received(), Constant(1.0)), expression)
+    with pytest.raises(UnsupportedModelError, match="the model Deep has an expression that is nested too deeply"):
+        generate(_boolean_model(expression), "python")
+
+
+def test_all_updates_of_a_step_read_the_state_before_it() -> None:
+    model = model_of("""
+        robot Swap {
+            component A {
+                outgoing message go with type: none
+                behaviour {
+                    variable x: integer(0..9) = 1
+                    variable y: integer(0..9) = 2
+                    on response from go do x := y, y := x goto s
+                    initial marked state s { on response from go do x := B.z, y := x goto t }
+                    marked state t { }
+                }
+            }
+            component B {
+                behaviour {
+                    variable z: integer(0..9) = 3
+                    variable in_s: boolean
+                    on response from go do z := A.x, in_s := A.s
+                    initial marked state only { }
+                }
+            }
+        }
+    """)
+    twins = Twins(Supervisor(model, Deployment.CONTROLLER, (), CERTIFICATE))
+    found = []
+    for _ in range(4):
+        twins.compare()
+        state = twins.generated.state()
+        found.append((*state["A"]["variables"].values(), *state["B"]["variables"].values(), state["A"]["state"]))
+        twins.step("go.response")
+    assert found == [
+        (1, 2, 3, False, "s"),
+        (3, 1, 1, True, "t"),
+        (1, 3, 3, False, "s"),
+        (3, 1, 1, True, "t"),
+    ]
+
+
+def test_names_that_would_meet_stay_apart() -> None:
+    text = """
+        robot R {
+            component A { behaviour { variable b__c: boolean  initial marked state s { } } }
+            component A__b { behaviour { variable c: boolean  initial marked state s { } } }
+            component ^state { behaviour { initial marked state s { } } }
+        }
+    """
+    twins = Twins(Supervisor(model_of(text), Deployment.CONTROLLER, (), CERTIFICATE))
+    twins.compare()
+    assert len(set(vars(twins.generated))) == len(list(itertools.chain(vars(twins.generated))))
+    assert {"A__b__c", "A__b__c_2"} <= vars(twins.generated).keys()

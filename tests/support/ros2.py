@@ -1,0 +1,237 @@
+"""Real ROS 2 in tests: nodes as processes, a peer that talks to them, isolated domains, no fixed sleeps."""
+
+import contextlib
+import fcntl
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+DISCOVERY_LIMIT_S = 15.0
+EXIT_LIMIT_S = 15.0
+
+LAST_DOMAIN = 101
+"""Above it, ROS 2 would use ports that the system hands out."""
+
+_PROFILE = """<?xml version="1.0" encoding="UTF-8"?>
+<profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
+  <participant profile_name="fast_discovery" is_default_profile="true"><rtps><builtin><discovery_config>
+    <initialAnnouncements><count>30</count><period><sec>0</sec><nanosec>50000000</nanosec></period></initialAnnouncements>
+    <leaseAnnouncement><sec>0</sec><nanosec>250000000</nanosec></leaseAnnouncement>
+  </discovery_config></builtin></rtps></participant>
+</profiles>
+"""
+
+
+@contextlib.contextmanager
+def own_domain() -> Iterator[int]:
+    """A domain id that no other test of this user has, whichever process it runs in."""
+    folder = Path(tempfile.gettempdir()) / f"robosc-ros-domains-{os.getuid()}"
+    folder.mkdir(exist_ok=True)
+    # Processes start looking at different places, so that they rarely meet.
+    for offset in range(LAST_DOMAIN):
+        domain = 1 + (os.getpid() + offset) % LAST_DOMAIN
+        with (folder / str(domain)).open("w") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                continue
+            yield domain
+            return
+    raise RuntimeError("every ROS domain is in use")
+
+
+def environment(domain: int, folder: Path) -> dict[str, str]:
+    """Variables for a process that talks on a domain: this machine only, quick discovery, strict messages."""
+    folder.mkdir(parents=True, exist_ok=True)
+    profile = folder / "fastdds.xml"
+    profile.write_text(_PROFILE)
+    return {
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "ROS_DOMAIN_ID": str(domain),
+        "ROS_LOG_DIR": str(folder / "log"),
+        "ROS_PYTHON_CHECK_FIELDS": "1",
+        "FASTRTPS_DEFAULT_PROFILES_FILE": str(profile),
+    }
+
+
+def wait_until(condition: Callable[[], bool], limit_s: float, what: str, step_s: float = 0.01) -> None:
+    """Poll until a condition is true.
+
+    Raises:
+        AssertionError: It was not within the limit; says what was waited for.
+    """
+    deadline = time.monotonic() + limit_s
+    while not condition():
+        assert time.monotonic() < deadline, f"waited {limit_s} s in vain for {what}"
+        time.sleep(step_s)
+
+
+class RosProcess:
+    """A program on ROS 2, as a process of its own; killed at the latest when the `with` block ends.
+
+    Args:
+        command: What to run, after the interpreter.
+        variables: Environment on top of this process's.
+        folder: Folder for its output.
+        python_path: Folders to import from.
+    """
+
+    def __init__(
+        self, command: Sequence[str], variables: Mapping[str, str], folder: Path, python_path: Sequence[Path] = ()
+    ) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self._error_file = folder / "stderr.txt"
+        self._output_file = folder / "stdout.txt"
+        path = os.pathsep.join([*map(str, python_path), os.environ.get("PYTHONPATH", "")]).rstrip(os.pathsep)
+        with self._error_file.open("wb") as error, self._output_file.open("wb") as output:
+            self._process = subprocess.Popen(
+                [sys.executable, *command],
+                env={**os.environ, **variables, "PYTHONPATH": path},
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=error,
+                cwd=folder,
+            )
+
+    @property
+    def stderr(self) -> str:
+        """What it has written to standard error so far."""
+        return self._error_file.read_text(errors="replace")
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it has not ended."""
+        return self._process.poll() is None
+
+    def signal(self, number: signal.Signals) -> None:
+        """Send a signal."""
+        self._process.send_signal(number)
+
+    def wait(self, limit_s: float = EXIT_LIMIT_S) -> int:
+        """Its exit status, waiting for its end."""
+        try:
+            return self._process.wait(limit_s)
+        except subprocess.TimeoutExpired:
+            raise AssertionError(f"the process did not end within {limit_s} s\n{self.stderr}") from None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._process.kill()  # rclpy takes SIGTERM over, so only SIGKILL ends a hung node.
+        self._process.wait()
+
+
+class Peer:
+    """The other side of a node under test: publishes, receives, and spins only while it waits.
+
+    Args:
+        domain: Domain id.
+        variables: As from `environment`; set in this process while the peer exists.
+    """
+
+    def __init__(self, domain: int, variables: Mapping[str, str]) -> None:
+        with warnings.catch_warnings():
+            # The parser of message definitions, which rclpy loads, uses a module that Python deprecates.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            import rclpy
+            import rosidl_generator_py  # noqa: F401
+            from rclpy.executors import SingleThreadedExecutor
+
+        self._before = {name: os.environ.get(name) for name in variables}
+        os.environ.update(variables)
+        self._context = rclpy.context.Context()
+        rclpy.init(context=self._context, domain_id=domain)
+        self.node = rclpy.create_node("test_peer", context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._publishers: dict[str, Any] = {}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        import rclpy
+
+        self._executor.shutdown()
+        self.node.destroy_node()
+        rclpy.shutdown(context=self._context)
+        for name, value in self._before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+    def receive(self, message_class: Any, topic: str) -> list[Any]:
+        """A list that grows with every message received on a topic."""
+        received: list[Any] = []
+        self.node.create_subscription(message_class, topic, received.append, 100)
+        return received
+
+    def publisher(self, message_class: Any, topic: str, qos: Any = 10) -> Any:
+        """The publisher of a topic, made on first use."""
+        if topic not in self._publishers:
+            self._publishers[topic] = self.node.create_publisher(message_class, topic, qos)
+        return self._publishers[topic]
+
+    def publish(self, message: Any, topic: str, qos: Any = 10) -> None:
+        """Send a message."""
+        self.publisher(type(message), topic, qos).publish(message)
+
+    def wait_for_peers(self, topics: Sequence[str]) -> None:
+        """Wait until somebody else publishes on or subscribes to each topic, as seen from here."""
+        own = self.node.get_name()
+
+        def others(topic: str) -> bool:
+            ends = self.node.get_publishers_info_by_topic(topic) + self.node.get_subscriptions_info_by_topic(topic)
+            return any(end.node_name not in (own, "_NODE_NAME_UNKNOWN_") for end in ends)
+
+        self.spin_until(lambda: all(others(topic) for topic in topics), DISCOVERY_LIMIT_S, f"peers on {topics}")
+
+    def spin_until(
+        self,
+        condition: Callable[[], bool],
+        limit_s: float,
+        what: str,
+        process: RosProcess | None = None,
+        repeat: Callable[[], object] = lambda: None,
+        repeat_every_s: float = 0.1,
+    ) -> None:
+        """Handle messages until a condition is true.
+
+        Args:
+            condition: What is waited for.
+            limit_s: After which it is a failure.
+            what: In words, for the failure.
+            process: One whose early end is a failure, too.
+            repeat: Called now and again: the first messages of a new connection may be lost.
+            repeat_every_s: How often.
+
+        Raises:
+            AssertionError: It did not become true in time.
+        """
+        deadline = time.monotonic() + limit_s
+        next_repeat = time.monotonic()
+        while not condition():
+            assert time.monotonic() < deadline, f"waited {limit_s} s in vain for {what}\n{process.stderr if process else ''}"
+            assert process is None or process.is_running, f"the node ended\n{process.stderr if process else ''}"
+            if time.monotonic() >= next_repeat:
+                repeat()
+                next_repeat = time.monotonic() + repeat_every_s
+            self._executor.spin_once(timeout_sec=0.02)
+
+    def spin_for(self, duration_s: float) -> None:
+        """Handle messages for a while: to show that nothing happens."""
+        deadline = time.monotonic() + duration_s
+        while time.monotonic() < deadline:
+            self._executor.spin_once(timeout_sec=0.02)

@@ -1,0 +1,65 @@
+"""`robosc explore`: the graph of everything the controlled system may do."""
+
+import argparse
+import sys
+
+from robosc.cli import synth
+from robosc.cli.arguments import add_deployment_argument, add_engine_argument, add_model_arguments, read_bundle
+from robosc.cli.output import ExitCode, diagnostics_json, print_json
+
+DEFAULT_LIMIT = 100_000
+
+
+def _positive(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise ValueError
+    return value
+
+
+_positive.__name__ = "positive number"
+
+
+def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "explore",
+        help="print the controlled system's states and transitions",
+        description="Print every state that the robot under its supervisor can be in, and every transition.",
+    )
+    add_model_arguments(parser)
+    parser.add_argument("--dot", action="store_true", help="print a graph for Graphviz instead of a table")
+    parser.add_argument(
+        "--limit",
+        type=_positive,
+        default=DEFAULT_LIMIT,
+        metavar="N",
+        help="give up beyond N states (default: %(default)s)",
+    )
+    add_deployment_argument(parser)
+    add_engine_argument(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Synthesize and explore; 0 with a graph, 1 without."""
+    from robosc.automata import to_automata
+    from robosc.exploration import explore, graph_dot, graph_json, graph_text
+    from robosc.supervisor.conditions import state_predicates
+
+    bundle = read_bundle(arguments)
+    made = synth.make(arguments, bundle)
+    if made.supervisor is None:
+        if arguments.json:
+            print_json({"status": str(made.status), "reason": made.reason, **diagnostics_json(made.diagnostics)})
+        else:
+            synth.report_problems(made, bundle)
+        return ExitCode.FAILED
+    supervisor = made.supervisor
+    system = to_automata(supervisor.model, supervisor.deployment)
+    graph = explore(system, state_predicates(system, supervisor.added), supervisor.model, limit=arguments.limit)
+    if arguments.json:
+        print_json(graph_json(graph))
+    else:
+        sys.stdout.write(graph_dot(graph) if arguments.dot else graph_text(graph))
+    return ExitCode.OK

@@ -1,0 +1,105 @@
+"""What the commands print, and the exit codes: shared by `robosc` and `robosc-client`.
+
+Results go to standard output, findings and progress to standard error; with `--json` one JSON document
+goes to standard output and holds the findings too.
+"""
+
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from enum import IntEnum
+from pathlib import Path
+from typing import TextIO
+
+from robosc.errors import Diagnostic, Severity
+from robosc.source import Bundle
+
+
+class ExitCode(IntEnum):
+    """What a command's exit status tells."""
+
+    OK = 0
+    FAILED = 1
+    """The model has errors, or no supervisor exists."""
+    USAGE = 2
+    """Wrong use: unknown options, a file that cannot be read or written."""
+    SERVICE = 3
+    """The server is not there, refused, or did not answer in time."""
+    INTERRUPTED = 130
+
+
+class UsageError(Exception):
+    """Wrong use of a command that the argument parser cannot see, such as a folder that cannot be written."""
+
+
+def print_json(document: Mapping[str, object]) -> None:
+    """One JSON document on standard output, keys in the order given."""
+    sys.stdout.write(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def print_diagnostics(diagnostics: Sequence[Diagnostic], bundle: Bundle | None) -> None:
+    """Findings with source line and caret on standard error, and a closing line that counts them."""
+    for diagnostic in diagnostics:
+        sys.stderr.write(diagnostic.render(bundle) + "\n")
+    if diagnostics:
+        sys.stderr.write(counts_text(diagnostics) + "\n")
+
+
+def counts(diagnostics: Sequence[Diagnostic]) -> dict[str, int]:
+    """How many errors, warnings and notes there are."""
+    return {f"{severity}s": sum(diagnostic.severity is severity for diagnostic in diagnostics) for severity in Severity}
+
+
+def counts_text(diagnostics: Sequence[Diagnostic]) -> str:
+    """For instance `2 errors, 1 warning`."""
+    parts = [f"{count} {name if count != 1 else name[:-1]}" for name, count in counts(diagnostics).items() if count]
+    return ", ".join(parts) or "no findings"
+
+
+def diagnostics_json(diagnostics: Sequence[Diagnostic]) -> dict[str, object]:
+    """The findings and their counts as JSON values."""
+    return {**counts(diagnostics), "diagnostics": [diagnostic.to_json() for diagnostic in diagnostics]}
+
+
+def has_errors(diagnostics: Sequence[Diagnostic], *, strict: bool = False) -> bool:
+    """Whether any finding is an error; with `strict`, whether any is an error or a warning."""
+    grave = {Severity.ERROR, Severity.WARNING} if strict else {Severity.ERROR}
+    return any(diagnostic.severity in grave for diagnostic in diagnostics)
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a result file whole or not at all.
+
+    Raises:
+        UsageError: The place cannot be written.
+    """
+    temporary = path.with_name(path.name + ".part")
+    try:
+        temporary.write_bytes(content)
+        temporary.replace(path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise UsageError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+class ProgressLine:
+    """A line on a terminal that long work overwrites; silent where the stream is no terminal."""
+
+    def __init__(self, stream: TextIO | None = None) -> None:
+        self._stream = stream or sys.stderr
+        self._is_shown = self._stream.isatty()
+        self._width = 0
+
+    def show(self, text: str) -> None:
+        """Replace the line."""
+        if self._is_shown:
+            self._stream.write("\r" + text[:100].ljust(self._width))
+            self._stream.flush()
+            self._width = len(text[:100])
+
+    def clear(self) -> None:
+        """Remove the line."""
+        if self._is_shown and self._width:
+            self._stream.write("\r" + " " * self._width + "\r")
+            self._stream.flush()
+            self._width = 0

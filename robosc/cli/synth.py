@@ -1,0 +1,87 @@
+"""`robosc synth`: the supervisor of a model, as a file and as a summary."""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from robosc.cli.arguments import add_deployment_argument, add_engine_argument, add_model_arguments, read_bundle
+from robosc.cli.output import ExitCode, ProgressLine, diagnostics_json, print_diagnostics, print_json, write_bytes
+from robosc.model.structure import Deployment
+from robosc.source import Bundle
+
+if TYPE_CHECKING:
+    from robosc.supervisor import Made
+
+
+def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "synth",
+        help="synthesize a supervisor",
+        description="Synthesize the supervisor of a model: safe, controllable, nonblocking, maximally permissive.",
+    )
+    add_model_arguments(parser)
+    add_output_argument(parser)
+    add_deployment_argument(parser)
+    add_engine_argument(parser)
+    parser.set_defaults(run=run)
+
+
+def add_output_argument(parser: argparse.ArgumentParser) -> None:
+    """The supervisor's file."""
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE.rsup", help="write the supervisor to this file")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Synthesize; 0 with a supervisor, 1 without."""
+    bundle = read_bundle(arguments)
+    return report_synthesis(arguments, make(arguments, bundle), bundle)
+
+
+def make(arguments: argparse.Namespace, bundle: Bundle) -> "Made":
+    """Synthesize as the arguments say, with a progress line on a terminal."""
+    from robosc.supervisor import make_supervisor
+
+    progress = ProgressLine()
+    try:
+        return make_supervisor(
+            bundle,
+            deployment=Deployment(arguments.deployment),
+            engine=arguments.engine,
+            on_progress=lambda step: progress.show(f"{step.stage}: {step.message}"),
+        )
+    finally:
+        progress.clear()
+
+
+def report_synthesis(arguments: argparse.Namespace, made: "Made", bundle: Bundle) -> ExitCode:
+    """Write the supervisor's file, print the outcome as asked and return the exit status."""
+    from robosc.supervisor import encode, summary_json, summary_text
+
+    if made.supervisor is not None and arguments.output is not None:
+        write_bytes(arguments.output, encode(made.supervisor))
+    if arguments.json:
+        print_json(
+            {
+                "status": str(made.status),
+                "reason": made.reason,
+                "summary": summary_json(made.supervisor) if made.supervisor else None,
+                "file": str(arguments.output) if made.supervisor and arguments.output else None,
+                **diagnostics_json(made.diagnostics),
+            }
+        )
+    else:
+        report_problems(made, bundle)
+        if made.supervisor is not None:
+            sys.stdout.write(summary_text(made.supervisor))
+            if arguments.output is not None:
+                sys.stdout.write(f"written to {arguments.output}\n")
+    return ExitCode.OK if made.supervisor is not None else ExitCode.FAILED
+
+
+def report_problems(made: "Made", bundle: Bundle) -> None:
+    """Findings and, where there is no supervisor, why, on standard error."""
+    print_diagnostics(made.diagnostics, bundle)
+    if made.reason:
+        sys.stderr.write(f"{bundle.main.name}: {made.reason}\n")

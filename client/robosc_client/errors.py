@@ -1,0 +1,28 @@
+"""What can go wrong between client and server; callers never see a raw gRPC error.
+
+ClientError
+|-- ServerUnavailableError   nobody answers at the address     (also a ConnectionError)
+|-- DeadlineError            no result in time                 (also a TimeoutError)
+|-- RequestRefusedError      the server refuses the request: malformed, too large, too busy
+`-- ServiceError             the server failed, or answered what no RoboSC server answers
+"""
+
+
+class ClientError(Exception):
+    """Root of every error of the client; its text is one sentence for people."""
+
+
+class ServerUnavailableError(ClientError, ConnectionError):
+    """Nobody answers at the address, or the connection was lost."""
+
+
+class DeadlineError(ClientError, TimeoutError):
+    """The caller's deadline or the server's own limit passed before there was a result."""
+
+
+class RequestRefusedError(ClientError):
+    """The server refuses the request."""
+
+
+class ServiceError(ClientError):
+    """The server failed, or answered what no RoboSC server answers."""

@@ -1,0 +1,223 @@
+from google.protobuf.internal import containers as _containers
+from google.protobuf.internal import enum_type_wrapper as _enum_type_wrapper
+from google.protobuf import descriptor as _descriptor
+from google.protobuf import message as _message
+from collections.abc import Iterable as _Iterable, Mapping as _Mapping
+from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
+
+DESCRIPTOR: _descriptor.FileDescriptor
+
+class Severity(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    SEVERITY_UNSPECIFIED: _ClassVar[Severity]
+    SEVERITY_ERROR: _ClassVar[Severity]
+    SEVERITY_WARNING: _ClassVar[Severity]
+    SEVERITY_NOTE: _ClassVar[Severity]
+
+class Deployment(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    DEPLOYMENT_UNSPECIFIED: _ClassVar[Deployment]
+    DEPLOYMENT_CONTROLLER: _ClassVar[Deployment]
+    DEPLOYMENT_LAYER: _ClassVar[Deployment]
+
+class SynthesisStatus(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    SYNTHESIS_STATUS_UNSPECIFIED: _ClassVar[SynthesisStatus]
+    SYNTHESIS_STATUS_SUPERVISOR: _ClassVar[SynthesisStatus]
+    SYNTHESIS_STATUS_EMPTY: _ClassVar[SynthesisStatus]
+    SYNTHESIS_STATUS_MODEL_ERRORS: _ClassVar[SynthesisStatus]
+    SYNTHESIS_STATUS_UNSUPPORTED_MODEL: _ClassVar[SynthesisStatus]
+SEVERITY_UNSPECIFIED: Severity
+SEVERITY_ERROR: Severity
+SEVERITY_WARNING: Severity
+SEVERITY_NOTE: Severity
+DEPLOYMENT_UNSPECIFIED: Deployment
+DEPLOYMENT_CONTROLLER: Deployment
+DEPLOYMENT_LAYER: Deployment
+SYNTHESIS_STATUS_UNSPECIFIED: SynthesisStatus
+SYNTHESIS_STATUS_SUPERVISOR: SynthesisStatus
+SYNTHESIS_STATUS_EMPTY: SynthesisStatus
+SYNTHESIS_STATUS_MODEL_ERRORS: SynthesisStatus
+SYNTHESIS_STATUS_UNSUPPORTED_MODEL: SynthesisStatus
+
+class SourceFile(_message.Message):
+    __slots__ = ("name", "text")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    text: str
+    def __init__(self, name: _Optional[str] = ..., text: _Optional[str] = ...) -> None: ...
+
+class Bundle(_message.Message):
+    __slots__ = ("main", "libraries", "searched")
+    MAIN_FIELD_NUMBER: _ClassVar[int]
+    LIBRARIES_FIELD_NUMBER: _ClassVar[int]
+    SEARCHED_FIELD_NUMBER: _ClassVar[int]
+    main: SourceFile
+    libraries: _containers.RepeatedCompositeFieldContainer[SourceFile]
+    searched: _containers.RepeatedScalarFieldContainer[str]
+    def __init__(self, main: _Optional[_Union[SourceFile, _Mapping]] = ..., libraries: _Optional[_Iterable[_Union[SourceFile, _Mapping]]] = ..., searched: _Optional[_Iterable[str]] = ...) -> None: ...
+
+class Location(_message.Message):
+    __slots__ = ("file", "line", "column", "length")
+    FILE_FIELD_NUMBER: _ClassVar[int]
+    LINE_FIELD_NUMBER: _ClassVar[int]
+    COLUMN_FIELD_NUMBER: _ClassVar[int]
+    LENGTH_FIELD_NUMBER: _ClassVar[int]
+    file: str
+    line: int
+    column: int
+    length: int
+    def __init__(self, file: _Optional[str] = ..., line: _Optional[int] = ..., column: _Optional[int] = ..., length: _Optional[int] = ...) -> None: ...
+
+class RelatedPlace(_message.Message):
+    __slots__ = ("message", "location")
+    MESSAGE_FIELD_NUMBER: _ClassVar[int]
+    LOCATION_FIELD_NUMBER: _ClassVar[int]
+    message: str
+    location: Location
+    def __init__(self, message: _Optional[str] = ..., location: _Optional[_Union[Location, _Mapping]] = ...) -> None: ...
+
+class Diagnostic(_message.Message):
+    __slots__ = ("severity", "code", "message", "location", "mend", "related")
+    SEVERITY_FIELD_NUMBER: _ClassVar[int]
+    CODE_FIELD_NUMBER: _ClassVar[int]
+    MESSAGE_FIELD_NUMBER: _ClassVar[int]
+    LOCATION_FIELD_NUMBER: _ClassVar[int]
+    MEND_FIELD_NUMBER: _ClassVar[int]
+    RELATED_FIELD_NUMBER: _ClassVar[int]
+    severity: Severity
+    code: str
+    message: str
+    location: Location
+    mend: str
+    related: _containers.RepeatedCompositeFieldContainer[RelatedPlace]
+    def __init__(self, severity: _Optional[_Union[Severity, str]] = ..., code: _Optional[str] = ..., message: _Optional[str] = ..., location: _Optional[_Union[Location, _Mapping]] = ..., mend: _Optional[str] = ..., related: _Optional[_Iterable[_Union[RelatedPlace, _Mapping]]] = ...) -> None: ...
+
+class SynthesisOptions(_message.Message):
+    __slots__ = ("deployment", "engine")
+    DEPLOYMENT_FIELD_NUMBER: _ClassVar[int]
+    ENGINE_FIELD_NUMBER: _ClassVar[int]
+    deployment: Deployment
+    engine: str
+    def __init__(self, deployment: _Optional[_Union[Deployment, str]] = ..., engine: _Optional[str] = ...) -> None: ...
+
+class CheckRequest(_message.Message):
+    __slots__ = ("bundle",)
+    BUNDLE_FIELD_NUMBER: _ClassVar[int]
+    bundle: Bundle
+    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ...) -> None: ...
+
+class CheckResponse(_message.Message):
+    __slots__ = ("diagnostics",)
+    DIAGNOSTICS_FIELD_NUMBER: _ClassVar[int]
+    diagnostics: _containers.RepeatedCompositeFieldContainer[Diagnostic]
+    def __init__(self, diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ...) -> None: ...
+
+class SynthesizeRequest(_message.Message):
+    __slots__ = ("bundle", "options")
+    BUNDLE_FIELD_NUMBER: _ClassVar[int]
+    OPTIONS_FIELD_NUMBER: _ClassVar[int]
+    bundle: Bundle
+    options: SynthesisOptions
+    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ...) -> None: ...
+
+class SynthesizeResponse(_message.Message):
+    __slots__ = ("progress", "result")
+    PROGRESS_FIELD_NUMBER: _ClassVar[int]
+    RESULT_FIELD_NUMBER: _ClassVar[int]
+    progress: Progress
+    result: SynthesisResult
+    def __init__(self, progress: _Optional[_Union[Progress, _Mapping]] = ..., result: _Optional[_Union[SynthesisResult, _Mapping]] = ...) -> None: ...
+
+class Progress(_message.Message):
+    __slots__ = ("stage", "message")
+    STAGE_FIELD_NUMBER: _ClassVar[int]
+    MESSAGE_FIELD_NUMBER: _ClassVar[int]
+    stage: str
+    message: str
+    def __init__(self, stage: _Optional[str] = ..., message: _Optional[str] = ...) -> None: ...
+
+class SynthesisResult(_message.Message):
+    __slots__ = ("status", "diagnostics", "supervisor", "reason", "summary", "statistics")
+    STATUS_FIELD_NUMBER: _ClassVar[int]
+    DIAGNOSTICS_FIELD_NUMBER: _ClassVar[int]
+    SUPERVISOR_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    SUMMARY_FIELD_NUMBER: _ClassVar[int]
+    STATISTICS_FIELD_NUMBER: _ClassVar[int]
+    status: SynthesisStatus
+    diagnostics: _containers.RepeatedCompositeFieldContainer[Diagnostic]
+    supervisor: bytes
+    reason: str
+    summary: Summary
+    statistics: Statistics
+    def __init__(self, status: _Optional[_Union[SynthesisStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., supervisor: _Optional[bytes] = ..., reason: _Optional[str] = ..., summary: _Optional[_Union[Summary, _Mapping]] = ..., statistics: _Optional[_Union[Statistics, _Mapping]] = ...) -> None: ...
+
+class Statistics(_message.Message):
+    __slots__ = ("engine", "state_bits", "iterations", "peak_nodes")
+    ENGINE_FIELD_NUMBER: _ClassVar[int]
+    STATE_BITS_FIELD_NUMBER: _ClassVar[int]
+    ITERATIONS_FIELD_NUMBER: _ClassVar[int]
+    PEAK_NODES_FIELD_NUMBER: _ClassVar[int]
+    engine: str
+    state_bits: int
+    iterations: int
+    peak_nodes: int
+    def __init__(self, engine: _Optional[str] = ..., state_bits: _Optional[int] = ..., iterations: _Optional[int] = ..., peak_nodes: _Optional[int] = ...) -> None: ...
+
+class Summary(_message.Message):
+    __slots__ = ("controllable_events", "uncontrollable_events", "states", "transitions", "added", "text")
+    CONTROLLABLE_EVENTS_FIELD_NUMBER: _ClassVar[int]
+    UNCONTROLLABLE_EVENTS_FIELD_NUMBER: _ClassVar[int]
+    STATES_FIELD_NUMBER: _ClassVar[int]
+    TRANSITIONS_FIELD_NUMBER: _ClassVar[int]
+    ADDED_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    controllable_events: int
+    uncontrollable_events: int
+    states: str
+    transitions: str
+    added: _containers.RepeatedCompositeFieldContainer[AddedCondition]
+    text: str
+    def __init__(self, controllable_events: _Optional[int] = ..., uncontrollable_events: _Optional[int] = ..., states: _Optional[str] = ..., transitions: _Optional[str] = ..., added: _Optional[_Iterable[_Union[AddedCondition, _Mapping]]] = ..., text: _Optional[str] = ...) -> None: ...
+
+class AddedCondition(_message.Message):
+    __slots__ = ("event", "condition")
+    EVENT_FIELD_NUMBER: _ClassVar[int]
+    CONDITION_FIELD_NUMBER: _ClassVar[int]
+    event: str
+    condition: str
+    def __init__(self, event: _Optional[str] = ..., condition: _Optional[str] = ...) -> None: ...
+
+class GenerateRequest(_message.Message):
+    __slots__ = ("bundle", "options", "target")
+    BUNDLE_FIELD_NUMBER: _ClassVar[int]
+    OPTIONS_FIELD_NUMBER: _ClassVar[int]
+    TARGET_FIELD_NUMBER: _ClassVar[int]
+    bundle: Bundle
+    options: SynthesisOptions
+    target: str
+    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., target: _Optional[str] = ...) -> None: ...
+
+class GenerateResponse(_message.Message):
+    __slots__ = ("status", "diagnostics", "reason", "files")
+    STATUS_FIELD_NUMBER: _ClassVar[int]
+    DIAGNOSTICS_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    FILES_FIELD_NUMBER: _ClassVar[int]
+    status: SynthesisStatus
+    diagnostics: _containers.RepeatedCompositeFieldContainer[Diagnostic]
+    reason: str
+    files: _containers.RepeatedCompositeFieldContainer[GeneratedFile]
+    def __init__(self, status: _Optional[_Union[SynthesisStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., reason: _Optional[str] = ..., files: _Optional[_Iterable[_Union[GeneratedFile, _Mapping]]] = ...) -> None: ...
+
+class GeneratedFile(_message.Message):
+    __slots__ = ("path", "content", "executable")
+    PATH_FIELD_NUMBER: _ClassVar[int]
+    CONTENT_FIELD_NUMBER: _ClassVar[int]
+    EXECUTABLE_FIELD_NUMBER: _ClassVar[int]
+    path: str
+    content: str
+    executable: bool
+    def __init__(self, path: _Optional[str] = ..., content: _Optional[str] = ..., executable: _Optional[bool] = ...) -> None: ...

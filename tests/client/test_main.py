@@ -1,0 +1,329 @@
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from robosc.cli.main import main as robosc
+from robosc.language import load_bundle
+from robosc.supervisor import decode
+from robosc_api.v1 import synthesis_pb2 as pb
+from robosc_client.main import main as robosc_client
+from robosc_server.settings import Settings
+from support.service import (
+    FAKE_WORKER,
+    PATIENCE_S,
+    Scripted,
+    eventually,
+    is_running,
+    scripted,
+    served,
+    server_process,
+)
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*/*.rscd"))
+
+ERRONEOUS = "robot R { component C { incoming message go with type: Missing } requirement jump needs C.x }"
+
+EMPTY = """
+robot R {
+    component C {
+        incoming message go with type: none
+        behaviour {
+            initial state a { on request to go goto b }
+            marked state b { }
+        }
+    }
+    requirement go needs C.b
+}
+"""
+
+WITH_LIBRARY = """
+robot R {
+    component Base from Parts import Platform
+    requirement go needs Base.ready
+}
+"""
+
+LIBRARY = """
+library Parts {
+    component Platform {
+        incoming message go with type: none
+        behaviour { initial marked state ready { on request to go } }
+    }
+}
+"""
+
+
+def long_work(count):
+    """A model whose synthesis takes many times the deadline: counters that are multiplied with each other."""
+    components = "".join(
+        f"""
+        component C{i} {{
+            incoming message up{i} with type: none
+            outgoing message down{i} with type: none
+            behaviour {{
+                variable x: integer(0..200)
+                initial marked state s {{ on request to up{i} transition if x > 150 goto t }}
+                state t {{ on response from down{i} do x := x + 1 goto s }}
+            }}
+        }}"""
+        for i in range(count)
+    )
+    requirements = "".join(f"requirement up{i} needs C{i}.x * C{(i + 1) % count}.x < 5000\n" for i in range(count))
+    return f"robot Long {{ {components} {requirements} }}"
+
+
+@pytest.fixture(scope="module")
+def server():
+    """Address of a real server, a program of its own."""
+    with server_process() as (_, address):
+        yield address
+
+
+@pytest.fixture(scope="module")
+def fake():
+    """Address of a server whose work does what the model's text says."""
+    with served(Settings(port=0, workers=2, max_bundle_bytes=1000), FAKE_WORKER) as address:
+        yield address
+
+
+@pytest.fixture
+def both(tmp_path, monkeypatch, capfd, server):
+    """Run a command here and on the server, each in a folder of its own; gives what each did."""
+
+    def run(*arguments):
+        outcomes = []
+        for name, program, more in (("here", robosc, []), ("there", robosc_client, ["--server", server])):
+            folder = tmp_path / name
+            folder.mkdir()
+            monkeypatch.chdir(folder)
+            status = program([*map(str, arguments), *more])
+            printed = capfd.readouterr()
+            files = {
+                str(path.relative_to(folder)): (path.read_bytes(), path.stat().st_mode & 0o777)
+                for path in sorted(folder.rglob("*"))
+                if path.is_file()
+            }
+            outcomes.append((status, printed.out, printed.err.replace("robosc-client:", "robosc:"), files))
+        return outcomes
+
+    return run
+
+
+def write(folder, text, name="robot.rscd"):
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+class TestSameAsHere:
+    def test_there_are_examples(self):
+        assert len(EXAMPLES) >= 4
+
+    @pytest.mark.parametrize("json", [[], ["--json"]])
+    @pytest.mark.parametrize("model", EXAMPLES, ids=lambda path: path.stem)
+    def test_check(self, both, model, json):
+        here, there = both("check", model, *json)
+        assert here == there
+        assert here[0] == 0
+
+    @pytest.mark.parametrize("deployment", ["controller", "layer"])
+    @pytest.mark.parametrize("model", EXAMPLES, ids=lambda path: path.stem)
+    def test_synth(self, both, model, deployment):
+        here, there = both("synth", model, "-o", "robot.rsup", "--deployment", deployment)
+        assert here == there
+        assert here[0] == 0
+        supervisor = decode(there[3]["robot.rsup"][0])
+        assert supervisor.deployment == deployment
+        assert supervisor.certificate.bundle_sha256 == load_bundle(model).digest
+
+    def test_synth_json(self, both):
+        here, there = both("synth", EXAMPLES[0], "--json")
+        assert here == there
+        assert '"summary"' in here[1]
+
+    @pytest.mark.parametrize("target", ["python", "ros2"])
+    def test_generate(self, both, target):
+        model = next(path for path in EXAMPLES if path.stem == "line_follower")
+        here, there = both("generate", model, "--target", target, "-o", "package")
+        assert here == there
+        assert here[0] == 0
+        assert len(here[3]) > 3
+
+    def test_libraries(self, both, tmp_path):
+        model, library = tmp_path / "robot", tmp_path / "parts"
+        model.mkdir()
+        library.mkdir()
+        write(library, LIBRARY, "parts.rscd")
+        here, there = both("synth", write(model, WITH_LIBRARY), "-L", library, "-o", "robot.rsup")
+        assert here == there
+        assert here[0] == 0
+
+    @pytest.mark.parametrize("text", [ERRONEOUS, EMPTY, "robot R {", "robot", "", "x\0", LIBRARY])
+    @pytest.mark.parametrize(
+        "command",
+        [["check"], ["synth", "-o", "robot.rsup"], ["synth", "--json"], ["generate", "--target", "ros2", "-o", "out"]],
+    )
+    def test_trouble(self, both, tmp_path, text, command):
+        here, there = both(command[0], write(tmp_path, text), *command[1:])
+        assert here == there
+        assert here[0] == (0 if command == ["check"] and text in (EMPTY, LIBRARY) else 1)
+        assert here[3] == {}
+        assert "Traceback" not in here[1] + here[2]
+
+    def test_not_overwritten(self, both, tmp_path, monkeypatch, capfd, server):
+        model = EXAMPLES[0]
+        changed = tmp_path / "out"
+        assert (
+            robosc_client(["generate", str(model), "--server", server, "--target", "python", "-o", str(changed)]) == 0
+        )
+        capfd.readouterr()
+        victim = next(path for path in sorted(changed.rglob("*.py")))
+        victim.write_text("mine")
+        here, there = both("generate", model, "--target", "python", "-o", changed)
+        assert here == there
+        assert here[0] == 1
+        assert victim.read_text() == "mine"
+
+
+class TestExitCodes:
+    def run(self, capfd, *arguments):
+        status = robosc_client([*map(str, arguments)])
+        printed = capfd.readouterr()
+        assert "Traceback" not in printed.err
+        return status, printed.err
+
+    @pytest.mark.parametrize("command", [["check"], ["synth"], ["generate", "--target", "ros2", "-o", "out"]])
+    def test_nobody_there(self, tmp_path, capfd, command):
+        model = write(tmp_path, "")
+        status, error = self.run(capfd, command[0], model, *command[1:], "--server", "127.0.0.1:1")
+        assert (status, error) == (3, "robosc-client: no server answers at 127.0.0.1:1\n")
+
+    def test_deadline(self, tmp_path, capfd, fake):
+        status, error = self.run(
+            capfd, "synth", write(tmp_path, "stuck"), "--server", fake, "--deadline", "1", "-o", tmp_path / "x.rsup"
+        )
+        assert status == 3
+        assert "within 1 seconds" in error
+        assert not (tmp_path / "x.rsup").exists()
+
+    def test_deadline_of_a_long_synthesis(self, tmp_path, capfd, server):
+        status, error = self.run(capfd, "synth", write(tmp_path, long_work(9)), "--server", server, "--deadline", "0.7")
+        assert (status, error) == (3, f"robosc-client: no result from {server} within 0.7 seconds\n")
+        # Its worker is gone and another one does the next work.
+        assert robosc_client(["check", str(EXAMPLES[0]), "--server", server]) == 0
+
+    def test_too_large(self, tmp_path, capfd, fake):
+        status, error = self.run(capfd, "check", write(tmp_path, "x" * 2000), "--server", fake)
+        assert status == 3
+        assert "at most 1000" in error
+
+    def test_fault(self, tmp_path, capfd, fake):
+        status, error = self.run(capfd, "check", write(tmp_path, "fault"), "--server", fake)
+        assert status == 3
+        assert "internal error" in error.splitlines()[-1]
+
+    @pytest.mark.parametrize("arguments", [["--engine", "abacus"], ["--target", "toaster"]])
+    def test_unknown_names(self, tmp_path, capfd, server, arguments):
+        chosen = {"--target": "python", "-o": str(tmp_path / "out"), arguments[0]: arguments[1]}
+        more = [part for pair in chosen.items() for part in pair]
+        status, error = self.run(capfd, "generate", EXAMPLES[0], "--server", server, *more)
+        assert status == 3
+        assert arguments[1] in error
+        assert error.count("\n") == 1
+
+    def test_no_file(self, tmp_path, capfd, fake):
+        status, error = self.run(capfd, "check", tmp_path / "none.rscd", "--server", fake)
+        assert status == 2
+        assert "none.rscd" in error
+
+    @pytest.mark.parametrize(
+        "arguments",
+        [
+            [],
+            ["--server", "localhost"],
+            ["--server", "localhost:0"],
+            ["--server", "localhost:65536"],
+            ["--server", "unix:/tmp/x"],
+            ["--server", "localhost:1", "--deadline", "0"],
+            ["--server", "localhost:1", "--deadline", "soon"],
+            ["--server", "localhost:1", "--deployment", "space"],
+        ],
+    )
+    def test_wrong_use(self, tmp_path, capfd, arguments):
+        with pytest.raises(SystemExit) as left:
+            robosc_client(["synth", str(write(tmp_path, "")), *arguments])
+        assert left.value.code == 2
+        assert "usage:" in capfd.readouterr().err
+
+    def test_help_tells_them(self, capfd):
+        for arguments in (["--help"], ["synth", "--help"]):
+            with pytest.raises(SystemExit):
+                robosc_client(arguments)
+            assert "exit status:" in capfd.readouterr().out
+
+    @pytest.mark.parametrize(
+        ("answer", "status", "words"),
+        [
+            ({"status": pb.SYNTHESIS_STATUS_UNSUPPORTED_MODEL, "reason": "too strange"}, 1, "too strange"),
+            ({"status": pb.SYNTHESIS_STATUS_SUPERVISOR, "supervisor": b"{}"}, 3, "supervisor is refused"),
+        ],
+    )
+    def test_odd_answers(self, tmp_path, capfd, answer, status, words):
+        response = pb.SynthesizeResponse(result=pb.SynthesisResult(**answer))
+        with scripted(Scripted(synthesize=[response])) as address:
+            model = write(tmp_path, "robot R { }")
+            outcome = self.run(capfd, "synth", model, "--server", address, "-o", tmp_path / "x.rsup")
+        assert outcome[0] == status
+        assert words in outcome[1]
+        assert outcome[1].count("\n") == 1
+        assert not (tmp_path / "x.rsup").exists()
+
+
+class TestPrograms:
+    def test_client_as_a_program(self, server):
+        command = [sys.executable, "-m", "robosc_client.main", "check", str(EXAMPLES[0]), "--server", server]
+        outcome = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+        assert outcome.returncode == 0
+        assert "Traceback" not in outcome.stderr
+
+    @pytest.mark.parametrize("command", [["check"], ["synth"], ["generate", "--target", "ros2", "-o", "out"]])
+    def test_interrupted_client(self, tmp_path, fake, command):
+        note = tmp_path / "pid"
+        model = write(tmp_path, f"stuck, see {note}")
+        command = [sys.executable, "-m", "robosc_client.main", command[0], str(model), *command[1:], "--server", fake]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            assert eventually(lambda: note.exists() and note.read_text().endswith("\n"))
+            process.send_signal(signal.SIGINT)
+            output, error = process.communicate(timeout=PATIENCE_S)
+        assert (process.returncode, output, error) == (130, "", "robosc-client: interrupted\n")
+        assert eventually(lambda: not is_running(int(note.read_text())))
+
+    @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+    def test_server_stops_gracefully(self, number, capfd):
+        with server_process() as (process, address):
+            workers = children(process.pid)
+            assert workers
+            assert robosc_client(["check", str(EXAMPLES[0]), "--server", address]) == 0
+            process.send_signal(number)
+            assert process.wait(PATIENCE_S) == 0
+            assert process.stdout.read() == ""
+            assert process.stderr.read() == ""
+        assert not any(is_running(pid) for pid in workers)
+
+    def test_a_killed_server_leaves_no_workers(self):
+        with server_process() as (process, _):
+            workers = children(process.pid)
+            assert workers
+            process.kill()
+            process.wait(PATIENCE_S)
+            assert all(eventually(lambda pid=pid: not is_running(pid)) for pid in workers)
+
+
+def children(pid):
+    """Numbers of a process's children."""
+    return [
+        int(child) for task in Path(f"/proc/{pid}/task").iterdir() for child in (task / "children").read_text().split()
+    ]

@@ -1,0 +1,55 @@
+import os
+import re
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from robosc_api.v1 import synthesis_pb2 as pb
+
+PROTO = Path(__file__).parents[2] / "proto"
+SOURCE = PROTO / "robosc_api" / "v1" / "synthesis.proto"
+
+
+def test_committed_bindings_are_what_the_generator_makes(tmp_path):
+    subprocess.run([PROTO / "generate.sh", tmp_path], check=True, env={**os.environ, "PYTHON": sys.executable})
+    made = sorted((tmp_path / "robosc_api" / "v1").iterdir())
+    assert [file.name for file in made] == ["synthesis_pb2.py", "synthesis_pb2.pyi", "synthesis_pb2_grpc.py"]
+    for file in made:
+        assert file.read_text() == (SOURCE.parent / file.name).read_text(), file.name
+
+
+def test_everything_in_the_interface_is_documented():
+    lines = SOURCE.read_text().splitlines()
+    defined = re.compile(r"\s*(message|enum|service|rpc|oneof|repeated \w+ \w+ =|\w+ \w+ =|[A-Z_]+ =)")
+    undocumented = [
+        line.strip()
+        for before, line in pairwise(lines)
+        if defined.match(line) and not line.startswith(("syntax", "//")) and not before.strip().startswith("//")
+    ]
+    assert sum(bool(defined.match(line)) for line in lines) > 80
+    assert undocumented == []
+
+
+def test_names_follow_the_rules():
+    """The basic rules of the usual linter for protobuf interfaces."""
+    for message in pb.DESCRIPTOR.message_types_by_name.values():
+        assert re.fullmatch(r"([A-Z][a-z]+)+", message.name)
+        for field in message.fields:
+            assert re.fullmatch(r"[a-z]+(_[a-z]+)*", field.name)
+    for enum in pb.DESCRIPTOR.enum_types_by_name.values():
+        prefix = re.sub(r"(?<!^)([A-Z])", r"_\1", enum.name).upper() + "_"
+        assert enum.values[0].name == prefix + "UNSPECIFIED"
+        assert enum.values[0].number == 0
+        assert all(value.name.startswith(prefix) for value in enum.values)
+
+
+@pytest.mark.parametrize("service", pb.DESCRIPTOR.services_by_name.values(), ids=lambda service: service.name)
+def test_each_rpc_has_messages_of_its_own(service):
+    assert service.name.endswith("Service")
+    assert [method.name for method in service.methods] == ["Check", "Synthesize", "Generate"]
+    for method in service.methods:
+        assert method.input_type.name == f"{method.name}Request"
+        assert method.output_type.name == f"{method.name}Response"

@@ -1,0 +1,262 @@
+"""The generated ROS 2 node as a process of its own on real topics, driven from this process."""
+
+import itertools
+import json
+import signal
+from array import array
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.generated import example_supervisor
+from support.ros2 import DISCOVERY_LIMIT_S, Peer, RosProcess, environment, own_domain
+
+from robosc.targets import generate, write_files
+
+pytest.importorskip("rclpy", reason="ROS 2 (rclpy) is not installed")
+
+pytestmark = pytest.mark.ros2
+
+PACKAGE = "line_follower_controller"
+TOPICS = ("/line/correction", "/line/lost", "/scan", "/emergency_stop/stop", "/emergency_stop/resume", "/cmd_vel")
+LIMIT_S = 10.0
+
+StartNode = Callable[..., RosProcess]
+
+
+@pytest.fixture(scope="module")
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("workspace")
+    write_files(generate(example_supervisor("line_follower/line_follower"), "ros2"), folder)
+    return folder
+
+
+@pytest.fixture
+def domain() -> Iterator[int]:
+    with own_domain() as number:
+        yield number
+
+
+@pytest.fixture
+def start(workspace: Path, domain: int, tmp_path: Path) -> Iterator[StartNode]:
+    """Starts the node; every started one is killed at the end."""
+    nodes: list[RosProcess] = []
+
+    def start_node(*parameters: str) -> RosProcess:
+        arguments = itertools.chain.from_iterable(("-p", parameter) for parameter in parameters)
+        command = ["-m", f"{PACKAGE}.node", "--ros-args", *arguments]
+        nodes.append(RosProcess(command, environment(domain, tmp_path), tmp_path / str(len(nodes)), [workspace]))
+        return nodes[-1]
+
+    yield start_node
+    for node in nodes:
+        node.__exit__(None, None, None)
+
+
+@pytest.fixture
+def peer(domain: int, tmp_path: Path) -> Iterator[Peer]:
+    with Peer(domain, environment(domain, tmp_path)) as made:
+        yield made
+
+
+class Robot:
+    """The test's side of the line follower's topics."""
+
+    def __init__(self, peer: Peer, node: RosProcess, prefix: str = "") -> None:
+        from geometry_msgs.msg import Twist
+
+        self.peer = peer
+        self.node = node
+        self.prefix = prefix
+        self.commands = peer.receive(Twist, f"{prefix}/cmd_vel")
+        peer.wait_for_peers([prefix + topic for topic in TOPICS])
+
+    @property
+    def speed(self) -> float | None:
+        return float(self.commands[-1].linear.x) if self.commands else None
+
+    def line(self, correction: float = 0.25) -> None:
+        from std_msgs.msg import Float32
+
+        self.peer.publish(Float32(data=correction), f"{self.prefix}/line/correction")
+
+    def scan(self, distance: float) -> None:
+        from rclpy.qos import qos_profile_sensor_data
+        from sensor_msgs.msg import LaserScan
+
+        message = LaserScan(ranges=array("f", [distance] * 360))
+        self.peer.publish(message, f"{self.prefix}/scan", qos_profile_sensor_data)
+
+    def empty(self, topic: str) -> None:
+        from std_msgs.msg import Empty
+
+        self.peer.publish(Empty(), self.prefix + topic)
+
+    def until(self, condition: Callable[[], bool], what: str, repeat: Callable[[], object] = lambda: None) -> None:
+        self.peer.spin_until(condition, LIMIT_S, what, self.node, repeat)
+
+    def drive(self) -> None:
+        """Give it a line and a clear way until it moves."""
+
+        def see() -> None:
+            self.line()
+            self.scan(2.0)
+
+        self.until(lambda: self.speed == 0.15, "the robot to move", see)
+
+
+def test_it_moves_only_while_everything_allows_it(start: StartNode, peer: Peer) -> None:
+    robot = Robot(peer, start("period:=0.02"))
+    robot.until(lambda: robot.speed is not None, "the first command")
+    assert robot.speed == 0.0
+    robot.until(lambda: len(robot.commands) > 10, "a line without a scan to change nothing", robot.line)
+    assert {command.linear.x for command in robot.commands} == {0.0}
+
+    robot.drive()
+    assert robot.commands[-1].angular.z == 0.25
+    robot.line(-0.5)
+    robot.until(lambda: robot.commands[-1].angular.z == -0.5, "the new correction")
+
+    stops: list[tuple[str, Callable[[], object], Callable[[], object]]] = [
+        ("an obstacle", lambda: robot.scan(0.2), lambda: robot.scan(2.0)),
+        ("the stop button", lambda: robot.empty("/emergency_stop/stop"), lambda: robot.empty("/emergency_stop/resume")),
+        ("a lost line", lambda: robot.empty("/line/lost"), robot.line),
+    ]
+    for what, stop, resume in stops:
+        stop()
+        robot.until(lambda: robot.speed == 0.0, f"the robot to stop at {what}", stop)
+        seen = len(robot.commands)
+        robot.until(lambda seen=seen: len(robot.commands) > seen + 5, "more commands")
+        assert {command.linear.x for command in robot.commands[seen:]} == {0.0}, what
+        robot.until(lambda: robot.speed == 0.15, f"the robot to move again after {what}", resume)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_stops_the_robot_first(start: StartNode, peer: Peer, number: signal.Signals, tmp_path: Path) -> None:
+    from geometry_msgs.msg import Twist
+
+    # Decisions are so rare that the zero can only come from the stop.
+    node = start("period:=0.5", f"log_folder:={tmp_path / 'events'}")
+    robot = Robot(peer, node)
+    robot.drive()
+    robot.node.signal(number)
+    peer.spin_until(lambda: robot.commands[-1] == Twist() and not node.is_running, LIMIT_S, "a zero and the end")
+    assert node.wait() == 0
+    assert node.stderr == ""
+    (log,) = (tmp_path / "events").iterdir()
+    entries = [json.loads(line) for line in log.read_text().splitlines()]
+    assert {"kind": "stop", "what": number.name}.items() <= entries[-1].items()
+    moves = [entry for entry in entries if entry.get("event") == "move.request"]
+    assert moves
+    for entry in moves:
+        assert entry["controllable"] is True
+        assert entry["data"] == {"linear": {"x": 0.15}, "angular": {"z": 0.25}}
+        states = {name: part["state"] for name, part in entry["state"].items()}
+        assert (states["LineDetector"], states["LidarSensor"]) == ("line_found", "safe")
+
+
+def test_hostile_numbers_neither_reach_the_motor_nor_stop_the_node(start: StartNode, peer: Peer) -> None:
+    robot = Robot(peer, start("period:=0.02"))
+    robot.drive()
+    for correction in (float("nan"), float("inf"), -float("inf")):
+        robot.line(correction)
+    robot.scan(float("nan"))
+    robot.until(lambda: robot.speed == 0.0, "a scan of NaN to count as an obstacle", lambda: robot.scan(float("nan")))
+    robot.line(0.75)
+    robot.until(lambda: robot.commands[-1].angular.z == 0.75, "the node to go on", lambda: robot.scan(2.0))
+    assert all(abs(command.angular.z) <= 1.0 for command in robot.commands)
+
+
+def test_a_stale_sensor_stops_the_robot_until_it_is_back(start: StartNode, peer: Peer) -> None:
+    robot = Robot(peer, start("period:=0.02", "max_age:=['/scan=0.3']", "release_identifiers:=['/cmd_vel']"))
+    robot.drive()
+    robot.until(lambda: robot.speed == 0.0, "the robot to stop without scans")
+    seen = len(robot.commands)
+    peer.spin_for(0.2)
+    assert len(robot.commands) == seen
+    robot.drive()
+
+
+def test_an_unfit_value_is_not_sent(start: StartNode, peer: Peer) -> None:
+    """1e308 fits the double field of a Twist; the log says nothing, and infinity never gets that far."""
+    robot = Robot(peer, start("period:=0.02"))
+    robot.drive()
+    robot.line(3e38)
+    robot.until(lambda: robot.commands[-1].angular.z > 1e38, "the great number")
+
+
+def test_the_state_is_published_as_semantics_says(start: StartNode, peer: Peer) -> None:
+    from std_msgs.msg import String
+
+    states = peer.receive(String, "/state")
+    robot = Robot(peer, start("period:=0.02", "publish_state:=true"))
+    robot.drive()
+
+    def content() -> Any:
+        return json.loads(states[-1].data)
+
+    robot.until(lambda: bool(states) and content()["current"]["LidarSensor"]["state"] == "safe", "the state topic")
+    state = content()
+    assert state["current"]["LineDetector"] == {"state": "line_found", "variables": {"current_correction": "0.25"}}
+    assert state["current"]["LidarSensor"] == {"state": "safe", "variables": {"ahead": "clear"}}
+    definition = state["definition"]
+    assert definition["name"] == "LineFollower"
+    names = [component["name"] for component in definition["components"]]
+    assert names == ["LineDetector", "LidarSensor", "EmergencyStop", "Platform"]
+    detector = definition["components"][0]
+    assert detector["messages"] == ["correction", "line_lost"]
+    assert detector["services"] == detector["actions"] == []
+    (initial, other) = detector["behaviour"]["states"]
+    assert initial["initial"] and not other["initial"]
+    (first,) = initial["transitions"]
+    assert {key: first[key] for key in ("next", "type", "communication")} == {
+        "next": "line_found",
+        "type": "response",
+        "communication": "correction",
+    }
+    taken = {number for message in states for number in json.loads(message.data)["transitions"]}
+    assert first["id"] in taken
+    known = {
+        item["id"]
+        for component in definition["components"]
+        for place in component["behaviour"]["states"]
+        for item in place["transitions"]
+    }
+    assert taken <= known
+
+
+def test_a_prefix_moves_every_topic(start: StartNode, peer: Peer) -> None:
+    robot = Robot(peer, start("period:=0.02", "topic_prefix:=/robot_1"), prefix="/robot_1")
+    robot.drive()
+    names = {name for name, _ in peer.node.get_topic_names_and_types()}
+    assert not names & set(TOPICS)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "complaint"),
+    [
+        ("period:=-1.0", "parameter 'period' is -1.0; it must be"),
+        ("period:=fast", "parameter 'period' is 'fast'; it must be"),
+        ("period:=1e9", "parameter 'period' is 1000000000.0; it must be at most 3600 seconds"),
+        ("policy:=best", "parameter 'policy' is 'best'; it must be one of fair, priority, random"),
+        ("priority:=[halt, mvoe]", "parameter 'priority': 'mvoe' is not a request; did you mean 'move'?"),
+        ("every:=2", "parameter 'every' is 2; it must be one of period, event"),
+        ("seed:=1.5", "parameter 'seed' is 1.5; it must be an integer"),
+        ("release_identifiers:=['/cmd']", "parameter 'release_identifiers': '/cmd' is not"),
+        ("max_age:=['/scan']", "parameter 'max_age' is '/scan'; it must be topic=seconds"),
+        ("max_age:=['/scan=-1']", "parameter 'max_age of /scan' is -1.0"),
+        ("max_age:=['/skan=1']", "parameter 'max_age': '/skan' is not"),
+        ("on_unknown:=panic", "parameter 'on_unknown' is 'panic'"),
+        ("topic_prefix:='a b'", "parameter 'topic_prefix' is 'a b'"),
+        ("log_folder:=/dev/null/x", "parameter 'log_folder': "),
+        ("publish_state:=1", "parameter 'publish_state' is 1; it must be true or false"),
+        ("period", "cannot start: "),
+    ],
+)
+def test_a_wrong_parameter_is_one_line_and_exit_status_2(start: StartNode, parameter: str, complaint: str) -> None:
+    node = start(parameter)
+    assert node.wait() == 2
+    lines = [line for line in node.stderr.splitlines() if line]
+    assert lines[-1].startswith(f"{PACKAGE}: {complaint}"), node.stderr
+    assert "Traceback" not in node.stderr

@@ -55,13 +55,18 @@ def to_automata(model: Model, deployment: Deployment) -> System:
     )
 
 
-def _communications_of(model: Model, component: Component) -> tuple[Communication, ...]:
-    return tuple(item for item in model.communications if item.component == component.name)
+def _communications(model: Model) -> Iterator[tuple[Component, tuple[Communication, ...]]]:
+    """Every component with its communications."""
+    found: dict[str, list[Communication]] = {}
+    for item in model.communications:
+        found.setdefault(item.component, []).append(item)
+    for component in model.components:
+        yield component, tuple(found.get(component.name, ()))
 
 
 def _events(model: Model, deployment: Deployment) -> Iterator[Event]:
-    for component in model.components:
-        for communication in _communications_of(model, component):
+    for component, communications in _communications(model):
+        for communication in communications:
             for kind in EVENT_KINDS[communication.kind]:
                 yield Event(communication.event(kind), _is_controllable(kind, deployment))
         if component.behaviour:
@@ -76,8 +81,8 @@ def _is_controllable(kind: EventKind, deployment: Deployment) -> bool:
 
 
 def _automata(model: Model) -> Iterator[Automaton]:
-    for component in model.components:
-        yield from (communication_plant(item) for item in _communications_of(model, component))
+    for component, communications in _communications(model):
+        yield from (communication_plant(item) for item in communications)
         if component.behaviour:
             yield component_plant(component.name, component.behaviour)
 
@@ -88,8 +93,8 @@ def _inputs(model: Model) -> Iterator[InputVariable]:
     for component in model.components:
         for event, path in _received(component):
             read.setdefault(event, {})[path] = None
-    for component in model.components:
-        for communication in _communications_of(model, component):
+    for _, communications in _communications(model):
+        for communication in communications:
             for kind in EVENT_KINDS[communication.kind]:
                 for path in read.get(communication.event(kind), ()):
                     yield _input(model, communication, kind, path)

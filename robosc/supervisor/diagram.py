@@ -4,7 +4,6 @@ from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from typing import overload
 
-from robosc.automata.state import subject_domain, subjects
 from robosc.automata.structure import System
 from robosc.expressions import (
     FALSE,
@@ -18,7 +17,7 @@ from robosc.expressions import (
     Value,
     VariableRead,
 )
-from robosc.expressions.types import EnumType, IntegerType, Type
+from robosc.expressions.types import EnumType, IntegerType, Type, domain
 from robosc.supervisor.structure import DecisionDiagram, DecisionNode
 
 Subject = tuple[str, str | None]
@@ -56,14 +55,12 @@ class SubjectDomain(Sequence[Value]):
 
 def diagram_domains(system: System) -> dict[Subject, SubjectDomain]:
     """The domain of every place of a system's state."""
-    types = {(automaton.name, v.name): v.type for automaton in system.automata for v in automaton.variables}
-    return {
-        (subject.automaton, subject.variable): SubjectDomain(
-            subject_domain(system, subject),
-            None if subject.variable is None else types[subject.automaton, subject.variable],
-        )
-        for subject in subjects(system)
-    }
+    found: dict[Subject, SubjectDomain] = {}
+    for automaton in system.automata:
+        found[automaton.name, None] = SubjectDomain(automaton.locations, None)
+        for variable in automaton.variables:
+            found[automaton.name, variable.name] = SubjectDomain(domain(variable.type), variable.type)
+    return found
 
 
 def evaluate(diagram: DecisionDiagram, read: Callable[[str, str | None], int]) -> bool:

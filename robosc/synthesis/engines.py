@@ -43,7 +43,7 @@ class Manager(Protocol):
         """Where some value of the variables makes a predicate true."""
 
 
-class UnknownEngineError(RoboscError):
+class UnknownEngineError(RoboscError, LookupError):
     """An engine that is not known or not installed."""
 
 

@@ -17,7 +17,7 @@ from grpc_health.v1 import health, health_pb2, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection
 
 from robosc_server import convert
-from robosc_server.pool import WORKER_COMMAND, WorkerPool
+from robosc_server.pool import WORKER_COMMAND, StartError, WorkerPool
 from robosc_server.service import SynthesisService
 from robosc_server.settings import Settings, parse_settings
 
@@ -35,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     logging.basicConfig(format="%(asctime)s %(levelname)s %(name)s: %(message)s", stream=sys.stderr)
     try:
         asyncio.run(_serve_until_signal(settings))
-    except AddressError as error:
+    except (AddressError, StartError) as error:
         sys.stderr.write(f"robosc-server: {error}\n")
         return 1
     return 0
@@ -58,6 +58,7 @@ async def running_server(settings: Settings, worker_command: Sequence[str] = WOR
 
     Raises:
         AddressError: The address is not ours or in use.
+        StartError: No worker can be started.
     """
     server = grpc.aio.server(
         options=[

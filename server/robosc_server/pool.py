@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import logging
+import os
 import sys
 from collections.abc import Awaitable, Callable, Sequence
 from types import TracebackType
@@ -22,6 +23,10 @@ WAITING_LIMIT = 64
 _RESTART_PAUSE_S = 1.0
 
 
+class StartError(Exception):
+    """No worker can be started; one sentence for the operator."""
+
+
 class PoolBusyError(Exception):
     """Too many requests wait already."""
 
@@ -37,7 +42,13 @@ class _Worker:
     async def start(cls, command: Sequence[str]) -> Self:
         """Start a process in its own session, so that a terminal's signals reach the server alone."""
         pipe = asyncio.subprocess.PIPE
-        return cls(await asyncio.create_subprocess_exec(*command, stdin=pipe, stdout=pipe, start_new_session=True))
+        # A copy: the environment itself may be changed by another thread in the middle of the start.
+        environment = dict(os.environ)
+        return cls(
+            await asyncio.create_subprocess_exec(
+                *command, stdin=pipe, stdout=pipe, start_new_session=True, env=environment
+            )
+        )
 
     @property
     def pid(self) -> int:
@@ -85,13 +96,21 @@ class WorkerPool:
         self._is_closing = False
 
     async def __aenter__(self) -> Self:
-        for _ in range(self._size):
-            await self._add()
+        try:
+            for _ in range(self._size):
+                await self._add()
+        except OSError as error:
+            await self._close()
+            raise StartError(f"cannot start a worker process: {error}") from error
         return self
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        await self._close()
+
+    async def _close(self) -> None:
+        """End every process."""
         self._is_closing = True
         tasks = list(self._replacements)
         for task in tasks:

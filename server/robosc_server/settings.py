@@ -13,7 +13,7 @@ that has both. SIGTERM and SIGINT end it gracefully.
 
 exit status:
   0  stopped by a signal
-  1  the address cannot be used
+  1  the address cannot be used, or no worker started
   2  wrong use
 """
 

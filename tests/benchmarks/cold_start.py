@@ -18,7 +18,7 @@ AIMS_S = {"check": 0.4, "synth": 0.8}
 
 def _seconds(command: list[str], environment: dict[str, str]) -> float:
     begin = time.perf_counter()
-    subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, check=True)
+    subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=True)
     return time.perf_counter() - begin
 
 
@@ -31,7 +31,7 @@ def table() -> str:
         # Compiled modules are part of a warm cache, whatever the caller's environment says.
         environment = {**os.environ, "PYTHONPYCACHEPREFIX": cache}
         environment.pop("PYTHONDONTWRITEBYTECODE", None)
-        commands = [(f"python -c pass", [sys.executable, "-c", "pass"], "")]
+        commands = [("python -c pass", [sys.executable, "-c", "pass"], "")]
         for name in ("line_follower/line_follower", "maze_solver/maze_solver", "navigation/navigation"):
             model = str(ROOT / "examples" / f"{name}.rscd")
             commands += [

@@ -16,6 +16,8 @@ def text_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]])
 
     def line(row: Sequence[str]) -> str:
         first, *rest = row
-        return "  ".join([first.ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(rest, widths[1:], strict=True))])
+        return "  ".join(
+            [first.ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(rest, widths[1:], strict=True))]
+        )
 
     return "\n".join([title, line(header), "  ".join("-" * width for width in widths), *(line(row) for row in rows)])

@@ -71,7 +71,9 @@ def long_work(count):
         }}"""
         for i in range(count)
     )
-    requirements = "".join(f"requirement up{i} needs C{i}.x * C{(i + 1) % count}.x < 5000\n" for i in range(count))
+    requirements = "".join(
+        f"requirement up{i} needs C{i}.x * C{(i + 1) % count}.x + C{(i + 2) % count}.x < 5000\n" for i in range(count)
+    )
     return f"robot Long {{ {components} {requirements} }}"
 
 

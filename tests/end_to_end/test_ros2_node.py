@@ -9,10 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.generated import example_supervisor
-from support.ros2 import DISCOVERY_LIMIT_S, Peer, RosProcess, environment, own_domain
 
+from robosc.model.structure import Deployment
+from robosc.supervisor.structure import Supervisor
 from robosc.targets import generate, write_files
+from support.generated import example_supervisor
+from support.models import model_of
+from support.random_supervisors import CERTIFICATE
+from support.ros2 import Peer, RosProcess, environment, own_domain
 
 pytest.importorskip("rclpy", reason="ROS 2 (rclpy) is not installed")
 
@@ -45,7 +49,8 @@ def start(workspace: Path, domain: int, tmp_path: Path) -> Iterator[StartNode]:
 
     def start_node(*parameters: str) -> RosProcess:
         arguments = itertools.chain.from_iterable(("-p", parameter) for parameter in parameters)
-        command = ["-m", f"{PACKAGE}.node", "--ros-args", *arguments]
+        file = workspace / "config/parameters.yaml"
+        command = ["-m", f"{PACKAGE}.node", "--ros-args", "--params-file", str(file), *arguments]
         nodes.append(RosProcess(command, environment(domain, tmp_path), tmp_path / str(len(nodes)), [workspace]))
         return nodes[-1]
 
@@ -96,6 +101,12 @@ class Robot:
     def until(self, condition: Callable[[], bool], what: str, repeat: Callable[[], object] = lambda: None) -> None:
         self.peer.spin_until(condition, LIMIT_S, what, self.node, repeat)
 
+    def next_commands(self, count: int) -> list[Any]:
+        """The commands that come from now on."""
+        before = len(self.commands)
+        self.until(lambda: len(self.commands) >= before + count, "more commands")
+        return self.commands[before:]
+
     def drive(self) -> None:
         """Give it a line and a clear way until it moves."""
 
@@ -126,9 +137,7 @@ def test_it_moves_only_while_everything_allows_it(start: StartNode, peer: Peer) 
     for what, stop, resume in stops:
         stop()
         robot.until(lambda: robot.speed == 0.0, f"the robot to stop at {what}", stop)
-        seen = len(robot.commands)
-        robot.until(lambda seen=seen: len(robot.commands) > seen + 5, "more commands")
-        assert {command.linear.x for command in robot.commands[seen:]} == {0.0}, what
+        assert {command.linear.x for command in robot.next_commands(5)} == {0.0}, what
         robot.until(lambda: robot.speed == 0.15, f"the robot to move again after {what}", resume)
 
 
@@ -178,12 +187,18 @@ def test_a_stale_sensor_stops_the_robot_until_it_is_back(start: StartNode, peer:
     robot.drive()
 
 
-def test_an_unfit_value_is_not_sent(start: StartNode, peer: Peer) -> None:
-    """1e308 fits the double field of a Twist; the log says nothing, and infinity never gets that far."""
-    robot = Robot(peer, start("period:=0.02"))
+def test_a_fault_stops_the_robot_and_ends_the_node(start: StartNode, peer: Peer) -> None:
+    from geometry_msgs.msg import Twist
+
+    node = start("period:=0.5", "on_unknown:=fault")
+    robot = Robot(peer, node)
     robot.drive()
-    robot.line(3e38)
-    robot.until(lambda: robot.commands[-1].angular.z > 1e38, "the great number")
+    robot.scan(float("nan"))
+    peer.spin_until(lambda: robot.commands[-1] == Twist() and not node.is_running, LIMIT_S, "a zero and the end")
+    assert node.wait() == 1
+    (line,) = node.stderr.splitlines()
+    assert line.startswith(f"{PACKAGE}: ")
+    assert "unknown at scan.response" in line
 
 
 def test_the_state_is_published_as_semantics_says(start: StartNode, peer: Peer) -> None:
@@ -209,7 +224,7 @@ def test_the_state_is_published_as_semantics_says(start: StartNode, peer: Peer) 
     assert detector["services"] == detector["actions"] == []
     (initial, other) = detector["behaviour"]["states"]
     assert initial["initial"] and not other["initial"]
-    (first,) = initial["transitions"]
+    (first,) = (item for item in initial["transitions"] if item["communication"] == "correction")
     assert {key: first[key] for key in ("next", "type", "communication")} == {
         "next": "line_found",
         "type": "response",
@@ -237,26 +252,44 @@ def test_a_prefix_moves_every_topic(start: StartNode, peer: Peer) -> None:
     ("parameter", "complaint"),
     [
         ("period:=-1.0", "parameter 'period' is -1.0; it must be"),
-        ("period:=fast", "parameter 'period' is 'fast'; it must be"),
-        ("period:=1e9", "parameter 'period' is 1000000000.0; it must be at most 3600 seconds"),
-        ("policy:=best", "parameter 'policy' is 'best'; it must be one of fair, priority, random"),
-        ("priority:=[halt, mvoe]", "parameter 'priority': 'mvoe' is not a request; did you mean 'move'?"),
-        ("every:=2", "parameter 'every' is 2; it must be one of period, event"),
-        ("seed:=1.5", "parameter 'seed' is 1.5; it must be an integer"),
-        ("release_identifiers:=['/cmd']", "parameter 'release_identifiers': '/cmd' is not"),
-        ("max_age:=['/scan']", "parameter 'max_age' is '/scan'; it must be topic=seconds"),
-        ("max_age:=['/scan=-1']", "parameter 'max_age of /scan' is -1.0"),
-        ("max_age:=['/skan=1']", "parameter 'max_age': '/skan' is not"),
-        ("on_unknown:=panic", "parameter 'on_unknown' is 'panic'"),
-        ("topic_prefix:='a b'", "parameter 'topic_prefix' is 'a b'"),
+        ("policy:=2", "parameter 'policy' is 2; it must be one of fair, priority, random"),
         ("log_folder:=/dev/null/x", "parameter 'log_folder': "),
-        ("publish_state:=1", "parameter 'publish_state' is 1; it must be true or false"),
         ("period", "cannot start: "),
     ],
 )
 def test_a_wrong_parameter_is_one_line_and_exit_status_2(start: StartNode, parameter: str, complaint: str) -> None:
     node = start(parameter)
     assert node.wait() == 2
-    lines = [line for line in node.stderr.splitlines() if line]
-    assert lines[-1].startswith(f"{PACKAGE}: {complaint}"), node.stderr
-    assert "Traceback" not in node.stderr
+    # What rcl itself prints about its arguments comes before.
+    *others, line = node.stderr.splitlines()
+    assert line.startswith(f"{PACKAGE}: {complaint}")
+    assert all(other.startswith("[ERROR]") for other in others)
+
+
+MISFITS = {
+    "a type that is not installed": (
+        "interface i use Pose from no_such_msgs component C { outgoing message m with type: none links i }",
+        "the message type no_such_msgs/msg/Pose is not installed; build no_such_msgs and source its workspace",
+    ),
+    "a property that a received message does not have": (
+        "interface i use LaserScan from sensor_msgs datatype object S { rages: array(double) }"
+        "component C { outgoing message m with type: S links i }",
+        "message m: sensor_msgs/msg/LaserScan has no field 'rages'; it has header, angle_min,",
+    ),
+    "a basic type for a message of many fields": (
+        "interface i use Range from sensor_msgs component C { outgoing message m with type: double links i }",
+        "the message sensor_msgs/msg/Range has the fields header, radiation_type,",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", MISFITS)
+def test_a_message_that_does_not_fit_the_model_is_a_start_up_error(what: str, domain: int, tmp_path: Path) -> None:
+    body, complaint = MISFITS[what]
+    supervisor = Supervisor(model_of(f"robot Misfit {{ {body} }}"), Deployment.CONTROLLER, (), CERTIFICATE)
+    write_files(generate(supervisor, "ros2"), tmp_path / "package")
+    command = ["-m", "misfit_controller.node"]
+    with RosProcess(command, environment(domain, tmp_path), tmp_path / "run", [tmp_path / "package"]) as node:
+        assert node.wait() == 2
+        (line,) = node.stderr.splitlines()
+    assert line.startswith(f"misfit_controller: {complaint}")

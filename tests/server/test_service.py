@@ -11,6 +11,7 @@ from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_api.v1 import synthesis_pb2_grpc
 from robosc_server import pool as pool_module
 from robosc_server.main import AddressError, main
+from robosc_server.pool import StartError
 from robosc_server.settings import Settings
 from support.service import FAKE_WORKER, PATIENCE_S, eventually, is_running, served
 
@@ -261,6 +262,13 @@ class TestAddress:
             main(arguments)
         assert left.value.code == 2
         assert "usage:" in capsys.readouterr().err
+
+    def test_no_workers(self):
+        with (
+            pytest.raises(StartError, match="no-such-program"),
+            served(Settings(port=0, workers=1), ["/no-such-program"]),
+        ):
+            pass
 
     def test_no_thread_is_left(self):
         with served(Settings(port=0, workers=1), FAKE_WORKER):

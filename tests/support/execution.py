@@ -3,16 +3,15 @@
 from collections.abc import Callable
 from typing import Any
 
-from support.models import example_model, model_of
-
 from robosc.execution.clock import ManualClock
 from robosc.execution.event_log import MemoryLog
-from robosc.execution.executor import Executor
+from robosc.execution.executor import Executor, Status
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.protocol import ControlledSystem, DataDoesNotFit
 from robosc.execution.settings import Settings
 from robosc.model.structure import Deployment, Model
 from robosc.supervisor.structure import AddedCondition, Certificate, Supervisor
+from support.models import example_model, model_of
 
 Sent = tuple[Any, ...]
 
@@ -128,6 +127,10 @@ class Bench:
         before = len(self.middleware.sent)
         self.executor.receive(identifier, data)
         return self.middleware.sent[before:]
+
+    def status(self) -> Status:
+        """What the executor is doing."""
+        return self.executor.status
 
     def state(self, component: str) -> str:
         """The state of a component."""

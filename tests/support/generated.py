@@ -22,9 +22,8 @@ _numbers = itertools.count()
 @cache
 def example_supervisor(name: str, deployment: Deployment = Deployment.CONTROLLER) -> Supervisor:
     """The supervisor of an example robot, such as `maze_solver/maze_solver`, through the whole pipeline."""
-    from support.models import example_bundle
-
     from robosc.supervisor import make_supervisor  # Only this needs the synthesizer.
+    from support.models import example_bundle
 
     made = make_supervisor(example_bundle(name), deployment=deployment)
     assert made.supervisor is not None, made.reason

@@ -31,6 +31,7 @@ from robosc.expressions import (
     StringType,
     Type,
     Unary,
+    Value,
     VariableRead,
     domain,
     is_finite,
@@ -71,10 +72,14 @@ CERTIFICATE = Certificate(
     transitions=None,
 )
 
-BOOLEAN, DOUBLE, STRING, INTEGER, NONE = BooleanType(), DoubleType(), StringType(), IntegerType(), NoneType()
-RANGE = IntegerType(-2, 5)
-OBJECT = ObjectType("Sample")
-INNER = ObjectType("Inner")
+BOOLEAN: Type = BooleanType()
+DOUBLE: Type = DoubleType()
+STRING: Type = StringType()
+INTEGER: Type = IntegerType()
+NONE: Type = NoneType()
+RANGE: Type = IntegerType(-2, 5)
+OBJECT: Type = ObjectType("Sample")
+INNER: Type = ObjectType("Inner")
 KIND = EnumType("Kind", ("small", "large"))
 
 KIND_DEFINITION = EnumDefinition(
@@ -145,7 +150,9 @@ def _kin(type_: Type) -> object:
 
 def _leaves(world: _World, type_: Type) -> list[Expression]:
     found: list[Expression] = [
-        VariableRead(component, variable.name) for component, variable in world.variables if _kin(variable.type) == _kin(type_)
+        VariableRead(component, variable.name)
+        for component, variable in world.variables
+        if _kin(variable.type) == _kin(type_)
     ]
     if type_ == BOOLEAN:
         found += [StateTest(component, state) for component, state in world.states]
@@ -234,7 +241,7 @@ def _communication(dice: Random, name: str, component: str, enums: Sequence[Enum
         name=name,
         component=component,
         kind=kind,
-        identifier=dice.choice(["/a", "/b/c", name, "it's \"x\"\n\\"]),
+        identifier=dice.choice(["/a", "/b/c", name, 'it\'s "x"\n\\']),
         request=None if is_outgoing else dice.choice([NONE, OBJECT, BOOLEAN, DOUBLE, INTEGER, STRING]),
         response=None if is_incoming else dice.choice(received),
         feedback=dice.choice(received) if kind is CommunicationKind.ACTION else None,
@@ -246,8 +253,8 @@ def _variable(dice: Random, name: str, enums: Sequence[EnumDefinition]) -> Varia
     type_ = dice.choice([*_types(enums), *kinds * 3])
     if is_finite(type_):
         return Variable(name, type_, dice.choice(list(domain(type_))), dice.random() < 0.6)
-    initial = {INTEGER: [0, 2**31 - 1], DOUBLE: [0.0, -2.5], STRING: ["", "it's"]}[type_]  # type: ignore[index]
-    return Variable(name, type_, dice.choice(initial), False)
+    initials: dict[Type, list[Value]] = {INTEGER: [0, 2**31 - 1], DOUBLE: [0.0, -2.5], STRING: ["", "it's"]}
+    return Variable(name, type_, dice.choice(initials[type_]), False)
 
 
 def random_supervisor(seed: int) -> Supervisor:

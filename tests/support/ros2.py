@@ -145,7 +145,7 @@ class Peer:
             # The parser of message definitions, which rclpy loads, uses a module that Python deprecates.
             warnings.simplefilter("ignore", DeprecationWarning)
             import rclpy
-            import rosidl_generator_py  # noqa: F401
+            import rosidl_generator_py  # type: ignore[import-untyped]  # noqa: F401
             from rclpy.executors import SingleThreadedExecutor
 
         self._before = {name: os.environ.get(name) for name in variables}
@@ -223,7 +223,9 @@ class Peer:
         deadline = time.monotonic() + limit_s
         next_repeat = time.monotonic()
         while not condition():
-            assert time.monotonic() < deadline, f"waited {limit_s} s in vain for {what}\n{process.stderr if process else ''}"
+            assert time.monotonic() < deadline, (
+                f"waited {limit_s} s in vain for {what}\n{process.stderr if process else ''}"
+            )
             assert process is None or process.is_running, f"the node ended\n{process.stderr if process else ''}"
             if time.monotonic() >= next_repeat:
                 repeat()

@@ -12,7 +12,7 @@ from robosc.targets.python.layout import has_plant_location
 from robosc.targets.python.provide import provide_method
 from robosc.targets.python.received import converter
 from robosc.targets.python.step import read_method, step_method
-from robosc.targets.python.text import comment, indent, printable
+from robosc.targets.python.text import indent, printable
 from robosc.targets.python.writer import Writer, make_writer
 
 _READING_FUNCTIONS = frozenset(
@@ -83,7 +83,11 @@ def _module_docstring(writer: Writer) -> list[str]:
         f"How: {printable(certificate.method)}.",
     ]
     if model.requirements:
-        lines += ["", "Requirements of the model:", *(f"  {printable(requirement_text(r))}" for r in model.requirements)]
+        lines += [
+            "",
+            "Requirements of the model:",
+            *(f"  {printable(requirement_text(r))}" for r in model.requirements),
+        ]
     return [*lines, '"""']
 
 
@@ -101,7 +105,14 @@ def _imports(writer: Writer, package: str) -> list[str]:
 def _class(writer: Writer) -> list[str]:
     model = writer.model
     requested = [item.name for item in model.communications if ("provide", item.name) in writer.layout.methods]
-    methods = [_constructor(writer), _restart(writer), *_PROTOCOL_METHODS, _location(writer), _state(writer), _signature(writer)]
+    methods = [
+        _constructor(writer),
+        _restart(writer),
+        *_PROTOCOL_METHODS,
+        _location(writer),
+        _state(writer),
+        _signature(writer),
+    ]
     methods += [allow_method(writer, event) for event in writer.layout.controllable]
     methods += [read_method(writer, event) for event in writer.layout.uncontrollable]
     methods += [step_method(writer, event) for event in (*writer.layout.controllable, *writer.layout.uncontrollable)]
@@ -137,7 +148,9 @@ def _constructor(writer: Writer) -> list[str]:
     lines = ["def __init__(self):"]
     for purpose in ("allow", "read", "step", "provide", "requirements", "conjuncts"):
         entries = tables.get(purpose, [])
-        lines += [f"    self._{purpose} = {{", *indent(entries, 2), "    }"] if entries else [f"    self._{purpose} = {{}}"]
+        lines += (
+            [f"    self._{purpose} = {{", *indent(entries, 2), "    }"] if entries else [f"    self._{purpose} = {{}}"]
+        )
     return [*lines, "    self.restart()"]
 
 

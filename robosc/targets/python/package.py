@@ -61,7 +61,9 @@ def _runtime_modules() -> dict[str, str]:
     """Copies of the modules that generated code runs on, importing each other instead of RoboSC."""
     texts = {
         "values.py": resources.files("robosc.expressions").joinpath("values.py").read_text(encoding="utf-8"),
-        "reading.py": resources.files("robosc.targets.python.runtime").joinpath("reading.py").read_text(encoding="utf-8"),
+        "reading.py": resources.files("robosc.targets.python.runtime")
+        .joinpath("reading.py")
+        .read_text(encoding="utf-8"),
     }
     for entry in sorted(resources.files("robosc.execution").iterdir(), key=lambda item: item.name):
         if entry.name.endswith(".py") and entry.name not in _NOT_COPIED:

@@ -40,7 +40,9 @@ Path = tuple[PathStep, ...]
 def received_paths(expressions: list[Expression]) -> tuple[Path, ...]:
     """Every path of received data that the expressions read, each once, in order of appearance."""
     return tuple(
-        dict.fromkeys(leaf.path for expression in expressions for leaf in leaves(expression) if isinstance(leaf, Received))
+        dict.fromkeys(
+            leaf.path for expression in expressions for leaf in leaves(expression) if isinstance(leaf, Received)
+        )
     )
 
 

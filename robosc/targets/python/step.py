@@ -98,7 +98,9 @@ class _StepWriter:
         self._name_received()
         blocks = self._blocks()
         self._copy_what_is_overwritten(blocks)
-        body = [line for component, behaviour, branches in blocks for line in self._block(component, behaviour, branches)]
+        body = [
+            line for component, behaviour, branches in blocks for line in self._block(component, behaviour, branches)
+        ]
         parameter = "" if is_controllable(self.event) else ", values"
         lines = [f"def {self.writer.layout.methods['step', self.event]}(self{parameter}):"]
         lines.append(f"    {docstring(f'Take {self.event}.')}")
@@ -158,7 +160,7 @@ class _StepWriter:
         """Find attributes that are read after a place that may write them; a superset is fine."""
         written: set[str] = set()
         overwritten: dict[str, None] = {}
-        for component, behaviour, branches in blocks:
+        for component, _, branches in blocks:
             location = self.writer.scope.location(component)
             in_block: set[str] = set()
             for _, transition in branches:

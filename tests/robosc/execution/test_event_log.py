@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.execution import bench
 
 from robosc.execution.event_log import JsonLinesLog, MemoryLog, NullLog, json_line, open_event_log
+from support.execution import bench
 
 ROBOT = """
 robot Robot {

@@ -3,11 +3,11 @@
 from typing import Any
 
 import pytest
-from support.execution import Bench, bench, system_of
 
 from robosc.execution.executor import Status
 from robosc.execution.protocol import Reading
 from robosc.execution.silent import EndlessRun, RunWatch
+from support.execution import Bench, bench, system_of
 
 SCANNER = """
 robot Scanner {
@@ -167,7 +167,7 @@ robot Livelock {
 def test_a_run_that_does_not_end_is_a_fault() -> None:
     b = bench(LIVELOCK)
     b.receive("go")
-    assert b.executor.status is Status.STOPPED
+    assert b.status() is Status.STOPPED
     assert b.executor.counters.faults == 1
     assert "do not end" in b.executor.reasons[0]
 
@@ -176,7 +176,7 @@ def test_a_restart_ends_a_livelock_for_now() -> None:
     b = bench(LIVELOCK)
     b.receive("go")
     b.executor.restart()
-    assert b.executor.status is Status.RUNNING
+    assert b.status() is Status.RUNNING
     assert b.state("A") == "calm"
 
 
@@ -204,7 +204,9 @@ def test_a_long_run_that_ends_is_no_fault() -> None:
         robot Long {{
           component A {{
             outgoing message go with type: none
-            behaviour {{ initial marked state start {{ on response from go goto s0 }} {states} marked state s200 {{ }} }}
+            behaviour {{
+              initial marked state start {{ on response from go goto s0 }} {states} marked state s200 {{ }}
+            }}
           }}
         }}
         """
@@ -243,7 +245,7 @@ def test_an_event_that_the_state_cannot_accept_is_unexpected_and_changes_nothing
     assert b.state("A") == "a"
     assert b.executor.counters.unexpected == 1
     assert [entry["event"] for entry in b.entries("unexpected")] == ["m.response"]
-    assert b.executor.status is Status.RUNNING
+    assert b.status() is Status.RUNNING
 
 
 def test_a_message_that_the_model_does_not_have_is_unexpected() -> None:
@@ -254,7 +256,7 @@ def test_a_message_that_the_model_does_not_have_is_unexpected() -> None:
 
 def test_nothing_happens_before_the_start() -> None:
     b = Bench(system_of(PLAIN), start=False)
-    assert b.executor.status is Status.NEW
+    assert b.status() is Status.NEW
     b.receive("m")
     assert b.tick() == []
     assert b.events == []

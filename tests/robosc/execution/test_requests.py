@@ -1,11 +1,9 @@
 """Semantics 3.5: when requests are issued, and with which data."""
 
-from support.execution import bench, example_system, supervisor_of, system_of
-from support.execution import Bench
-from support.models import model_of
-
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.supervisor.structure import AddedCondition, DecisionDiagram, DecisionNode
+from support.execution import Bench, bench, example_system, supervisor_of, system_of
+from support.models import model_of
 
 THREE = """
 robot Three {

@@ -3,9 +3,9 @@
 from typing import Any
 
 import pytest
-from support.execution import Bench, Sent, bench, system_of
 
 from robosc.execution.executor import Status
+from support.execution import Bench, Sent, bench, system_of
 
 ROBOT = """
 robot Robot {
@@ -66,7 +66,7 @@ def test_a_stop_sends_the_default_everywhere_and_requests_nothing() -> None:
     b.executor.stop("SIGINT")
     # Also where nothing was sent: whatever acts there must stop.
     assert b.middleware.sent == ZEROS
-    assert b.executor.status is Status.STOPPED
+    assert b.status() is Status.STOPPED
     assert b.executor.reasons == ("SIGINT",)
     assert not b.executor.is_faulty
     assert b.tick(10) == []
@@ -111,7 +111,7 @@ def test_a_call_that_cannot_be_made_stops_the_robot(request_: str, method: str) 
     assert b.tick() == ZEROS
     assert b.executor.is_faulty
     # Nothing is awaited from a call that was never made.
-    assert b.executor.status is Status.STOPPED
+    assert b.status() is Status.STOPPED
     b.middleware.failing.clear()
     b.executor.restart()
     assert b.tick()[0][:2] == ("goal" if request_ == "go" else "call", request_)
@@ -142,7 +142,7 @@ def test_an_exception_of_the_system_stops_the_robot(method: str) -> None:
     b.tick()
     assert b.executor.is_faulty
     assert b.middleware.sent[-2:] == ZEROS
-    assert b.executor.status is Status.STOPPED
+    assert b.status() is Status.STOPPED
 
 
 def test_a_default_message_that_fails_keeps_no_other_from_going_out() -> None:
@@ -162,10 +162,10 @@ def test_a_robot_that_cannot_be_brought_to_rest_is_not_restarted() -> None:
     b.middleware.failing.add("publish_default")
     b.executor.stop("SIGINT")
     b.executor.restart()
-    assert b.executor.status is Status.STOPPED
+    assert b.status() is Status.STOPPED
     b.middleware.failing.clear()
     b.executor.restart()
-    assert b.executor.status is Status.RUNNING
+    assert b.status() is Status.RUNNING
 
 
 def test_a_log_that_raises_does_not_stop_the_robot() -> None:
@@ -176,7 +176,7 @@ def test_a_log_that_raises_does_not_stop_the_robot() -> None:
 
     b.log.write = broken  # type: ignore[method-assign]
     assert b.tick() == [MOVE]
-    assert b.executor.status is Status.RUNNING
+    assert b.status() is Status.RUNNING
     assert b.executor.counters.dropped == 1
 
 
@@ -186,11 +186,11 @@ def test_running_goals_are_cancelled_and_awaited_for_half_a_second() -> None:
     b.executor.stop("SIGINT")
     assert b.middleware.sent == [*ZEROS, ("cancel", "go", 1)]
     assert b.events == ["go.request"]
-    assert b.executor.status is Status.STOPPING
+    assert b.status() is Status.STOPPING
     b.clock.advance(0.49)
-    assert b.executor.status is Status.STOPPING
+    assert b.status() is Status.STOPPING
     b.clock.advance(0.02)
-    assert b.executor.status is Status.STOPPED
+    assert b.status() is Status.STOPPED
 
 
 def test_the_goal_then_ends_as_an_error() -> None:
@@ -198,7 +198,7 @@ def test_the_goal_then_ends_as_an_error() -> None:
     b.executor.on_goal_accepted(1)
     b.executor.stop("SIGINT")
     b.executor.on_goal_ended(1, "cancelled")
-    assert b.executor.status is Status.STOPPED
+    assert b.status() is Status.STOPPED
     assert b.events == ["go.request", "go.error", "go.reset"]
 
 
@@ -229,7 +229,7 @@ def test_after_a_fault_it_stays_stopped_until_a_restart_in_the_initial_state() -
     b.executor.restart()
     assert b.middleware.sent == []
     assert b.variable("Sensor", "seen") is False
-    assert b.executor.status is Status.RUNNING
+    assert b.status() is Status.RUNNING
     assert b.executor.reasons == ()
     assert b.tick() == [MOVE]
 
@@ -264,21 +264,21 @@ def test_calls_of_the_old_run_are_forgotten() -> None:
 
 def test_nothing_is_requested_before_the_first_message_of_a_sensor_with_a_maximum_age() -> None:
     b = bench(ROBOT, policy="priority", priority=("move",), max_age_s={"/scan": 1.0})
-    assert b.executor.status is Status.WAITING
+    assert b.status() is Status.WAITING
     assert b.tick(3) == []
     b.receive("/battery", 12.0)
     assert b.tick() == []
     b.receive("/scan", True)
-    assert b.executor.status is Status.RUNNING
+    assert b.status() is Status.RUNNING
     assert b.tick() == [MOVE]
 
 
 def test_a_sensor_that_never_comes_is_stale_after_its_maximum_age() -> None:
     b = bench(ROBOT, max_age_s={"/scan": 1.0})
     b.tick(9)
-    assert b.executor.status is Status.WAITING
+    assert b.status() is Status.WAITING
     assert b.tick(2) == ZEROS * 2
-    assert b.executor.status is Status.STOPPED
+    assert b.status() is Status.STOPPED
     assert not b.executor.is_faulty
 
 
@@ -287,12 +287,12 @@ def test_a_stale_sensor_stops_the_robot_and_its_return_ends_that() -> None:
     b.receive("/scan", True)
     assert b.tick(2) == [MOVE, MOVE]
     assert b.tick() == ZEROS * 2
-    assert b.executor.status is Status.STOPPED
+    assert b.status() is Status.STOPPED
     assert len(b.executor.reasons) == 2
     assert "stale" in b.executor.reasons[0]
     assert b.tick(3) == []
     b.receive("/scan", True)
-    assert b.executor.status is Status.RUNNING
+    assert b.status() is Status.RUNNING
     assert b.tick() == [MOVE]
     assert b.executor.counters.faults == 0
 
@@ -322,9 +322,9 @@ def test_a_late_message_is_stale_even_if_no_period_passed() -> None:
 def test_a_restart_waits_for_the_sensors_again() -> None:
     b = bench(ROBOT, max_age_s={"/scan": 1.0})
     b.receive("/scan", True)
-    assert b.executor.status is Status.RUNNING
+    assert b.status() is Status.RUNNING
     b.executor.restart()
-    assert b.executor.status is Status.WAITING
+    assert b.status() is Status.WAITING
 
 
 def test_a_stop_before_the_start_holds_afterwards() -> None:

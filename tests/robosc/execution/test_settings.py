@@ -1,9 +1,9 @@
 from typing import Any
 
 import pytest
-from support.execution import bench, system_of
 
 from robosc.execution.settings import Settings, SettingsError, settings_for, settings_from
+from support.execution import bench, system_of
 
 ROBOT = """
 robot Robot {

@@ -1,7 +1,5 @@
 """Writing generated files: nothing of the user's is lost, nothing leaves the folder, the same text twice is quiet."""
 
-import json
-import os
 import stat
 from pathlib import Path
 
@@ -51,11 +49,17 @@ def test_files_are_written_with_their_modes(tmp_path: Path) -> None:
     assert stat.S_IMODE((tmp_path / "out/deep/er/data.txt").stat().st_mode) == 0o644
 
 
-def test_unchanged_files_are_replaced_and_obsolete_ones_removed(tmp_path: Path) -> None:
-    write_files(GeneratedFiles({"a": "1", "old/b": "2"}), tmp_path)
+def test_unchanged_files_are_replaced(tmp_path: Path) -> None:
+    write_files(GeneratedFiles({"a": "1", "b": "2"}), tmp_path)
     write_files(GeneratedFiles({"a": "3", "c": "4"}), tmp_path)
-    assert contents(tmp_path) == {"a": "3", "c": "4"}
-    assert not (tmp_path / "old").exists()
+    assert contents(tmp_path) == {"a": "3", "b": "2", "c": "4"}
+
+
+def test_several_packages_may_stand_in_one_folder(tmp_path: Path) -> None:
+    write_files(GeneratedFiles({"one/a": "1"}), tmp_path)
+    write_files(GeneratedFiles({"two/b": "2"}), tmp_path)
+    write_files(GeneratedFiles({"one/a": "3"}), tmp_path)
+    assert contents(tmp_path) == {"one/a": "3", "two/b": "2"}
 
 
 def test_a_changed_file_stops_everything(tmp_path: Path) -> None:
@@ -75,13 +79,6 @@ def test_a_file_that_was_never_generated_is_not_overwritten(tmp_path: Path) -> N
     with pytest.raises(OverwriteError):
         write_files(GeneratedFiles({"a": "1"}), tmp_path)
     assert contents(tmp_path) == {"a": "mine"}
-
-
-def test_a_changed_obsolete_file_stays(tmp_path: Path) -> None:
-    write_files(GeneratedFiles({"a": "1", "b": "2"}), tmp_path)
-    (tmp_path / "b").write_text("mine")
-    write_files(GeneratedFiles({"a": "1"}), tmp_path)
-    assert contents(tmp_path) == {"a": "1", "b": "mine"}
 
 
 def test_writing_the_same_again_touches_nothing(tmp_path: Path) -> None:
@@ -113,17 +110,6 @@ def test_a_broken_manifest_means_that_nothing_is_known(tmp_path: Path, manifest:
         write_files(GeneratedFiles({"a": "1"}), tmp_path)
 
 
-def test_a_manifest_cannot_delete_outside_the_folder(tmp_path: Path) -> None:
-    outside = tmp_path / "outside"
-    outside.write_text("mine")
-    folder = tmp_path / "out"
-    write_files(GeneratedFiles({"a": "mine"}), folder)
-    digest = json.loads((folder / MANIFEST).read_text())["files"]["a"]
-    (folder / MANIFEST).write_text(json.dumps({"version": 1, "files": {"../outside": digest, str(outside): digest}}))
-    write_files(GeneratedFiles({"a": "mine"}), folder)
-    assert outside.read_text() == "mine"
-
-
 def test_a_linked_folder_is_not_followed(tmp_path: Path) -> None:
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "out").mkdir()
@@ -144,7 +130,7 @@ def test_a_linked_file_is_replaced_not_written_through(tmp_path: Path) -> None:
 
 def test_a_place_that_cannot_be_written_is_one_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(OverwriteError, match="cannot write to .*not a directory"):
+    with pytest.raises(OverwriteError, match=r"cannot write to .*not a directory"):
         write_files(GeneratedFiles({"a": "1"}), tmp_path / "file")
 
 
@@ -155,4 +141,4 @@ def test_a_failed_write_leaves_no_temporary_file(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(Path, "replace", fail)
     with pytest.raises(OverwriteError, match="no space left"):
         write_files(GeneratedFiles({"a": "1"}), tmp_path)
-    assert os.listdir(tmp_path) == []
+    assert not list(tmp_path.iterdir())

@@ -11,9 +11,6 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.generated import example_supervisor, imported, load_system, python_text, same
-from support.models import EXAMPLE_NAMES, model_of
-from support.random_supervisors import CERTIFICATE, random_data, random_supervisor
 
 from robosc.errors import UnsupportedModelError
 from robosc.execution.clock import ManualClock
@@ -35,6 +32,9 @@ from robosc.model.structure import (
 from robosc.supervisor.structure import Supervisor
 from robosc.targets import GenerateOptions, generate
 from robosc.targets.python.layout import events, is_controllable
+from support.generated import example_supervisor, imported, load_system, python_text, same
+from support.models import EXAMPLE_NAMES, model_of
+from support.random_supervisors import CERTIFICATE, random_data, random_supervisor
 
 STEPS = 25
 FULL_SCAN = {"ranges": [1.0] * 360}
@@ -131,7 +131,8 @@ def test_the_random_supervisors_show_everything() -> None:
 def test_an_example_behaves_as_interpreted(name: str, deployment: Deployment) -> None:
     twins = Twins(example_supervisor(name, deployment))
     twins.run(Random(1), 200)
-    for data in (FULL_SCAN, {"ranges": [0.1] * 360}, {"ranges": []}, None, {"success": True}, 0.7, 2.0):
+    samples: tuple[Any, ...] = (FULL_SCAN, {"ranges": [0.1] * 360}, {"ranges": []}, None, {"success": True}, 0.7, 2.0)
+    for data in samples:
         for event in events(twins.model):
             twins.step(event, data)
             twins.compare()
@@ -228,9 +229,10 @@ def test_the_package_drives_an_executor_of_its_own(tmp_path: Path) -> None:
         def publish_default(self, identifier: str) -> None:
             sent.append((identifier, None))
 
-    with imported(files, tmp_path, "follower.supervisor") as module, imported(
-        files, tmp_path, "follower.runtime.executor"
-    ) as runtime:
+    with (
+        imported(files, tmp_path, "follower.supervisor") as module,
+        imported(files, tmp_path, "follower.runtime.executor") as runtime,
+    ):
         log, clock = MemoryLog(), ManualClock()
         executor = runtime.Executor(module.Supervisor(), Middleware(), None, clock, log)
         executor.start()

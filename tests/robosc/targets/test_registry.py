@@ -1,9 +1,9 @@
 """The registry of targets."""
 
 import importlib.metadata
+from typing import Any
 
 import pytest
-from support.generated import example_supervisor
 
 from robosc.targets import (
     GeneratedFiles,
@@ -13,10 +13,11 @@ from robosc.targets import (
     available_targets,
     generate,
     register,
+    registry,
     require_target,
 )
-from robosc.targets import registry
 from robosc.targets.registry import Target
+from support.generated import example_supervisor
 
 
 @pytest.fixture(autouse=True)
@@ -35,9 +36,9 @@ def test_the_list_says_what_the_targets_themselves_say() -> None:
 
 
 def test_an_unknown_target_is_one_clear_error() -> None:
-    with pytest.raises(UnknownTargetError, match="^unknown target 'ros3'; did you mean 'ros2'\\?$"):
+    with pytest.raises(UnknownTargetError, match=r"^unknown target 'ros3'; did you mean 'ros2'\?$"):
         require_target("ros3")
-    with pytest.raises(UnknownTargetError, match="^unknown target 'cobol'; there is python, ros2$"):
+    with pytest.raises(UnknownTargetError, match=r"^unknown target 'cobol'; there is python, ros2$"):
         generate(example_supervisor("line_follower/line_follower"), "cobol")
 
 
@@ -48,7 +49,10 @@ def test_a_registered_target_is_used() -> None:
     register(Target(TargetInfo("text", "a text"), make))
     assert [info.name for info in available_targets()] == ["python", "ros2", "text"]
     assert generate(example_supervisor("line_follower/line_follower"), "text")["name.txt"] == "none"
-    assert generate(example_supervisor("line_follower/line_follower"), "text", GenerateOptions(package="x"))["name.txt"] == "x"
+    assert (
+        generate(example_supervisor("line_follower/line_follower"), "text", GenerateOptions(package="x"))["name.txt"]
+        == "x"
+    )
 
 
 def test_a_plug_in_is_found_by_its_entry_point(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -56,14 +60,16 @@ def test_a_plug_in_is_found_by_its_entry_point(monkeypatch: pytest.MonkeyPatch) 
         return importlib.metadata.EntryPoint("plug", value, registry.ENTRY_POINT_GROUP)
 
     def find(value: str) -> None:
-        def entry_points(group: str, **wanted: str) -> importlib.metadata.EntryPoints:
+        def entry_points(group: str, **wanted: Any) -> importlib.metadata.EntryPoints:
             return importlib.metadata.EntryPoints([entry(value)]).select(**wanted)
 
         monkeypatch.setattr(registry, "entry_points", entry_points)
 
     find("robosc.targets.python:TARGET")
     assert TargetInfo("plug", "plug-in robosc.targets.python:TARGET") in available_targets()
-    assert "line_follower_supervisor/supervisor.py" in generate(example_supervisor("line_follower/line_follower"), "plug")
+    assert "line_follower_supervisor/supervisor.py" in generate(
+        example_supervisor("line_follower/line_follower"), "plug"
+    )
     find("json:dumps")
     with pytest.raises(UnknownTargetError, match="plug-in of target 'plug'"):
         generate(example_supervisor("line_follower/line_follower"), "plug")

@@ -64,9 +64,24 @@ def test_shapes_that_fit(package: str, name: str, shape: Any) -> None:
     ("package", "name", "shape", "problem"),
     [
         ("geometry_msgs", "Twist", {"liniar": VECTOR}, "has no field 'liniar'; it has linear, angular"),
-        ("geometry_msgs", "Twist", {"linear": {"w": "double"}}, "Twist has no field 'linear.w'|has no field 'linear.w'"),
-        ("geometry_msgs", "Twist", {"linear": "double"}, "field 'linear' .* geometry_msgs/Vector3, in the model it is double"),
-        ("geometry_msgs", "Twist", {"linear": {"x": {"y": "double"}}}, "'linear.x' .* is double, in the model it is an object"),
+        (
+            "geometry_msgs",
+            "Twist",
+            {"linear": {"w": "double"}},
+            "Twist has no field 'linear.w'|has no field 'linear.w'",
+        ),
+        (
+            "geometry_msgs",
+            "Twist",
+            {"linear": "double"},
+            "field 'linear' .* geometry_msgs/Vector3, in the model it is double",
+        ),
+        (
+            "geometry_msgs",
+            "Twist",
+            {"linear": {"x": {"y": "double"}}},
+            "'linear.x' .* is double, in the model it is an object",
+        ),
         ("geometry_msgs", "Twist", {"linear": {"x": "integer"}}, "'linear.x' .* is double, in the model it is integer"),
         ("sensor_msgs", "LaserScan", {"ranges": "double"}, "'ranges' .* sequence<float>, in the model it is double"),
         ("sensor_msgs", "LaserScan", {"ranges": ["integer"]}, "'ranges' .* is float, in the model it is integer"),
@@ -99,9 +114,9 @@ def test_integers_must_fit(field_type: str, good: tuple[int, ...], bad: tuple[in
     convert = converter(field_type, "integer")
     for value in good:
         assert convert(value) == value
-    for value in (*bad, 1.5, "1", None, True):
+    for misfit in (*bad, 1.5, "1", None, True):
         with pytest.raises(DataDoesNotFit):
-            convert(value)
+            convert(misfit)
 
 
 def test_numbers_must_be_finite_and_fit() -> None:

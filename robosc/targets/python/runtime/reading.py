@@ -61,7 +61,7 @@ def clamped(value: Any, low: int, high: int) -> Any:
 def moved(path: str, value: Any, low: int, high: int) -> Any:
     """In words, that a received integer was moved into its declared range; no words if it was not."""
     if value < low or value > high:
-        return ("{} is {}, outside {}..{}".format(path, value, low, high),)
+        return (f"{path} is {value}, outside {low}..{high}",)
     return ()
 
 

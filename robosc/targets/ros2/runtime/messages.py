@@ -13,11 +13,12 @@ from __future__ import annotations
 
 import importlib
 import re
-from typing import Any, Callable, Dict, List, NamedTuple, Optional, Tuple  # noqa: UP035  # Python 3.8
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 from robosc.execution.protocol import DataDoesNotFit
 
-Path = Tuple[str, ...]
+Path = tuple[str, ...]
 
 MAXIMUM_FLOAT32 = 3.4028234663852886e38
 _INFINITY = float("inf")
@@ -40,8 +41,8 @@ class Topic(NamedTuple):
     identifier: str
     package: str
     type: str
-    published: Tuple[str, ...]
-    received: Tuple[str, ...]
+    published: tuple[str, ...]
+    received: tuple[str, ...]
 
 
 class SetupError(Exception):
@@ -58,7 +59,7 @@ def load_message(package: str, name: str) -> Any:
         return getattr(importlib.import_module(package + ".msg"), name)
     except (ImportError, AttributeError) as error:
         raise SetupError(
-            "the message type {0}/msg/{1} is not installed; build {0} and source its workspace".format(package, name)
+            f"the message type {package}/msg/{name} is not installed; build {package} and source its workspace"
         ) from error
 
 
@@ -104,7 +105,7 @@ def check_shape(message_class: Any, shape: Any, subject: str) -> None:
         _check_field(field_type, shape, subject, message_class, (name,))
 
 
-def _check_object(message_class: Any, shape: Dict[str, Any], subject: str, path: Path) -> None:
+def _check_object(message_class: Any, shape: dict[str, Any], subject: str, path: Path) -> None:
     fields = message_class.get_fields_and_field_types()
     for name, inner in shape.items():
         if name not in fields:
@@ -167,7 +168,7 @@ def converter(field_type: str, shape: str) -> Callable[[Any], Any]:
         return _to_float(MAXIMUM_FLOAT32 if field_type == "float" else None)
     match = _INTEGER.match(field_type)
     if match is None:
-        raise SetupError("no integer fits into a field of type {}".format(field_type))
+        raise SetupError(f"no integer fits into a field of type {field_type}")
     bits = int(match.group(2))
     return _to_integer(0, 2**bits - 1) if match.group(1) else _to_integer(-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
 
@@ -175,36 +176,36 @@ def converter(field_type: str, shape: str) -> Callable[[Any], Any]:
 def _to_boolean(value: Any) -> bool:
     if value is True or value is False:
         return bool(value)
-    raise DataDoesNotFit("{!r} is not a boolean".format(value))
+    raise DataDoesNotFit(f"{value!r} is not a boolean")
 
 
 def _to_any_string(value: Any) -> str:
     if isinstance(value, str):
         return value
-    raise DataDoesNotFit("{!r} is not a string".format(value))
+    raise DataDoesNotFit(f"{value!r} is not a string")
 
 
 def _to_string(bound: int) -> Callable[[Any], str]:
     def convert(value: Any) -> str:
         text = _to_any_string(value)
         if len(text.encode("utf-8", "surrogatepass")) > bound:
-            raise DataDoesNotFit("a string of more than {} bytes".format(bound))
+            raise DataDoesNotFit(f"a string of more than {bound} bytes")
         return text
 
     return convert
 
 
-def _to_float(limit: Optional[float]) -> Callable[[Any], float]:
+def _to_float(limit: float | None) -> Callable[[Any], float]:
     greatest = limit if limit is not None else _INFINITY
 
     def convert(value: Any) -> float:
         if not isinstance(value, (int, float)) or value is True or value is False:
-            raise DataDoesNotFit("{!r} is not a number".format(value))
+            raise DataDoesNotFit(f"{value!r} is not a number")
         number = float(value)
         # False for NaN, too.
         if -greatest <= number <= greatest and -_INFINITY < number < _INFINITY:
             return number
-        raise DataDoesNotFit("{!r} does not fit into the field".format(number))
+        raise DataDoesNotFit(f"{number!r} does not fit into the field")
 
     return convert
 
@@ -212,10 +213,10 @@ def _to_float(limit: Optional[float]) -> Callable[[Any], float]:
 def _to_integer(low: int, high: int) -> Callable[[Any], int]:
     def convert(value: Any) -> int:
         if not isinstance(value, int) or value is True or value is False:
-            raise DataDoesNotFit("{!r} is not an integer".format(value))
+            raise DataDoesNotFit(f"{value!r} is not an integer")
         if low <= value <= high:
             return value
-        raise DataDoesNotFit("{} is outside {}..{}".format(value, low, high))
+        raise DataDoesNotFit(f"{value} is outside {low}..{high}")
 
     return convert
 
@@ -247,11 +248,11 @@ class Sender:
         SetupError: The message does not fit the model.
     """
 
-    def __init__(self, message_class: Any, shape: Any, paths: Tuple[Path, ...], subject: str) -> None:
+    def __init__(self, message_class: Any, shape: Any, paths: tuple[Path, ...], subject: str) -> None:
         check_shape(message_class, shape, subject)
         self.message = message_class()
         self.is_default = True
-        self._slots: List[_Slot] = [_slot(self.message, shape, path) for path in paths]
+        self._slots: list[_Slot] = [_slot(self.message, shape, path) for path in paths]
 
     def fill(self, data: Any) -> None:
         """Put data into the message; what it does not mention gets its default.
@@ -295,7 +296,7 @@ def _slot(message: Any, shape: Any, path: Path) -> _Slot:
     return _Slot(path, owner, names[-1], converter(field_type, inner), getattr(owner, names[-1]))
 
 
-def received_field(message_class: Any, shape: Any, subject: str) -> Optional[str]:
+def received_field(message_class: Any, shape: Any, subject: str) -> str | None:
     """The field of a received message that holds the model's datum; None if the whole message does.
 
     Raises:

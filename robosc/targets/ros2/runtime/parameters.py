@@ -6,7 +6,8 @@ A copy of this module stands in generated packages, which run on Python 3.8 and 
 from __future__ import annotations
 
 import re
-from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple  # noqa: UP035  # Python 3.8
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 from robosc.execution.protocol import Description
 from robosc.execution.settings import Settings, SettingsError, settings_for
@@ -47,19 +48,19 @@ class Parameters(NamedTuple):
     publish_state: bool
 
 
-def declarations(release_identifiers: Sequence[str]) -> Tuple[Parameter, ...]:
+def declarations(release_identifiers: Sequence[str]) -> tuple[Parameter, ...]:
     """Every parameter, given the release identifiers that the model suggests."""
     return (
         Parameter("period", 0.1, "Seconds between decisions: at most one request is issued each time."),
-        Parameter("policy", "fair", "Which enabled request is issued: fair, priority (the list below, then fair), random."),
+        Parameter("policy", "fair", "Which enabled request is issued: fair, random, priority (the list, then fair)."),
         Parameter("priority", [""], "Messages in order of urgency, for the policy priority."),
         Parameter("seed", 0, "Seed of the policy random."),
         Parameter("every", "period", "When to decide: each period, or after each event as well (event)."),
         Parameter(
             "release_identifiers",
             list(release_identifiers) or [""],
-            "Topics that keep acting after a message (velocities): the all-default message is sent there as soon as the "
-            'last one is no longer allowed, and at every stop; [""] for none.',
+            "Topics that keep acting after a message (velocities): the all-default message is sent there as soon as "
+            'the last one is no longer allowed, and at every stop; [""] for none.',
         ),
         Parameter(
             "max_age",
@@ -104,7 +105,7 @@ def validate(given: Mapping[str, Any], description: Description) -> Parameters:
     except SettingsError as error:
         raise ParameterError(_in_words_of_parameters(str(error))) from error
     if checked.period_s > MAXIMUM_PERIOD_S:
-        raise _wrong("period", checked.period_s, "at most {:g} seconds".format(MAXIMUM_PERIOD_S))
+        raise _wrong("period", checked.period_s, f"at most {MAXIMUM_PERIOD_S:g} seconds")
     return Parameters(checked, _prefix(given), _text(given, "log_folder"), _boolean(given, "publish_state"))
 
 
@@ -115,7 +116,7 @@ def _in_words_of_parameters(text: str) -> str:
 
 
 def _wrong(name: str, value: Any, expected: str) -> ParameterError:
-    return ParameterError("parameter '{}' is {!r}; it must be {}".format(name, value, expected))
+    return ParameterError(f"parameter '{name}' is {value!r}; it must be {expected}")
 
 
 def _boolean(given: Mapping[str, Any], name: str) -> bool:
@@ -132,16 +133,16 @@ def _text(given: Mapping[str, Any], name: str) -> str:
     return value
 
 
-def _texts(given: Mapping[str, Any], name: str) -> Tuple[str, ...]:
+def _texts(given: Mapping[str, Any], name: str) -> tuple[str, ...]:
     """A list of strings without the empty ones: ROS parameter files know no empty list."""
     value = given[name]
     if not isinstance(value, (list, tuple)) or not all(isinstance(item, str) for item in value):
         raise _wrong(name, value, "a list of strings")
-    texts: List[str] = [item for item in value if item]
+    texts: list[str] = [item for item in value if item]
     return tuple(texts)
 
 
-def _ages(given: Mapping[str, Any]) -> Dict[str, float]:
+def _ages(given: Mapping[str, Any]) -> dict[str, float]:
     ages = {}
     for entry in _texts(given, "max_age"):
         identifier, _, text = entry.rpartition("=")
@@ -152,7 +153,7 @@ def _ages(given: Mapping[str, Any]) -> Dict[str, float]:
     return ages
 
 
-def _number(text: str) -> Optional[float]:
+def _number(text: str) -> float | None:
     try:
         return float(text)
     except ValueError:

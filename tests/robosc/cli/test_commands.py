@@ -1,0 +1,261 @@
+"""The commands as a user runs them: what is printed, where, and with which exit status."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from robosc.cli.main import main
+from robosc.supervisor import decode
+from support.models import EXAMPLES
+
+LINE_FOLLOWER = str(EXAMPLES / "line_follower" / "line_follower.rscd")
+NAVIGATION = str(EXAMPLES / "navigation" / "navigation.rscd")
+
+EMPTY = """robot R {
+    component C {
+        outgoing message broken with type: none
+        behaviour {
+            initial marked state fine { on response from broken goto lost }
+            state lost { transition if value_seen goto fine }
+            variable value_seen: boolean
+        }
+    }
+}"""
+
+
+@pytest.fixture
+def empty(tmp_path: Path) -> str:
+    path = tmp_path / "empty.rscd"
+    path.write_text(EMPTY, encoding="utf-8")
+    return str(path)
+
+
+@pytest.fixture
+def broken(tmp_path: Path) -> str:
+    path = tmp_path / "broken.rscd"
+    path.write_text("robot R {\n  requirement go needs\n    Nobody.here\n}\n", encoding="utf-8")
+    return str(path)
+
+
+def run_json(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, dict[str, Any]]:
+    status = main([*arguments, "--json"])
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    document = json.loads(captured.out)
+    assert isinstance(document, dict)
+    return status, document
+
+
+def test_check_of_a_sound_model(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", LINE_FOLLOWER]) == 0
+    assert capsys.readouterr().out == f"{LINE_FOLLOWER}: no findings\n"
+
+
+def test_check_prints_every_finding_with_its_place(capsys: pytest.CaptureFixture[str], broken: str) -> None:
+    assert main(["check", broken]) == 1
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    lines = captured.err.splitlines()
+    assert lines[0] == "broken.rscd:2:15: error: unknown communication 'go' [unknown-name]"
+    assert lines[1:3] == ["  |   requirement go needs", "  |               ^^"]
+    assert lines[3].startswith("  = mend: ")
+    assert lines[-1] == "2 errors"
+
+
+def test_check_json(capsys: pytest.CaptureFixture[str], broken: str) -> None:
+    status, document = run_json(capsys, "check", broken)
+    assert status == 1
+    assert (document["errors"], document["warnings"], document["notes"]) == (2, 0, 0)
+    first = document["diagnostics"][0]
+    assert (first["code"], first["file"], first["line"], first["column"], first["length"]) == (
+        "unknown-name", "broken.rscd", 2, 15, 2,
+    )  # fmt: skip
+
+
+def test_strict_makes_warnings_count(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", NAVIGATION]) == 0
+    assert main(["check", "--strict", NAVIGATION]) == 1
+    assert "may-leave-range" in capsys.readouterr().err
+
+
+def test_synth_prints_a_summary_and_writes_the_supervisor(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    target = tmp_path / "nav.rsup"
+    assert main(["synth", NAVIGATION, "-o", str(target)]) == 0
+    output = capsys.readouterr().out
+    assert "16: 9 controllable, 7 not" in output
+    assert "784 states, 4792 transitions" in output
+    assert "navigate.request    Navigator.failures <= 2" in output
+    assert "maximally permissive  passed" in output
+    supervisor = decode(target.read_bytes())
+    assert supervisor.model.name == "Navigation"
+    assert [path.name for path in tmp_path.iterdir()] == ["nav.rsup"]
+
+
+def test_synth_json_and_both_engines_write_the_same_bytes(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    contents = []
+    for engine in ("cudd", "autoref"):
+        target = tmp_path / f"{engine}.rsup"
+        status, document = run_json(capsys, "synth", LINE_FOLLOWER, "-o", str(target), "--engine", engine)
+        assert (status, document["status"], document["summary"]["states"]) == (0, "supervisor", 16)
+        contents.append(target.read_bytes())
+    assert contents[0] == contents[1]
+
+
+def test_the_layer_is_another_supervisor(capsys: pytest.CaptureFixture[str]) -> None:
+    status, document = run_json(capsys, "synth", NAVIGATION, "--deployment", "layer")
+    assert status == 0
+    assert document["summary"]["deployment"] == "layer"
+    assert document["summary"]["events"] == {"controllable": 8, "uncontrollable": 8}
+
+
+@pytest.mark.parametrize("command", [["synth"], ["explore"], ["generate", "--target", "python", "-o", "{folder}"]])
+def test_an_empty_supervisor_is_a_result_with_a_reason(
+    capsys: pytest.CaptureFixture[str], empty: str, tmp_path: Path, command: list[str]
+) -> None:
+    folder = tmp_path / "out"
+    arguments = [part.format(folder=folder) for part in command]
+    assert main([*arguments, empty]) == 1
+    assert "no supervisor exists: " in capsys.readouterr().err
+    status, document = run_json(capsys, *arguments, empty)
+    assert (status, document["status"]) == (1, "empty")
+    assert document["reason"]
+    assert not folder.exists()
+
+
+@pytest.mark.parametrize("command", [["synth"], ["explore"], ["generate", "--target", "ros2", "-o", "{folder}"]])
+def test_errors_of_the_model_stop_every_command(
+    capsys: pytest.CaptureFixture[str], broken: str, tmp_path: Path, command: list[str]
+) -> None:
+    arguments = [part.format(folder=tmp_path / "out") for part in command]
+    assert main([*arguments, broken]) == 1
+    assert "2 errors" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_library_has_no_supervisor(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "lib.rscd"
+    path.write_text("library L { component C { incoming message m with type: none } }", encoding="utf-8")
+    assert main(["check", str(path)]) == 0
+    assert main(["synth", str(path)]) == 1
+    assert "a library has no robot" in capsys.readouterr().err
+
+
+def test_explore_prints_the_graph(capsys: pytest.CaptureFixture[str]) -> None:
+    status, document = run_json(capsys, "explore", LINE_FOLLOWER)
+    assert status == 0
+    assert sorted(document) == ["initial", "states", "transitions"]
+    initial = document["states"][document["initial"]]
+    assert initial["components"]["LineDetector"] == "no_line"
+    assert initial["variables"] == {"LidarSensor.ahead": "obstructed"}
+    assert "halt.request" in initial["enabled"]
+    assert "move.request" not in initial["enabled"]
+    assert main(["explore", LINE_FOLLOWER, "--dot"]) == 0
+    assert capsys.readouterr().out.startswith("digraph")
+    assert main(["explore", LINE_FOLLOWER, "--limit", "3"]) == 1
+    assert "more than 3" in capsys.readouterr().err
+
+
+def test_generate_writes_a_package_and_keeps_what_a_user_changed(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    folder = tmp_path / "out"
+    arguments = ["generate", LINE_FOLLOWER, "--target", "ros2", "-o", str(folder)]
+    status, document = run_json(capsys, *arguments)
+    assert status == 0
+    assert str(folder / "line_follower_controller" / "node.py") in document["files"]
+    assert main(arguments) == 0
+    parameters = folder / "config" / "parameters.yaml"
+    parameters.write_text("changed: true\n", encoding="utf-8")
+    capsys.readouterr()
+    assert main(arguments) == 1
+    assert "parameters.yaml" in capsys.readouterr().err
+    assert parameters.read_text(encoding="utf-8") == "changed: true\n"
+    assert main([*arguments, "--force"]) == 0
+    assert parameters.read_text(encoding="utf-8") != "changed: true\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["check", "{folder}/nothing.rscd"], "there is no file"),
+        (["check", "{folder}"], "is a folder"),
+        (["check", LINE_FOLLOWER, "-L", "{folder}/nowhere"], "there is no library folder"),
+        (["synth", LINE_FOLLOWER, "-o", "{folder}/no/such/place.rsup"], "cannot write"),
+    ],
+)
+def test_wrong_use_is_one_line_and_status_2(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, arguments: list[str], words: str
+) -> None:
+    assert main([part.format(folder=tmp_path) for part in arguments]) == 2
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert error.startswith("robosc: ")
+    assert words in error
+
+
+@pytest.mark.parametrize("arguments", [[], ["chek"], ["explore", LINE_FOLLOWER, "--limit", "0"], ["check"]])
+def test_the_parser_refuses_with_status_2(capsys: pytest.CaptureFixture[str], arguments: list[str]) -> None:
+    with pytest.raises(SystemExit) as raised:
+        main(arguments)
+    assert raised.value.code == 2
+    assert "usage: robosc" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("status", "arguments", "words"),
+    [
+        (2, ["synth", LINE_FOLLOWER, "--engine", "magic"], "unknown engine 'magic'"),
+        (2, ["generate", LINE_FOLLOWER, "--target", "ros", "-o", "x"], "unknown target 'ros'"),
+        (1, ["generate", NAVIGATION, "--target", "ros2", "-o", "x"], "'calibrate' of Localisation is a service"),
+    ],
+)
+def test_what_is_not_to_be_had_is_said(
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    words: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == status
+    assert words in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_installed_command_and_a_closed_pipe(tmp_path: Path) -> None:
+    robosc = Path(sys.executable).with_name("robosc")
+    result = subprocess.run(
+        [str(robosc), "check", LINE_FOLLOWER], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (result.returncode, result.stderr) == (0, "")
+    read, write = os.pipe()
+    os.close(read)
+    try:
+        result = subprocess.run(
+            [str(robosc), "explore", NAVIGATION],
+            stdout=write,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+    finally:
+        os.close(write)
+    assert "Traceback" not in result.stderr
+    assert "BrokenPipe" not in result.stderr
+
+
+def test_what_check_does_not_need_is_not_imported() -> None:
+    """A cold start pays only for what a command uses."""
+    code = (
+        "import sys; from robosc.cli.main import main; main(['check', sys.argv[1]]);"
+        "print([m for m in ('dd', 'jinja2', 'robosc.synthesis', 'robosc.execution') if m in sys.modules])"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", code, LINE_FOLLOWER], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert result.stdout.splitlines()[-1] == "[]"

@@ -1,0 +1,434 @@
+"""The generated ROS 2 package: its files are what colcon, launch and a reader expect; what is refused is named."""
+
+import ast
+import importlib.util
+import re
+import subprocess
+import sys
+import types
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from robosc.errors import UnsupportedModelError
+from robosc.execution.interpreter import InterpretedSystem, describe
+from robosc.model.structure import Deployment
+from robosc.supervisor.structure import Supervisor
+from robosc.targets import GeneratedFiles, GenerateOptions, generate, write_files
+from robosc.targets.ros2.runtime.parameters import ParameterError, declarations, prefixed, validate
+from robosc.targets.ros2.state_topic import state_topic
+from support.generated import example_supervisor, imported
+from support.models import model_of
+from support.random_supervisors import CERTIFICATE
+
+yaml = pytest.importorskip("yaml", reason="PyYAML, a part of ROS 2, is not installed")
+
+PACKAGE = "line_follower_controller"
+FOLLOWER = "line_follower/line_follower"
+MAZE = "maze_solver/maze_solver"
+
+
+def supervisor_of(text: str) -> Supervisor:
+    """A supervisor that adds nothing to a model's text."""
+    return Supervisor(model_of(text), Deployment.CONTROLLER, (), CERTIFICATE)
+
+
+def robot(body: str, name: str = "Robot") -> Supervisor:
+    return supervisor_of(f"robot {name} {{ {body} }}")
+
+
+@pytest.fixture(scope="module")
+def files() -> GeneratedFiles:
+    return generate(example_supervisor(FOLLOWER), "ros2")
+
+
+@pytest.fixture
+def folder(files: GeneratedFiles, tmp_path: Path) -> Path:
+    write_files(files, tmp_path)
+    return tmp_path
+
+
+def test_everything_that_a_package_needs_is_there(files: GeneratedFiles) -> None:
+    assert {
+        "README.md",
+        "config/parameters.yaml",
+        "launch/controller.launch.py",
+        "package.xml",
+        f"resource/{PACKAGE}",
+        "setup.cfg",
+        "setup.py",
+        "test/test_supervisor.py",
+        f"{PACKAGE}/__init__.py",
+        f"{PACKAGE}/node.py",
+        f"{PACKAGE}/supervisor.py",
+        f"{PACKAGE}/runtime/executor.py",
+    } <= set(files)
+
+
+@pytest.mark.parametrize("name", [FOLLOWER, MAZE])
+def test_python_files_run_on_3_8_and_name_nothing_undefined(name: str, tmp_path: Path) -> None:
+    package = generate(example_supervisor(name), "ros2")
+    write_files(package, tmp_path)
+    for path, text in package.items():
+        if path.endswith(".py"):
+            ast.parse(text, filename=path, feature_version=(3, 8))
+            assert not re.search(r"^\s*(from|import) robosc", text, re.MULTILINE), path
+    ruff = [sys.executable, "-m", "ruff", "check", "--isolated", "--select", "F,E4,E7,E9,B,PLE", str(tmp_path)]
+    result = subprocess.run(ruff, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stdout
+
+
+def test_the_same_supervisor_gives_the_same_bytes(files: GeneratedFiles) -> None:
+    again = example_supervisor.__wrapped__(FOLLOWER, Deployment.CONTROLLER)
+    assert generate(again, "ros2") == files
+
+
+def test_package_xml(files: GeneratedFiles) -> None:
+    root = ElementTree.fromstring(files["package.xml"])
+    assert root.get("format") == "3"
+    assert root.findtext("name") == PACKAGE
+    assert re.fullmatch(r"[^@ ]+@[a-z]+\.[a-z]{2,}", root.find("maintainer").get("email"))  # type: ignore[union-attr, arg-type]
+    assert {"rclpy", "geometry_msgs", "sensor_msgs", "std_msgs"} <= {item.text for item in root.findall("exec_depend")}
+    assert root.findtext("export/build_type") == "ament_python"
+
+
+def test_setup_py_installs_what_is_there(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    given: dict[str, Any] = {}
+    stub = types.ModuleType("setuptools")
+    stub.setup = lambda **arguments: given.update(arguments)  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "setuptools", stub)
+    monkeypatch.chdir(folder)
+    exec(compile((folder / "setup.py").read_text(), "setup.py", "exec"), {"__name__": "__main__"})
+    assert given["name"] == PACKAGE
+    found = [str(path.parent.relative_to(folder)).replace("/", ".") for path in folder.rglob("__init__.py")]
+    assert given["packages"] == sorted(found) == [PACKAGE, f"{PACKAGE}.runtime"]
+    assert given["extras_require"] == {"test": ["pytest"]}
+    assert given["entry_points"] == {"console_scripts": [f"controller = {PACKAGE}.node:main"]}
+    installed = [path for _, paths in given["data_files"] for path in paths]
+    assert all((folder / path).is_file() for path in installed)
+    assert {"package.xml", "launch/controller.launch.py", "config/parameters.yaml"} <= set(installed)
+    assert f"script_dir=$base/lib/{PACKAGE}" in (folder / "setup.cfg").read_text()
+
+
+class Recorded:
+    """Stands for a class of `launch` or `launch_ros`: keeps what it was called with."""
+
+    def __init__(self, *positional: Any, **named: Any) -> None:
+        self.positional = positional
+        self.named = named
+
+
+@pytest.fixture
+def launch_stub(monkeypatch: pytest.MonkeyPatch, folder: Path) -> Iterator[None]:
+    """`launch` is in no package index: a stub that records is the most that can be had here."""
+    modules = {
+        "launch": ["LaunchDescription"],
+        "launch.actions": ["DeclareLaunchArgument"],
+        "launch.substitutions": ["LaunchConfiguration"],
+        "launch_ros": [],
+        "launch_ros.actions": ["Node"],
+        "ament_index_python": [],
+        "ament_index_python.packages": [],
+    }
+    for name, classes in modules.items():
+        module = types.ModuleType(name)
+        for item in classes:
+            setattr(module, item, type(item, (Recorded,), {}))
+        monkeypatch.setitem(sys.modules, name, module)
+    packages = sys.modules["ament_index_python.packages"]
+    packages.get_package_share_directory = lambda package: str(folder)  # type: ignore[attr-defined]
+    yield
+
+
+@pytest.mark.usefixtures("launch_stub")
+def test_the_launch_file_starts_the_node_with_its_parameters(folder: Path) -> None:
+    spec = importlib.util.spec_from_file_location("launch_file", folder / "launch/controller.launch.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    (actions,) = module.generate_launch_description().positional
+    arguments = {item.positional[0]: item.named for item in actions if type(item).__name__ == "DeclareLaunchArgument"}
+    assert set(arguments) == {"parameters", "log_level"}
+    assert Path(arguments["parameters"]["default_value"]).is_file()
+    (node,) = (item for item in actions if type(item).__name__ == "Node")
+    assert node.named["package"] == PACKAGE
+    assert node.named["executable"] == "controller"
+    (parameters,) = node.named["parameters"]
+    assert parameters.positional == ("parameters",)
+
+
+def test_the_parameter_file_holds_every_default(files: GeneratedFiles) -> None:
+    content = yaml.safe_load(files["config/parameters.yaml"])["/**"]["ros__parameters"]
+    expected = {item.name: item.default for item in declarations(("/cmd_vel",))}
+    assert content == expected
+    description = describe(example_supervisor(FOLLOWER))
+    checked = validate(content, description)
+    assert checked.settings.period_s == 0.1
+    assert checked.settings.release_identifiers == ("/cmd_vel",)
+    assert (checked.topic_prefix, checked.log_folder, checked.publish_state) == ("", "", False)
+
+
+def test_the_readme_names_every_topic_and_parameter(files: GeneratedFiles) -> None:
+    readme = files["README.md"]
+    for row in (
+        "| `/scan` | `sensor_msgs/msg/LaserScan` | received (best effort) | scan |",
+        "| `/line/correction` | `std_msgs/msg/Float32` | received | correction |",
+        "| `/cmd_vel` | `geometry_msgs/msg/Twist` | published | move, halt |",
+        "| safe | no message is sent against a requirement, and no bad state is reached | passed |",
+    ):
+        assert row in readme
+    assert "requirement move needs LineDetector.line_found" in readme
+    for parameter in declarations(()):
+        assert f"| `{parameter.name}` |" in readme
+
+
+@pytest.mark.parametrize("name", [FOLLOWER, MAZE])
+def test_the_packages_own_tests_pass_without_ros(name: str, tmp_path: Path) -> None:
+    write_files(generate(example_supervisor(name), "ros2"), tmp_path)
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test"]
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stdout
+    assert "3 passed" in result.stdout
+
+
+def test_the_packages_own_tests_can_fail(tmp_path: Path) -> None:
+    write_files(generate(example_supervisor(FOLLOWER), "ros2"), tmp_path)
+    supervisor = tmp_path / PACKAGE / "supervisor.py"
+    text = supervisor.read_text()
+    begin = text.index("def allow_move_request")
+    supervisor.write_text(text[:begin] + text[begin:].replace("== 'safe'", "== 'unsafe'", 1))
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test"]
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert result.returncode == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "package"),
+    [
+        ("LineFollower", "line_follower_controller"),
+        ("HTTPRobot2", "http_robot2_controller"),
+        ("_x__Y_", "x_y_controller"),
+        ("_9", "robot_9_controller"),
+        ("__", "robot_controller"),
+        ("class", "class_controller"),
+        ("A" * 255, "a" * 100 + "_controller"),
+    ],
+)
+def test_the_package_has_a_valid_name(name: str, package: str) -> None:
+    files = generate(robot("", name), "ros2")
+    assert f"{package}/node.py" in files
+    assert re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", package)
+
+
+def test_a_package_may_be_called_as_one_likes() -> None:
+    files = generate(robot(""), "ros2", GenerateOptions(package="my_robot"))
+    assert ElementTree.fromstring(files["package.xml"]).findtext("name") == "my_robot"
+    assert "my_robot/node.py" in files
+
+
+# What is refused.
+
+
+@pytest.mark.parametrize(
+    ("body", "problem"),
+    [
+        (
+            "interface t use T from x_srvs component C { service s with request: none, response: none links t }",
+            "'s' of C is a service, and this version generates messages only",
+        ),
+        (
+            "interface t use Go from x_msgs component C {"
+            "  action a with request: none, response: none, feedback: none links t }",
+            "'a' of C is an action, and this version generates messages only",
+        ),
+        (
+            'component C { outgoing message m with identifier: "/a b", type: none }',
+            "the identifier '/a b' of 'm' is no ROS 2 topic name",
+        ),
+        ('component C { outgoing message m with identifier: "/1", type: none }', "identifier '/1' of 'm'"),
+        ('component C { outgoing message m with identifier: "/a/", type: none }', "identifier '/a/' of 'm'"),
+        ('component C { outgoing message m with identifier: "/a//b", type: none }', "identifier '/a//b' of 'm'"),
+        ('component C { outgoing message m with identifier: "/a\\n", type: none }', "identifier '/a\\n' of 'm'"),
+        ('component C { outgoing message m with identifier: "{x}", type: none }', "identifier '{x}' of 'm'"),
+        ('component C { outgoing message m with identifier: "/' + "x" * 220 + '", type: none }', "no ROS 2 topic name"),
+        (
+            'component C { outgoing message m with identifier: "/t", type: none'
+            '              outgoing message n with identifier: "/t", type: double }',
+            "the topic /t has two types: std_msgs/Empty for 'm' and std_msgs/Float32 for 'n'",
+        ),
+        (
+            "interface i use Twist from geometry_msgs component C {"
+            '  outgoing message m with identifier: "/t", type: none'
+            '  incoming message n with identifier: "/t", type: none links i }',
+            "the topic /t has two types: std_msgs/Empty for 'm' and geometry_msgs/Twist for 'n'",
+        ),
+        (
+            "interface i use twist from geometry_msgs component C { outgoing message m with type: none links i }",
+            "twist from geometry_msgs, linked by 'm', is no name of a ROS 2 message type",
+        ),
+        (
+            "interface i use Twist from Geometry_Msgs component C { outgoing message m with type: none links i }",
+            "Twist from Geometry_Msgs, linked by 'm', is no name",
+        ),
+        (
+            "datatype enum E from double to { value > 1.0 -> a default -> b }"
+            "component C { incoming message m with type: E }",
+            "'m' sends the enum E, which is made from received data",
+        ),
+        (
+            "interface i use X from robot_controller component C { outgoing message m with type: none links i }",
+            "the generated package would be called robot_controller, like a package whose messages it uses",
+        ),
+    ],
+)
+def test_what_it_cannot_do_is_refused_with_its_name(body: str, problem: str) -> None:
+    with pytest.raises(UnsupportedModelError) as raised:
+        generate(robot(body), "ros2")
+    message = str(raised.value)
+    assert message.startswith("target ros2: ")
+    assert problem in message
+    assert "\n" not in message
+
+
+def test_services_and_actions_of_the_example_are_refused() -> None:
+    with pytest.raises(UnsupportedModelError, match="'calibrate' of Localisation is a service"):
+        generate(example_supervisor("navigation/navigation"), "ros2")
+
+
+def test_a_layer_is_refused() -> None:
+    supervisor = example_supervisor("line_follower/line_follower_layer", Deployment.LAYER)
+    with pytest.raises(
+        UnsupportedModelError, match="was made for the deployment 'layer', and this version generates contr"
+    ):
+        generate(supervisor, "ros2")
+
+
+# Hostile texts.
+
+HOSTILE = r"""
+robot None {
+    datatype object class { x: double }
+    datatype enum continue from string to { value = "{{ 1 }} --> `|` \" ' \\ </name>" -> break default -> global }
+    interface i use Vector3 from geometry_msgs
+    component def {
+        incoming message lambda with identifier: "/a", type: string
+        incoming message raise with identifier: "/b", type: class links i
+        outgoing message yield with identifier: "/c", type: continue
+        behaviour {
+            variable y: continue = break
+            on response from yield do y := value
+            variable x: string = "\" ' \\ ${x} {{ x }} {% raw %} </name> <!-- --> \u0022 é"
+            initial marked state in { on request to lambda on request to raise }
+        }
+    }
+    requirement lambda needs def.y = break
+    provide lambda with "{{ 1 }} {% if %} \" ' \\ é"
+}
+""".replace("state in", "state s")
+
+
+def test_texts_of_the_model_stay_texts(tmp_path: Path) -> None:
+    files = generate(supervisor_of(HOSTILE), "ros2")
+    for path, text in files.items():
+        if path.endswith(".py"):
+            ast.parse(text, filename=path, feature_version=(3, 8))
+    ElementTree.fromstring(files["package.xml"])
+    yaml.safe_load(files["config/parameters.yaml"])
+    with imported(files, tmp_path, "none_controller.supervisor") as module:
+        system = module.Supervisor()
+        interpreted = InterpretedSystem(supervisor_of(HOSTILE))
+        assert system.provide("lambda") == interpreted.provide("lambda")
+        assert system.enabled("lambda.request")
+        assert system.state() == interpreted.state()
+
+
+# Parameters.
+
+
+def given(**changes: Any) -> dict[str, Any]:
+    return {item.name: item.default for item in declarations(("/cmd_vel",))} | changes
+
+
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({"period": 0}, "parameter 'period' is 0; it must be"),
+        ({"period": float("nan")}, "parameter 'period' is nan; it must be"),
+        ({"period": "fast"}, "parameter 'period' is 'fast'; it must be"),
+        ({"period": None}, "parameter 'period' is None; it must be"),
+        ({"period": 1e9}, "parameter 'period' is 1000000000.0; it must be at most 3600 seconds"),
+        ({"policy": "best"}, "parameter 'policy' is 'best'; it must be one of fair, priority, random"),
+        ({"policy": ["fair"]}, "parameter 'policy' is "),
+        ({"priority": "move"}, "parameter 'priority' is 'move'; it must be a list of strings"),
+        ({"priority": ["mvoe"]}, "parameter 'priority': 'mvoe' is not a request; did you mean 'move'?"),
+        ({"seed": 1.5}, "parameter 'seed' is 1.5; it must be an integer"),
+        ({"every": "day"}, "parameter 'every' is 'day'; it must be one of period, event"),
+        ({"release_identifiers": ["/scan"]}, "parameter 'release_identifiers': '/scan' is not"),
+        ({"max_age": ["/scan"]}, "parameter 'max_age' is '/scan'; it must be topic=seconds"),
+        ({"max_age": ["/scan=soon"]}, "parameter 'max_age' is '/scan=soon'; it must be topic=seconds"),
+        ({"max_age": ["/scan=0"]}, "parameter 'max_age of /scan' is 0.0"),
+        ({"max_age": ["/cmd_vel=1"]}, "parameter 'max_age': '/cmd_vel' is not"),
+        ({"on_unknown": "panic"}, "parameter 'on_unknown' is 'panic'; it must be one of default, keep, fault"),
+        ({"topic_prefix": "a b"}, "parameter 'topic_prefix' is 'a b'; it must be empty or"),
+        ({"topic_prefix": "robot"}, "parameter 'topic_prefix' is 'robot'"),
+        ({"log_folder": 3}, "parameter 'log_folder' is 3; it must be a string"),
+        ({"publish_state": 1}, "parameter 'publish_state' is 1; it must be true or false"),
+    ],
+)
+def test_a_wrong_parameter_is_one_clear_error(changes: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(ParameterError) as raised:
+        validate(given(**changes), describe(example_supervisor(FOLLOWER)))
+    assert str(raised.value).startswith(complaint)
+
+
+def test_parameters_become_settings() -> None:
+    checked = validate(
+        given(period=1, priority=["halt", ""], release_identifiers=[""], max_age=["/scan=0.5"], topic_prefix="/a/b/"),
+        describe(example_supervisor(FOLLOWER)),
+    )
+    assert checked.settings.period_s == 1.0
+    assert checked.settings.priority == ("halt",)
+    assert checked.settings.release_identifiers == ()
+    assert checked.settings.max_age_s == {"/scan": 0.5}
+    assert checked.topic_prefix == "/a/b"
+
+
+def test_prefixes() -> None:
+    assert prefixed("", "/scan") == "/scan"
+    assert prefixed("/a", "/scan") == "/a/scan"
+    assert prefixed("/a", "scan") == "/a/scan"
+    assert prefixed("/a", "~/scan") == "~/scan"
+
+
+# The topic /state.
+
+
+def test_every_transition_has_a_number_of_its_own() -> None:
+    tables = state_topic(example_supervisor(FOLLOWER).model)
+    components: Any = tables.definition["components"]
+    drawn = [
+        (component["name"], state["name"], item)
+        for component in components
+        for state in component["behaviour"]["states"]
+        for item in state["transitions"]
+    ]
+    numbers = [item["id"] for _, _, item in drawn]
+    assert numbers == list(range(1, len(numbers) + 1))
+    lidar = [
+        (state, item["next"], item["type"], item["communication"])
+        for name, state, item in drawn
+        if name == "LidarSensor"
+    ]
+    assert lidar == [
+        ("unsafe", "safe", "tau", ""),
+        ("unsafe", "unsafe", "response", "scan"),
+        ("safe", "unsafe", "tau", ""),
+        ("safe", "safe", "response", "scan"),
+    ]
+    by_place = {(name, state, item["type"], item["communication"]): item["id"] for name, state, item in drawn}
+    assert dict(tables.transitions["scan.response"])["LidarSensor"] == {
+        state: by_place["LidarSensor", state, "response", "scan"] for state in ("unsafe", "safe")
+    }

@@ -217,6 +217,7 @@ def test_what_is_not_to_be_had_is_said(
     capsys: pytest.CaptureFixture[str],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
+    status: int,
     arguments: list[str],
     words: str,
 ) -> None:

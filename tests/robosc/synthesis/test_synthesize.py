@@ -8,16 +8,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robosc.automata import Automaton, Edge, Event, InputVariable, System
+from robosc.automata import Automaton, Edge, Event, InputVariable, System, to_automata
 from robosc.automata.controlled import controlled_graph
 from robosc.automata.semantics import Semantics
 from robosc.automata.structure import Assignment, DiscreteVariable, EventCondition
 from robosc.errors import SynthesisCancelled
 from robosc.expressions import BooleanType, IntegerType, Received
 from robosc.expressions.tree import Binary, Constant, VariableRead
+from robosc.model.structure import Deployment
 from robosc.supervisor.conditions import state_predicates
 from robosc.synthesis import Progress, SynthesisStatus, UnknownEngineError, synthesize
 from robosc.verification import synthesize_explicit
+from support.models import EXAMPLE_NAMES, example_model
 from support.random_systems import kind, random_system
 
 ENGINES = ("cudd", "autoref")
@@ -80,6 +82,13 @@ def test_random_systems(capsys: pytest.CaptureFixture[str]) -> None:
         print(f"\nrandom systems: {total}, " + ", ".join(f"{n} {shares[n] / total:.0%}" for n in sorted(shares)))
     assert shares["disables"] >= total / 2
     assert shares["empty"] >= total / 10
+
+
+@pytest.mark.parametrize("deployment", list(Deployment))
+@pytest.mark.parametrize("name", EXAMPLE_NAMES)
+def test_the_example_robots(name: str, deployment: Deployment) -> None:
+    found = agree(to_automata(example_model(name), deployment))
+    assert found == ("disables" if name.startswith("navigation") else "free")
 
 
 @pytest.fixture(params=ENGINES)

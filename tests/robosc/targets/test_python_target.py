@@ -359,6 +359,63 @@ def test_all_updates_of_a_step_read_the_state_before_it() -> None:
     ]
 
 
+RECEIVED = """
+    robot Received {
+        datatype enum Other from double to { value != 1.0 -> other  default -> one }
+        datatype enum Small from integer(0..5) to { value < 5 -> small  default -> large }
+        component C {
+            outgoing message number with type: Other
+            outgoing message level with type: integer(0..5)
+            outgoing message size with type: Small
+            outgoing message minus with type: double
+            behaviour {
+                variable other: Other = one
+                variable level: integer(0..5)
+                variable size: Small = large
+                variable minus: double
+                on response from number do other := value
+                on response from level do level := value
+                on response from size do size := value
+                on response from minus do minus := -value
+                initial marked state s { }
+            }
+        }
+    }
+"""
+
+
+@pytest.mark.parametrize(
+    ("event", "data", "value", "unknown"),
+    [
+        ("number", 2, "other", ()),
+        ("number", 1.0, "one", ()),
+        ("number", float("inf"), "other", ()),
+        ("number", float("nan"), "one", ("value is one by default: an earlier rule is unknown",)),
+        ("number", "2", "one", ("value is one by default: an earlier rule is unknown",)),
+        ("level", 4, 4, ()),
+        ("level", 9, 5, ("value is 9, outside 0..5",)),
+        ("level", -9, 0, ("value is -9, outside 0..5",)),
+        ("level", 2**31, 2, ()),
+        ("level", 3.0, 2, ()),
+        ("level", True, 2, ()),
+        ("size", -1, "small", ("value is -1, outside 0..5",)),
+        ("size", 7, "large", ("value is 7, outside 0..5",)),
+        ("size", None, "large", ("value is large by default: an earlier rule is unknown",)),
+        ("minus", 2, -2.0, ()),
+        ("minus", float("inf"), 0.0, ()),
+        ("minus", float("nan"), 0.0, ()),
+    ],
+)
+def test_what_is_received_is_converted_once_and_for_all(event: str, data: Any, value: Any, unknown: Any) -> None:
+    twins = Twins(Supervisor(model_of(RECEIVED), Deployment.CONTROLLER, (), CERTIFICATE))
+    twins.step("level.response", 2)
+    assert twins.generated.read(f"{event}.response", data).unknown == unknown
+    twins.step(f"{event}.response", data)
+    twins.compare()
+    variable = "other" if event == "number" else event
+    assert same(twins.generated.state()["C"]["variables"][variable], value)
+
+
 def test_names_that_would_meet_stay_apart() -> None:
     text = """
         robot R {

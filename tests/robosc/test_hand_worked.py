@@ -12,11 +12,14 @@ from robosc.automata import System, to_automata
 from robosc.automata.compile import State
 from robosc.exploration import explore
 from robosc.model.structure import Deployment, Model
+from robosc.supervisor.conditions import state_predicates
+from robosc.synthesis import SynthesisStatus, synthesize
 from robosc.verification import ExplicitSupervisor, Outcome, synthesize_explicit, verify
 from support.models import model_of
 
 type Graph = dict[str, dict[str, str]]
 
+ENGINES = ("cudd", "autoref")
 CONTROLLER, LAYER = Deployment.CONTROLLER, Deployment.LAYER
 
 
@@ -37,6 +40,8 @@ def _model(text: str) -> Model:
 def _synthesize(system: System) -> ExplicitSupervisor:
     supervisor = synthesize_explicit(system, limit=1000)
     assert supervisor is not None
+    for engine in ENGINES:
+        assert (synthesize(system, engine=engine).status is SynthesisStatus.EMPTY) == supervisor.is_empty
     return supervisor
 
 
@@ -53,6 +58,9 @@ def _graph(text: str, deployment: Deployment = CONTROLLER) -> Graph:
     found = verify(system, added)
     assert {found.safe, found.controllable, found.nonblocking, found.maximally_permissive} == {Outcome.PASSED}
     graph = explore(system, added, model)
+    for engine in ENGINES:
+        symbolic = state_predicates(system, synthesize(system, engine=engine).added)
+        assert explore(system, symbolic, model) == graph
     names = [
         " ".join(str(value) for _, value in (*item.components, *item.variables, *item.communications))
         for item in graph.states

@@ -1,0 +1,84 @@
+"""Walks over nodes against enumeration, over both engines."""
+
+from itertools import product
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robosc.synthesis.engines import make_manager
+from robosc.synthesis.nodes import cofactors, count_models, restrict
+
+NAMES = tuple(f"x{number}" for number in range(6))
+formulas = st.recursive(
+    st.sampled_from(NAMES),
+    lambda inner: st.one_of(
+        st.tuples(st.just("not"), inner), st.tuples(st.sampled_from(["and", "or", "xor"]), inner, inner)
+    ),
+    max_leaves=12,
+)
+
+
+@pytest.fixture(scope="module", params=["cudd", "autoref"])
+def manager(request: pytest.FixtureRequest) -> Any:
+    if request.param == "cudd":
+        pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+    found = make_manager(request.param)
+    found.declare(*NAMES)
+    return found
+
+
+def build(manager: Any, formula: Any) -> Any:
+    if isinstance(formula, str):
+        return manager.var(formula)
+    if formula[0] == "not":
+        return ~build(manager, formula[1])
+    left, right = build(manager, formula[1]), build(manager, formula[2])
+    return {"and": left & right, "or": left | right, "xor": manager.ite(left, ~right, right)}[formula[0]]
+
+
+def truth(formula: Any, values: dict[str, bool]) -> bool:
+    if isinstance(formula, str):
+        return values[formula]
+    if formula[0] == "not":
+        return not truth(formula[1], values)
+    left, right = truth(formula[1], values), truth(formula[2], values)
+    return {"and": left and right, "or": left or right, "xor": left != right}[formula[0]]
+
+
+VALUATIONS = [dict(zip(NAMES, bits, strict=True)) for bits in product((False, True), repeat=len(NAMES))]
+
+
+@settings(max_examples=100, deadline=None)
+@given(formula=formulas)
+def test_counting(manager: Any, formula: Any) -> None:
+    expected = sum(truth(formula, values) for values in VALUATIONS)
+    assert count_models(manager, build(manager, formula), NAMES) == expected
+
+
+@settings(max_examples=100, deadline=None)
+@given(formula=formulas, care=formulas)
+def test_restricting_keeps_what_matters(manager: Any, formula: Any, care: Any) -> None:
+    node, cared = build(manager, formula), build(manager, care)
+    assert restrict(manager, node, cared) & cared == node & cared
+
+
+@settings(max_examples=100, deadline=None)
+@given(formula=formulas)
+def test_cofactors_are_the_branches_of_the_top_variable(manager: Any, formula: Any) -> None:
+    node = build(manager, formula)
+    if node in (manager.true, manager.false):
+        return
+    low, high = cofactors(node)
+    assert low == manager.let({node.var: False}, node)
+    assert high == manager.let({node.var: True}, node)
+
+
+def test_counting_is_exact_beyond_a_double() -> None:
+    manager = make_manager("autoref")
+    names = [f"y{number}" for number in range(200)]
+    manager.declare(*names)
+    node = manager.var("y0")
+    assert count_models(manager, node, names) == 2**199
+    assert count_models(manager, node | manager.var("y199"), names) == 2**199 + 2**198

@@ -1,0 +1,42 @@
+"""The static variable order."""
+
+from random import Random
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robosc.automata import System, to_automata
+from robosc.automata.state import subjects
+from robosc.model.structure import Deployment
+from robosc.synthesis.order import force, hyperedges, span, subject_order
+from support.models import example_model
+from support.random_systems import systems
+
+
+@given(st.integers(1, 12), st.integers(0, 2**32 - 1))
+def test_force_gives_a_permutation_that_is_never_worse(count: int, seed: int) -> None:
+    random = Random(seed)
+    edges = [random.sample(range(count), random.randint(1, min(4, count))) for _ in range(random.randint(0, 8))]
+    order = force(count, edges)
+    assert sorted(order) == list(range(count))
+    assert span(order, edges) <= span(range(count), edges)
+    assert force(count, edges) == order
+
+
+def test_a_shuffled_chain_is_put_in_order() -> None:
+    shuffled = Random(7).sample(range(20), 20)
+    edges = [shuffled[place : place + 2] for place in range(19)]
+    assert span(range(20), edges) > 100
+    assert span(force(20, edges), edges) <= 40
+
+
+@given(systems())
+def test_every_place_of_a_state_is_ordered_once(system: System) -> None:
+    assert sorted(map(str, subject_order(system))) == sorted(map(str, subjects(system)))
+
+
+def test_what_an_event_touches_is_one_hyperedge() -> None:
+    system = to_automata(example_model("line_follower/line_follower"), Deployment.CONTROLLER)
+    edges = {frozenset(map(str, edge)) for edge in hyperedges(system)}
+    assert {"LidarSensor", "LidarSensor.ahead"} in edges
+    assert {"LineDetector", "LidarSensor", "EmergencyStop"} in edges

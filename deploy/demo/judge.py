@@ -42,11 +42,12 @@ def _state(state: Mapping[str, Any], component: str) -> str:
 def judge_motion(record: Sequence[Entry], happenings: Iterable[Happening] = HAPPENINGS) -> tuple[list[str], list[str]]:
     """What is wrong with the robot's motion, and how fast it came to rest: (faults, remarks).
 
-    For each happening that forbids moving: the robot moved before it, its speed is zero from the
-    reaction limit on until the happening that ends it, and afterwards it moves again.
+    For each happening that forbids moving: the robot moved before it, its speed and every command are zero
+    from the reaction limit on until the happening that ends it, and afterwards it moves again.
     """
     times = {entry["happening"]: float(entry["time_s"]) for entry in record if "happening" in entry}
     samples = [(float(entry["time_s"]), float(entry["speed_m_s"])) for entry in record if "speed_m_s" in entry]
+    commands = [(float(entry["time_s"]), float(entry["command_m_s"])) for entry in record if "command_m_s" in entry]
     faults, remarks = [], []
     for happening in happenings:
         if not happening.forbids_moving:
@@ -64,6 +65,8 @@ def judge_motion(record: Sequence[Entry], happenings: Iterable[Happening] = HAPP
             faults.append(f"{happening.name}: the robot still moved after {rest_s * 1000:.0f} ms")
         else:
             remarks.append(f"{happening.name}: at rest after {rest_s * 1000:.0f} ms")
+        if any(command != 0.0 for time_s, command in commands if begin_s + REACTION_LIMIT_S <= time_s < end_s):
+            faults.append(f"{happening.name}: a command to drive came more than {REACTION_LIMIT_S:.1f} s later")
         if not any(speed > 0.0 for time_s, speed in samples if end_s <= time_s < end_s + 1.0):
             faults.append(f"{happening.ended_by}: the robot did not move again")
     return faults, remarks

@@ -1,7 +1,7 @@
 """A small robot for the demonstration: a ROS 2 node with wheels, a line camera, a LiDAR and a stop button.
 
 It obeys `/cmd_vel` with limited acceleration, publishes what its sensors see while the scenario goes
-on, and writes its own speed, sampled 100 times a second on the monotonic clock, as JSON Lines.
+on, and writes every command and its own speed, sampled 100 times a second on the monotonic clock, as JSON Lines.
 
 Usage: simulated_robot.py RECORD
 """
@@ -68,6 +68,7 @@ class SimulatedRobot(Node):  # type: ignore[misc]  # rclpy has no types
 
     def _command(self, message: Twist) -> None:
         self._commanded_m_s, self._commanded_rad_s = message.linear.x, message.angular.z
+        self._write({"time_s": time.monotonic(), "command_m_s": message.linear.x})
 
     def _step(self) -> None:
         """One step of 10 ms: happenings that are due, motion, sensors, record."""

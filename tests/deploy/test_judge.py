@@ -65,6 +65,14 @@ def test_a_robot_that_rests_late_is_found() -> None:
     assert faults == ["obstacle: the robot still moved after 320 ms"]
 
 
+def test_a_late_command_is_found_even_if_the_robot_rests() -> None:
+    commands = [{"time_s": 0.9, "command_m_s": 0.15}, {"time_s": 1.1, "command_m_s": 0.15}]
+    assert judge_motion([*record(0.1), *commands], HAPPENINGS)[0] == []
+    late: dict[str, object] = {"time_s": 1.5, "command_m_s": 0.15}
+    faults, _ = judge_motion([*record(0.1), late], HAPPENINGS)
+    assert faults == ["obstacle: a command to drive came more than 0.3 s later"]
+
+
 def test_a_robot_that_never_moved_proves_nothing() -> None:
     assert judge_motion(record(0.1, moves_before=False), HAPPENINGS)[0]
     assert judge_motion(record(0.1, moves_after=False), HAPPENINGS)[0] == ["gone: the robot did not move again"]

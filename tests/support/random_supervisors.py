@@ -386,7 +386,8 @@ def _diagram(dice: Random, system: System) -> DecisionDiagram:
 
 
 _SCALARS = (
-    *(0, 1, -1, 3, 5, 7, 2**31, -(2**31), 10**400, 0.4, -0.5, 1e308, math.nan, math.inf, -math.inf),
+    *(0, 1, -1, 3, 5, 6, 7, 9, 100, 2**31 - 1, 2**31, -(2**31), 10**400),
+    *(0.4, -0.5, 1.0, 1e308, math.nan, math.inf, -math.inf),
     *(None, True, False, "", "a", "it's", "\udc80é"),
 )
 

@@ -16,6 +16,7 @@ from typing import Any, Self
 
 DISCOVERY_LIMIT_S = 15.0
 EXIT_LIMIT_S = 15.0
+ORDERLY_END_S = 3.0
 
 LAST_DOMAIN = 101
 """Above it, ROS 2 would use ports that the system hands out."""
@@ -75,7 +76,7 @@ def wait_until(condition: Callable[[], bool], limit_s: float, what: str, step_s:
 
 
 class RosProcess:
-    """A program on ROS 2, as a process of its own; killed at the latest when the `with` block ends.
+    """A program on ROS 2, as a process of its own; ended at the latest when the `with` block ends.
 
     Args:
         command: What to run, after the interpreter.
@@ -128,7 +129,11 @@ class RosProcess:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._process.kill()  # rclpy takes SIGTERM over, so only SIGKILL ends a hung node.
+        # An orderly end leaves no shared memory behind; rclpy takes SIGTERM over, so only SIGKILL ends a hung node.
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.terminate()
+            self._process.wait(ORDERLY_END_S)
+        self._process.kill()
         self._process.wait()
 
 

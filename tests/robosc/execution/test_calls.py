@@ -3,8 +3,11 @@
 import pytest
 
 from robosc.execution.executor import DeploymentError, Status
+from robosc.execution.interpreter import InterpretedSystem
 from robosc.model.structure import Deployment
-from support.execution import Bench, Sent, bench, example_system, system_of
+from robosc.supervisor.structure import AddedCondition, DecisionDiagram, DecisionNode
+from support.execution import Bench, Sent, bench, example_system, supervisor_of, system_of
+from support.models import model_of
 
 SERVICE = """
 robot Caller {
@@ -96,6 +99,7 @@ robot Driver {
   component Sensor {
     outgoing message safe with type: boolean
     outgoing message near with type: boolean
+    outgoing message out with type: none
     behaviour {
       variable is_safe: boolean = true
       variable is_near: boolean = false
@@ -110,12 +114,13 @@ robot Driver {
       variable left: double
       variable code: integer = 99
       on feedback from drive do left := value.left
-      initial marked state home { on request to drive goto away }
+      initial marked state home { on request to drive goto away  on response from out goto outside }
       marked state away {
         on response from drive do code := value.code goto home
         on error from drive goto failed
         on cancel to drive goto home
       }
+      marked state outside { }
       marked state failed { on response from near goto home }
     }
   }
@@ -209,6 +214,9 @@ def test_a_requirement_that_turns_cancels_the_goal() -> None:
     assert b.events == ["drive.request", "safe.response", "drive.cancel"]
     assert b.state("Driver") == "home"
     assert b.system.location("drive") == "idle"
+    b.executor.on_goal_ended(1, "cancelled")
+    assert b.executor.counters.unexpected == 0
+    assert b.events[-1] == "drive.cancel"
 
 
 def test_each_requirement_cancels_by_itself_also_one_that_disables() -> None:
@@ -373,3 +381,57 @@ def test_the_layer_supervisor_leaves_cancel_to_the_caller() -> None:
     own = system_of(ACTION)
     own.step("drive.request")
     assert not own.enabled("drive.cancel")
+
+
+def test_a_requirement_that_came_true_since_the_request_cancels_when_it_turns_again() -> None:
+    b = bench(
+        ACTION.replace("requirement drive needs Sensor.is_safe", "requirement drive needs Driver.home")
+        .replace("marked state away {", "marked state away { transition if Sensor.is_near goto home")
+        .replace("requirement Sensor.is_near disables drive", "")
+    )
+    assert b.tick() == [GOAL]
+    b.executor.on_goal_accepted(1)
+    # Away the requirement does not hold; at home it does, though the goal runs on.
+    b.receive("near", True)
+    assert b.state("Driver") == "home"
+    assert b.middleware.sent == [GOAL]
+    assert b.receive("out") == [CANCEL]
+
+
+def test_a_cancel_that_the_supervisor_forbids_waits_until_it_does_not() -> None:
+    diagram = DecisionDiagram((DecisionNode("Sensor", "is_near", (0, 1), (0, 1)),), 2)
+    text = ACTION.replace("requirement Sensor.is_near disables drive", "requirement Sensor.is_near disables other")
+    text = text.replace("component Driver {", "component Driver { incoming message other with type: none")
+    supervisor = supervisor_of(model_of(text), added=(AddedCondition("drive.cancel", diagram),))
+    b = Bench(InterpretedSystem(supervisor), policy="priority", priority=("drive",))
+    assert b.tick() == [GOAL]
+    b.executor.on_goal_accepted(1)
+    assert b.receive("safe", False) == []
+    assert b.receive("out") == []
+    assert b.receive("near", True) == [CANCEL]
+
+
+def test_several_cancels_go_out_in_source_order() -> None:
+    b = bench(
+        """
+        robot Two {
+          interface navigate use NavigateToPose from nav2_msgs
+          datatype object Empty { }
+          component Sensor {
+            outgoing message alarm with type: none
+            behaviour {
+              initial marked state calm { on response from alarm goto alarmed }
+              marked state alarmed { }
+            }
+          }
+          component A { action first with request: Empty, response: Empty, feedback: Empty links navigate }
+          component B { action second with request: Empty, response: Empty, feedback: Empty links navigate }
+          requirement { first, second } needs Sensor.calm
+        }
+        """,
+        policy="priority",
+        priority=("second", "first"),
+    )
+    assert [sent[1] for sent in b.tick(2)] == ["second", "first"]
+    b.receive("alarm")
+    assert b.events[-2:] == ["first.cancel", "second.cancel"]

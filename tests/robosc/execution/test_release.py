@@ -196,15 +196,7 @@ def test_while_another_request_on_the_identifier_is_enabled_it_is_the_next_decis
 
 
 def test_that_decision_comes_before_any_policy() -> None:
-    text = DRIVE.replace(
-        "requirement grip",
-        """requirement halt needs !Sensor.is_clear
-           requirement grip""",
-    ).replace(
-        "component Platform {",
-        'component Platform { incoming message halt with identifier: "/cmd_vel", type: Twist links twist',
-    )
-    b = bench(text, policy="priority", priority=("move", "grip"))
+    b = bench(with_halt(), policy="priority", priority=("move", "grip"))
     assert b.tick() == [MOVE]
     assert b.receive("clear", False) == []
     # The list says grip; the release that waits says halt.
@@ -271,3 +263,57 @@ def test_after_a_waiting_release_whose_request_does_not_fit_others_are_tried() -
     b.middleware.unfit.add("halt")
     assert b.tick() == [ZERO]
     assert b.tick() == []
+
+
+def with_halt(halt: str = "") -> str:
+    """The driving robot with a second message on its topic."""
+    return DRIVE.replace("requirement grip", "requirement halt needs !Sensor.is_clear requirement grip").replace(
+        "component Platform {",
+        f'component Platform {{ incoming message halt with identifier: "/cmd_vel", type: Twist links twist {halt}',
+    )
+
+
+def test_if_what_would_end_a_release_cannot_be_sent_the_decision_passes_on() -> None:
+    b = bench(with_halt(), policy="priority", priority=("move",))
+    assert b.tick() == [MOVE]
+    assert b.receive("clear", False) == []
+    b.middleware.unfit.add("halt")
+    assert b.tick() == [ZERO, GRIP]
+
+
+def test_a_request_that_ends_a_release_and_disables_itself_ends_it_all_the_same() -> None:
+    halt = "behaviour { initial marked state a { on request to halt goto b  on request to move } marked state b { } }"
+    b = bench(with_halt(halt), policy="priority", priority=("move",))
+    assert b.tick() == [MOVE]
+    assert b.receive("clear", False) == []
+    assert b.tick() == [("publish", "halt", None)]
+    assert b.entries("release") == []
+
+
+def test_a_request_that_is_sent_again_and_disables_itself_releases_nothing() -> None:
+    b = bench(
+        f"""
+        robot Twice {{ {HEAD}
+          component Platform {{
+            incoming message move with identifier: "/cmd_vel", type: Twist links twist
+            behaviour {{
+              initial marked state one {{ on request to move goto two }}
+              marked state two {{ on request to move goto three }}
+              marked state three {{ }}
+            }}
+          }}
+          provide move with {{ linear: {{ x: 0.5 }} }}
+        }}
+        """
+    )
+    assert b.tick(3) == [MOVE, MOVE]
+
+
+def test_what_never_was_so_since_the_message_releases_nothing_later_either() -> None:
+    b = bench(
+        SELF.replace(
+            "variable healthy", "variable noise: boolean on response from hum do noise := value variable healthy"
+        ).replace("outgoing message done", "outgoing message hum with type: boolean  outgoing message done")
+    )
+    b.tick()
+    assert b.receive("hum", True) + b.receive("hum", False) == []

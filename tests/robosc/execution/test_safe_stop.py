@@ -250,6 +250,7 @@ def test_goals_of_the_old_run_are_nothing_to_the_new_one_but_must_end() -> None:
     before = len(b.events)
     b.executor.on_goal_ended(1, "cancelled")
     assert b.events[before:] == []
+    assert b.executor.counters.unexpected == 0
     assert b.tick()[-1] == ("goal", "go", 2, None)
 
 
@@ -257,9 +258,17 @@ def test_calls_of_the_old_run_are_forgotten() -> None:
     b = bench(ROBOT, policy="priority", priority=("ask",))
     b.tick()
     b.executor.restart()
+    assert b.tick()[0] == ("call", "ask", 2, None)
     b.executor.on_reply(1, {})
     assert b.executor.counters.unexpected == 1
-    assert b.tick()[0] == ("call", "ask", 2, None)
+    assert b.system.location("ask") == "waiting"
+
+
+def test_a_restart_forgets_whose_turn_it_was() -> None:
+    b = bench(ROBOT)
+    first = b.tick()
+    b.executor.restart()
+    assert b.tick() == first
 
 
 def test_nothing_is_requested_before_the_first_message_of_a_sensor_with_a_maximum_age() -> None:
@@ -333,3 +342,32 @@ def test_a_stop_before_the_start_holds_afterwards() -> None:
     assert b.middleware.sent == ZEROS
     b.executor.start()
     assert b.tick(3) == []
+
+
+def test_a_sensor_is_stale_at_its_maximum_age_and_not_before() -> None:
+    b = bench(ROBOT, max_age_s={"/battery": 0.25}, period_s=0.125)
+    b.receive("/battery", 12.0)
+    b.tick()
+    assert b.status() is Status.RUNNING
+    b.tick()
+    assert b.status() is Status.STOPPED
+
+
+def test_each_sensor_stops_the_robot_once_and_again_after_its_return() -> None:
+    b = bench(ROBOT, max_age_s={"/scan": 0.35, "/battery": 0.75})
+    for round_ in (1, 2):
+        b.receive("/scan", True)
+        b.receive("/battery", 12.0)
+        assert b.status() is Status.RUNNING
+        b.tick(15)
+        assert len(b.entries("stop")) == 3 * round_
+        assert len(b.entries("resume")) == 3 * (round_ - 1)
+
+
+def test_each_sensor_alone_is_watched_again_after_its_return() -> None:
+    b = bench(ROBOT, max_age_s={"/battery": 0.35})
+    for _ in range(3):
+        b.receive("/battery", 12.0)
+        assert b.status() is Status.RUNNING
+        b.tick(5)
+        assert b.status() is Status.STOPPED

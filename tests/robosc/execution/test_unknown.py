@@ -6,9 +6,14 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from robosc.execution.executor import Status
-from support.execution import Bench, bench, example_system, system_of
+from robosc.execution.interpreter import InterpretedSystem
+from robosc.expressions import Binary, EnumValue, Received
+from robosc.model.structure import EnumRule
+from support.execution import Bench, bench, example_system, supervisor_of, system_of
+from support.models import model_of
 
 NAN, INFINITY = math.nan, math.inf
 
@@ -90,6 +95,63 @@ def test_an_enum_takes_the_first_true_rule_else_its_default(data: Any, expected:
     assert b.executor.counters.unknown == unknown
     assert len(b.entries("unknown")) == unknown
     assert b.status() is Status.RUNNING
+
+
+NESTED = """
+robot Nested {
+  interface pair use Pair from some_msgs
+  datatype object Pair { left: Side  right: double }
+  datatype enum Side from double to { value > 1.0 -> far default -> close }
+  datatype enum Both from Pair to {
+    value.right > 1.0 -> right_far
+    value.right < -1.0 -> left_far
+    default -> neither
+  }
+  component Sensor {
+    outgoing message pair with type: Both links pair
+    behaviour {
+      variable both: Both = neither
+      on response from pair do both := value
+      initial marked state awake { }
+    }
+  }
+}
+"""
+
+
+def nested_system() -> InterpretedSystem:
+    """With the rule `value.left = far -> left_far`."""
+    model = model_of(NESTED)
+    both = model.enum("Both")
+    is_far = Binary("=", Received(("left",)), EnumValue("Side", "far"))
+    rules = (both.rules[0], EnumRule(is_far, "left_far"))
+    enums = tuple(replace(item, rules=rules) if item is both else item for item in model.enums)
+    return InterpretedSystem(supervisor_of(replace(model, enums=enums)))
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "expected", "unknown"),
+    [
+        (2.0, 2.0, "right_far", 0),
+        (2.0, 0.5, "left_far", 0),
+        (0.5, 0.5, "neither", 0),
+        # An earlier rule was unknown, but the enum did not fall to its default.
+        (2.0, NAN, "left_far", 0),
+        (0.5, NAN, "neither", 1),
+        # The enum inside fell to its default; the outer one did so knowing everything.
+        (NAN, 0.5, "neither", 1),
+        (NAN, NAN, "neither", 2),
+        (NAN, 2.0, "right_far", 0),
+    ],
+)
+def test_enums_within_the_source_of_an_enum(left: float, right: float, expected: str, unknown: int) -> None:
+    b = Bench(nested_system())
+    b.receive("pair", {"left": left, "right": right})
+    assert b.variable("Sensor", "both") == expected
+    assert b.executor.counters.unknown == unknown
+    kept = Bench(nested_system(), on_unknown="keep")
+    kept.receive("pair", {"left": left, "right": right})
+    assert kept.events == ([] if unknown else ["pair.response"])
 
 
 def test_keep_means_as_if_nothing_had_come() -> None:

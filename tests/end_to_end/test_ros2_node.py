@@ -3,6 +3,8 @@
 import itertools
 import json
 import signal
+import subprocess
+import sys
 from array import array
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,10 +15,10 @@ import pytest
 from robosc.model.structure import Deployment
 from robosc.supervisor.structure import Supervisor
 from robosc.targets import generate, write_files
-from support.generated import example_supervisor
-from support.models import model_of
+from support.models import EXAMPLES, model_of
 from support.random_supervisors import CERTIFICATE
 from support.ros2 import Peer, RosProcess, environment, own_domain
+from support.service import server_process
 
 pytest.importorskip("rclpy", reason="ROS 2 (rclpy) is not installed")
 
@@ -31,8 +33,14 @@ StartNode = Callable[..., RosProcess]
 
 @pytest.fixture(scope="module")
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The package as a robot's engineer gets it: a client process asks a server process for it."""
     folder = tmp_path_factory.mktemp("workspace")
-    write_files(generate(example_supervisor("line_follower/line_follower"), "ros2"), folder)
+    client = str(Path(sys.executable).with_name("robosc-client"))
+    model = str(EXAMPLES / "line_follower" / "line_follower.rscd")
+    with server_process() as (_, address):
+        command = [client, "generate", model, "--server", address, "--target", "ros2", "-o", str(folder)]
+        result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert result.returncode == 0, result.stderr
     return folder
 
 

@@ -149,7 +149,7 @@ def test_it_moves_only_while_everything_allows_it(start: StartNode, peer: Peer) 
         robot.until(lambda: robot.speed == 0.15, f"the robot to move again after {what}", resume)
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_a_signal_stops_the_robot_first(start: StartNode, peer: Peer, number: signal.Signals, tmp_path: Path) -> None:
     from geometry_msgs.msg import Twist
 

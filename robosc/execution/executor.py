@@ -11,17 +11,19 @@ releases that it made due, send the message. So no request is decided on a state
 from __future__ import annotations
 
 from enum import Enum
-from typing import Any, Dict, Optional, Tuple
+from functools import wraps
+from typing import Any, Callable, Dict, Optional, Tuple, TypeVar, cast
 
-from robosc.execution.calls import OUTCOMES, Calls, Goal, Goals
+from robosc.execution.calls import Calls, Goals
 from robosc.execution.clock import Clock, SystemClock
 from robosc.execution.decision import Policy, make_policy
 from robosc.execution.event_log import EventLog, NullLog
 from robosc.execution.protocol import CommunicationInfo, ControlledSystem, Description, Middleware
 from robosc.execution.recorder import Counters, Recorder
 from robosc.execution.release import Releases
+from robosc.execution.replies import Replies
 from robosc.execution.requests import Decisions, by_identifier, requests_of
-from robosc.execution.rest import Rest, describe_error, request_cancel
+from robosc.execution.rest import Rest, describe_error
 from robosc.execution.sensors import Sensors
 from robosc.execution.settings import Settings, settings_for
 from robosc.execution.steps import ExecutionError, Steps
@@ -45,6 +47,22 @@ class Status(str, Enum):
 
 class DeploymentError(ValueError):
     """The supervisor was made for another deployment."""
+
+
+_Method = TypeVar("_Method", bound=Callable[..., None])
+
+
+def _guarded(method: _Method) -> _Method:
+    """The method with every exception turned into a fault."""
+
+    @wraps(method)
+    def guarded(self: Executor, *arguments: Any, **named: Any) -> None:
+        try:
+            method(self, *arguments, **named)
+        except Exception as error:
+            self._fail(describe_error(error))
+
+    return cast(_Method, guarded)
 
 
 class Executor:
@@ -77,20 +95,17 @@ class Executor:
         _require_controller(system.description)
         self.settings = settings_for(settings or Settings(), system.description)
         self._clock: Clock = SystemClock() if clock is None else clock
-        self._middleware = middleware
         self._recorder = Recorder(system, self._clock, NullLog() if log is None else log)
         released = self.settings.release_identifiers or ()
         requests = requests_of(infos, released)
-        self._releases = Releases(system, released, by_identifier(requests))
-        self._calls = Calls(self.settings.service_timeout_s)
-        self._goals = Goals(
-            system, [info.name for info in infos if info.kind == "action"], self.settings.action_timeout_s
-        )
+        releases = Releases(system, released, by_identifier(requests))
+        calls = Calls(self.settings.service_timeout_s)
+        goals = Goals(system, [info.name for info in infos if info.kind == "action"], self.settings.action_timeout_s)
         self._sensors = Sensors(
             [(info.name, info.identifier) for info in infos if info.kind == "outgoing message"], self.settings.max_age_s
         )
-        self._rest = Rest(middleware, self._releases, self._goals)
-        self._steps = Steps(system, middleware, self._recorder, self._releases, self._goals, self.settings.on_unknown)
+        self._rest = Rest(middleware, releases, goals)
+        self._steps = Steps(system, middleware, self._recorder, releases, goals, self.settings.on_unknown)
         self._request_names = [request.name for request in requests]
         self._decisions = Decisions(
             system,
@@ -98,11 +113,12 @@ class Executor:
             requests,
             self._steps,
             self._recorder,
-            self._releases,
-            self._calls,
-            self._goals,
+            releases,
+            calls,
+            goals,
             self._new_policy(),
         )
+        self._replies = Replies(self._steps, middleware, self._recorder, calls, goals)
         self._batches = _batches(infos)
         self._decides_after_batch = self.settings.every == "event"
         self._is_started = False
@@ -139,17 +155,15 @@ class Executor:
 
     # What an adapter tells.
 
+    @_guarded
     def start(self) -> None:
         """Begin in the initial state; what comes earlier is ignored. Does nothing the second time."""
-        if self._is_started:
-            return
-        try:
+        if not self._is_started:
             self._begin()
-        except Exception as error:
-            self._fail(describe_error(error))
 
     def tick(self) -> None:
         """A period has passed: one decision."""
+        # This and `receive` are written out for speed: the cycle time of the controller.
         if not self._is_started:
             return
         try:
@@ -186,51 +200,34 @@ class Executor:
         except Exception as error:
             self._fail(describe_error(error))
 
+    @_guarded
     def on_reply(self, request_id: int, data: Any) -> None:
         """A service call was answered."""
-        try:
-            service = self._end_call(request_id)
-            if service is not None:
-                self._steps.happen_with_data(service + ".response", data)
-                self._end_batch()
-        except Exception as error:
-            self._fail(describe_error(error))
+        self._look_at_clock()
+        if self._replies.reply(request_id, data):
+            self._end_batch()
 
+    @_guarded
     def on_call_failed(self, request_id: int, reason: str) -> None:
         """A service call will not be answered: its server is absent or lost, or refuses it."""
-        try:
-            service = self._end_call(request_id)
-            if service is not None:
-                self._steps.happen(service + ".error", None, reason)
-                self._end_batch()
-        except Exception as error:
-            self._fail(describe_error(error))
+        self._look_at_clock()
+        if self._replies.call_failed(request_id, reason):
+            self._end_batch()
 
+    @_guarded
     def on_goal_accepted(self, goal_id: int) -> None:
         """A goal was accepted by its server."""
-        try:
-            goal = self._find_goal(goal_id, "an acceptance")
-            if goal is not None:
-                goal.is_accepted = True
-                if goal.is_cancel_wanted:
-                    request_cancel(self._middleware, goal)
-        except Exception as error:
-            self._fail(describe_error(error))
+        self._look_at_clock()
+        self._replies.goal_accepted(goal_id)
 
+    @_guarded
     def on_feedback(self, goal_id: int, data: Any) -> None:
         """A goal's server told how far it is."""
-        try:
-            goal = self._find_goal(goal_id, "feedback")
-            if goal is None:
-                return
-            if goal.is_running:
-                self._steps.happen_with_data(goal.action + ".feedback", data)
-                self._end_batch()
-            else:
-                self._recorder.unexpected({"event": goal.action + ".feedback"})
-        except Exception as error:
-            self._fail(describe_error(error))
+        self._look_at_clock()
+        if self._replies.feedback(goal_id, data):
+            self._end_batch()
 
+    @_guarded
     def on_goal_ended(self, goal_id: int, outcome: str, data: Any = None) -> None:
         """A goal's end is known, or its server is lost.
 
@@ -239,25 +236,11 @@ class Executor:
             outcome: `succeeded`, `rejected`, `aborted`, `cancelled` or `lost`.
             data: Its result, if it succeeded.
         """
-        try:
-            if outcome not in OUTCOMES:
-                raise ExecutionError("a goal cannot end as '{}'".format(outcome))
-            goal = self._find_goal(goal_id, "a result")
-            if goal is None:
-                return
-            self._goals.close(goal_id)
-            self._steps.enabled = None
-            if goal.is_running:
-                if outcome == "succeeded":
-                    self._steps.happen_with_data(goal.action + ".response", data)
-                else:
-                    self._steps.happen(goal.action + ".error", None, outcome)
-                self._end_batch()
-            elif outcome == "succeeded":
-                self._recorder.unexpected({"event": goal.action + ".response"})
-        except Exception as error:
-            self._fail(describe_error(error))
+        self._look_at_clock()
+        if self._replies.goal_ended(goal_id, outcome, data):
+            self._end_batch()
 
+    @_guarded
     def on_cancel_refused(self, goal_id: int, ended: bool) -> None:
         """A cancel was refused.
 
@@ -265,12 +248,8 @@ class Executor:
             goal_id: Which goal.
             ended: Whether because the goal had ended already; its result follows or came already.
         """
-        try:
-            goal = None if ended else self._find_goal(goal_id, "a refused cancel")
-            if goal is not None:
-                raise ExecutionError("the cancel of a running goal of {} was refused".format(goal.action))
-        except Exception as error:
-            self._fail(describe_error(error))
+        self._look_at_clock()
+        self._replies.cancel_refused(goal_id, ended)
 
     def stop(self, reason: str, is_fault: bool = False) -> None:
         """Come to rest until `restart`: on a signal, or, if `is_fault`, on a fault that the adapter found.
@@ -283,28 +262,24 @@ class Executor:
         else:
             self._stop(_STOPPED_BY_HAND, reason)
 
+    @_guarded
     def restart(self) -> None:
         """Begin again in the initial state, whatever happened; goals and calls under way are the old run's."""
-        try:
-            self._now_s = self._clock.monotonic()
-            if not self._rest.reasons or self._rest.restless:
-                self._come_to_rest()
-            if self._rest.restless:
-                raise ExecutionError("no restart: the robot could not be brought to rest")
-            self._rest.reasons.clear()
-            self._recorder.note("restart", "")
-            self._begin()
-        except Exception as error:
-            self._fail(describe_error(error))
+        self._now_s = self._clock.monotonic()
+        if not self._rest.reasons or self._rest.restless:
+            self._come_to_rest()
+        if self._rest.restless:
+            raise ExecutionError("no restart: the robot could not be brought to rest")
+        self._rest.reasons.clear()
+        self._recorder.note("restart", "")
+        self._begin()
 
     # Time.
 
     def _begin(self) -> None:
         self._is_started = True
         now = self._now_s = self._recorder.began_s = self._clock.monotonic()
-        self._calls.clear()
-        self._goals.leave_model()
-        self._releases.clear()
+        self._replies.forget()
         self._sensors.start(now)
         self._decisions.policy = self._new_policy()
         self._steps.restart()
@@ -320,19 +295,11 @@ class Executor:
             self._check_time(now)
 
     def _next_deadline(self, now: float) -> float:
-        return min(self._calls.deadline_s(), self._goals.deadline_s(), self._sensors.deadline_s(now))
+        return min(self._replies.deadline_s(), self._sensors.deadline_s(now))
 
     def _check_time(self, now: float) -> None:
         """Replies that did not come in time, and stale sensors."""
-        for number in self._calls.expired(now):
-            service = self._calls.close(number)
-            self._steps.happen("{}.error".format(service), None, "timeout")
-            self._steps.settle()
-        for goal in self._goals.expired(now):
-            goal.is_running = False
-            self._steps.happen(goal.action + ".error", None, "timeout")
-            self._steps.settle()
-            request_cancel(self._middleware, goal)
+        self._replies.expire(now)
         for name, identifier in self._sensors.stale(now):
             if _stale_key(name) not in self._rest.reasons:
                 self._stop(_stale_key(name), "{} on {} is stale".format(name, identifier))
@@ -346,23 +313,7 @@ class Executor:
                 self._deadline_s = self._next_deadline(self._now_s)
             self._update_may_request()
 
-    # Replies and decisions.
-
-    def _end_call(self, request_id: int) -> Optional[str]:
-        """End a call: its service, or None after noting that nobody waits for the reply."""
-        self._look_at_clock()
-        service = self._calls.close(request_id)
-        if service is None:
-            self._recorder.unexpected({"what": "a reply to no call"})
-        return service
-
-    def _find_goal(self, goal_id: int, what: str) -> Optional[Goal]:
-        """A goal under way, or None after noting that nobody waits for what came."""
-        self._look_at_clock()
-        goal = self._goals.find(goal_id)
-        if goal is None:
-            self._recorder.unexpected({"what": "{} of no goal".format(what)})
-        return goal
+    # Decisions.
 
     def _end_batch(self) -> None:
         """Silent steps, and a decision if each batch brings one."""

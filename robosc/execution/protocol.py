@@ -130,6 +130,8 @@ class Middleware(Protocol):
     def prepare(self, communication: str, data: Any) -> Any:
         """The middleware's message for a request, from the model's data (None: the default message).
 
+        The data is not to be changed: it stands in the log, and may come again.
+
         Raises:
             DataDoesNotFit: A value does not fit its field; the request is then not issued.
         """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Dict, List, Optional, Sequence, Tuple
 
-from robosc.execution.edges import have_fallen, held_ever
+from robosc.execution.edges import have_fallen
 from robosc.execution.protocol import ControlledSystem
 
 
@@ -14,9 +14,10 @@ class _Acting:
     Attributes:
         request: Name of the communication whose request sent it.
         event: That request.
-        was_enabled: Whether the request was enabled in a stable state since.
-        held: For each conjunct of its requirements: whether it held in a stable state since.
-        is_due: Whether it is to be released; once due it stays so until something is sent there.
+        was_enabled: Whether the request was enabled in the last stable state since.
+        held: For each conjunct of its requirements: whether it held in that state.
+        is_due: Whether it is to be released: something was so and is no longer. Once due it stays so until
+            something is sent there; that is why the last stable state is enough to remember.
     """
 
     __slots__ = ("event", "held", "is_due", "request", "was_enabled")
@@ -77,8 +78,8 @@ class Releases:
         holds = self._system.conjuncts(acting.request)
         if (acting.was_enabled and not is_enabled) or have_fallen(acting.held, holds):
             acting.is_due = True
-        acting.was_enabled = acting.was_enabled or is_enabled
-        acting.held = held_ever(acting.held, holds)
+        acting.was_enabled = is_enabled
+        acting.held = holds
 
     def _another_is_enabled(self, identifier: str, acting: _Acting) -> bool:
         enabled = self._system.enabled
@@ -104,7 +105,7 @@ class Releases:
     def sent_unchanged(self, request: str, identifier: str, is_default: bool) -> None:
         """The same, where the request changed nothing: what was enabled still is, with all that it takes."""
         acting = self._acting.get(identifier)
-        if is_default or acting is None or acting.request != request or acting.is_due:
+        if is_default or acting is None or acting.request != request:
             self.sent(request, identifier, is_default)
 
     def is_acting(self, identifier: str) -> bool:

@@ -83,15 +83,20 @@ def conjunction(*conditions: Expression) -> Expression:
 
 def conjuncts(condition: Expression) -> tuple[Expression, ...]:
     """The top-level conjuncts of a condition, looking through negated disjunctions and double negation."""
-    match condition:
-        case Binary(operator="and", left=left, right=right):
-            return conjuncts(left) + conjuncts(right)
-        case Unary(operator="not", operand=Binary(operator="or", left=left, right=right)):
-            return conjuncts(Unary("not", left)) + conjuncts(Unary("not", right))
-        case Unary(operator="not", operand=Unary(operator="not", operand=operand)):
-            return conjuncts(operand)
-        case _:
-            return (condition,)
+    found: list[Expression] = []
+    stack = [condition]
+    while stack:
+        node = stack.pop()
+        match node:
+            case Binary(operator="and", left=left, right=right):
+                stack += [right, left]
+            case Unary(operator="not", operand=Binary(operator="or", left=left, right=right)):
+                stack += [Unary("not", right), Unary("not", left)]
+            case Unary(operator="not", operand=Unary(operator="not", operand=operand)):
+                stack.append(operand)
+            case _:
+                found.append(node)
+    return tuple(found)
 
 
 def children(expression: Expression) -> tuple[Expression, ...]:

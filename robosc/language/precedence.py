@@ -1,11 +1,13 @@
-"""Builds the tree of an expression from the flat run of operands and operators that the grammar reads.
+"""Builds the tree of an expression from the flat run of operands, operators and parentheses that the grammar reads.
 
-One climber over A.3's table replaces a tower of grammar rules, which a packrat parser would walk down for
-every literal. Binary operators associate to the left. Long chains of `and` and `or` become balanced trees:
+One climber over A.3's table replaces a tower of grammar rules, which a recursive-descent parser would walk down for
+every literal; parentheses are matched with a stack, so their depth costs no recursion either (E. W. Dijkstra,
+Algol 60 translation, 1961: the shunting-yard). Binary operators associate to the left. Long chains of `and` and `or` become balanced trees:
 both are associative, and a chain of a thousand conditions must not need a thousand levels of recursion.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 from robosc.language import syntax
@@ -30,7 +32,76 @@ Operator = tuple[str, Location]
 _BALANCED_FROM = 16
 
 
-def build(operands: Sequence[syntax.Expression], operators: Sequence[Operator], report: Report) -> syntax.Expression:
+@dataclass(slots=True)
+class _Group:
+    """What stands inside one pair of parentheses, as far as it has been read."""
+
+    opening: Location | None
+    operands: list[syntax.Expression] = field(default_factory=list)
+    operators: list[Operator] = field(default_factory=list)
+    signs: list[Operator] = field(default_factory=list)
+
+
+class ExpressionBuilder:
+    """Takes the tokens of one expression from left to right.
+
+    The grammar has made sure that operands and operators take turns, so every group holds an operand when it is closed.
+
+    Args:
+        report: Takes what is wrong: parentheses without a partner, `-` before `!`, a mixed `=>`.
+    """
+
+    def __init__(self, report: Report) -> None:
+        self._report = report
+        self._groups = [_Group(None)]
+
+    def prefix(self, sign: str, location: Location) -> None:
+        """A `!`, `-` or `(` before an operand."""
+        if sign == "(":
+            self._groups.append(_Group(location))
+        else:
+            self._groups[-1].signs.append((sign, location))
+
+    def operand(self, tree: syntax.Expression) -> None:
+        """A literal or an access, or what a pair of parentheses has become."""
+        group = self._groups[-1]
+        for (sign, _), (following, place) in pairwise(group.signs):
+            if sign == "-" and following == "!":
+                self._report("syntax-error", "'-' cannot stand before '!'; expected a number", place, "Remove the '-'.")
+        for sign, location in reversed(group.signs):
+            tree = syntax.Unary(sign, tree, location)
+        group.signs.clear()
+        group.operands.append(tree)
+
+    def closing(self, location: Location) -> None:
+        """A `)` behind an operand."""
+        if len(self._groups) == 1:
+            self._report("syntax-error", "this ')' closes nothing", location, "Remove it, or open it with '('.")
+        else:
+            self._close()
+
+    def operator(self, text: str, location: Location) -> None:
+        """A binary operator."""
+        self._groups[-1].operators.append((text, location))
+
+    def finish(self) -> syntax.Expression:
+        """The whole tree."""
+        while len(self._groups) > 1:
+            opening = self._groups[-1].opening
+            if opening is not None:
+                self._report("syntax-error", "this '(' is never closed", opening, "Close it with ')'.")
+            self._close()
+        return self._tree(self._groups[0])
+
+    def _close(self) -> None:
+        group = self._groups.pop()
+        self.operand(self._tree(group))
+
+    def _tree(self, group: _Group) -> syntax.Expression:
+        return _build(group.operands, group.operators, self._report)
+
+
+def _build(operands: Sequence[syntax.Expression], operators: Sequence[Operator], report: Report) -> syntax.Expression:
     """The tree of `operands` with one operator between each two."""
     if any(text == "=>" for text, _ in operators):
         return _implication(operands, operators, report)

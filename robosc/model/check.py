@@ -165,19 +165,24 @@ class _RobotChecker:
             # Inside its own behaviour a component is always itself, whatever else was imported under its name.
             part = next(part for part in self._parts if part.name == own)
             components[part.tree.name.text] = names[own]
+        enums = self._enums_of(unit, imported=imported)
+        return Scope(self._types, components, enums, names.get(own) if own else None)
+
+    def _enums_of(self, unit: Unit, *, imported: bool = False) -> dict[str, EnumType]:
+        """The enums of a file by the names they have there; with `imported`, those of other files by theirs."""
         enums: dict[str, EnumType] = {}
         for key, (enum, home, tree) in self._types.enums.items():
             if home is unit:
                 enums[tree.name.text] = enum
             elif imported:
                 enums.setdefault(key, enum)
-        return Scope(self._types, components, enums, names.get(own) if own else None)
+        return enums
 
     def _enums(self) -> tuple[EnumDefinition, ...]:
         """The definition of every enum, its rules resolved."""
         found = []
-        for key, (enum, _, tree) in list(self._types.enums.items()):
-            scope = Scope(self._types, {}, {}, None, self._types.sources[key])
+        for key, (enum, unit, tree) in self._types.enums.items():
+            scope = Scope(self._types, {}, self._enums_of(unit), None, self._types.sources[key])
             checker = ExpressionChecker(scope, self._findings)
             rules = []
             for rule in tree.rules:

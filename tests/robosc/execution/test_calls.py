@@ -68,6 +68,7 @@ def test_no_reply_in_time_is_an_error_and_a_late_one_is_unexpected(timeout_s: fl
     assert b.variable("A", "errors") == 0
     b.tick(3)
     assert b.variable("A", "errors") == 1
+    assert b.events[:4] == ["ask.request", "ask.error", "ask.reset", "ask.request"]
     b.executor.on_reply(1, {"success": True})
     assert b.executor.counters.unexpected == 1
     assert b.variable("A", "good") is False

@@ -317,3 +317,57 @@ def test_what_never_was_so_since_the_message_releases_nothing_later_either() -> 
     )
     b.tick()
     assert b.receive("hum", True) + b.receive("hum", False) == []
+
+
+RESTING = (
+    SELF.replace("variable healthy: boolean = true", "")
+    .replace("on response from fault do healthy := false", "on response from fault goto turning")
+    .replace("state turning { on response from done goto idle }", "state turning { on response from done goto LATER }")
+    .replace("initial marked state idle", "marked state resting { }  initial marked state idle")
+    .replace("Rotator.idle and Rotator.healthy", "!Rotator.turning")
+)
+
+
+def test_what_came_true_after_the_message_releases_when_it_turns_again() -> None:
+    b = bench(RESTING.replace("LATER", "idle"))
+    assert len(b.tick()) == 1
+    assert b.receive("done") == []
+    assert b.receive("fault") == [ZERO]
+
+
+def test_so_does_a_conjunct_of_a_request_that_was_not_enabled_meanwhile() -> None:
+    b = bench(RESTING.replace("LATER", "resting"))
+    assert len(b.tick()) == 1
+    assert b.receive("done") == []
+    assert b.tick() == []
+    assert b.receive("fault") == [ZERO]
+
+
+def test_after_a_stop_nothing_acts_any_more() -> None:
+    b = driving()
+    b.executor.stop("SIGINT")
+    assert b.receive("clear", False) == []
+
+
+def test_so_does_a_request_without_requirements_that_was_enabled_meanwhile() -> None:
+    b = bench(
+        f"""
+        robot Lifted {{ {HEAD}
+          component Platform {{
+            incoming message move with identifier: "/cmd_vel", type: Twist links twist
+            outgoing message lift with type: none
+            outgoing message lower with type: none
+            behaviour {{
+              on response from lower goto down
+              on response from lift goto up
+              initial marked state down {{ on request to move goto up }}
+              marked state up {{ }}
+            }}
+          }}
+          provide move with {{ linear: {{ x: 0.5 }} }}
+        }}
+        """
+    )
+    assert b.tick() == [MOVE]
+    assert b.receive("lift") + b.receive("lower") == []
+    assert b.receive("lift") == [ZERO]

@@ -365,7 +365,7 @@ def test_each_sensor_stops_the_robot_once_and_again_after_its_return() -> None:
 
 
 def test_each_sensor_alone_is_watched_again_after_its_return() -> None:
-    b = bench(ROBOT, max_age_s={"/battery": 0.35})
+    b = bench(ROBOT, policy="priority", priority=("move",), max_age_s={"/battery": 0.35})
     for _ in range(3):
         b.receive("/battery", 12.0)
         assert b.status() is Status.RUNNING

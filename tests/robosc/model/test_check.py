@@ -73,6 +73,21 @@ def test_a_component_wins_over_a_type_and_a_variable_over_an_enum_value() -> Non
     assert behaviour.transitions[0].guard == VariableRead("C", "flag")
 
 
+def test_an_enum_rule_may_compare_a_property_that_is_an_enum() -> None:
+    model = model_of("""robot R {
+        interface i use Pair from p
+        datatype enum Side from double to { value > 1 -> far default -> near }
+        datatype object Pair { left: Side right: Side }
+        datatype enum Both from Pair to { value.left = far and value.right = far -> open default -> shut }
+        component C { outgoing message seen with type: Both links i }
+    }""")
+    (rule,) = model.enum("Both").rules
+    far = EnumValue("Side", "far")
+    assert rule.condition == Binary(
+        "and", Binary("=", Received(("left",)), far), Binary("=", Received(("right",)), far)
+    )
+
+
 def test_initial_values_and_defaults() -> None:
     model = model_of("""robot R {
         datatype enum E from double to { value > 1 -> first default -> fallback }

@@ -1,0 +1,132 @@
+"""What comes back to service calls and goals, or does not come in time (semantics 3.2)."""
+
+from __future__ import annotations
+
+from typing import Any, Optional
+
+from robosc.execution.calls import OUTCOMES, Calls, Goal, Goals
+from robosc.execution.protocol import Middleware
+from robosc.execution.recorder import Recorder
+from robosc.execution.rest import request_cancel
+from robosc.execution.steps import ExecutionError, Steps
+
+
+class Replies:
+    """Matches replies to requests and takes their events; methods that take one tell whether they did.
+
+    Args:
+        steps: Takes the events.
+        middleware: Cancels goals.
+        recorder: Is told what matches nothing.
+        calls: Service calls under way.
+        goals: Goals under way.
+    """
+
+    __slots__ = ("_calls", "_goals", "_middleware", "_recorder", "_steps")
+
+    def __init__(self, steps: Steps, middleware: Middleware, recorder: Recorder, calls: Calls, goals: Goals) -> None:
+        self._steps = steps
+        self._middleware = middleware
+        self._recorder = recorder
+        self._calls = calls
+        self._goals = goals
+
+    def forget(self) -> None:
+        """The model starts again: what is under way is nothing to it, but the end of goals is still awaited."""
+        self._calls.clear()
+        self._goals.leave_model()
+
+    def deadline_s(self) -> float:
+        """When the next call or goal is over its time."""
+        return min(self._calls.deadline_s(), self._goals.deadline_s())
+
+    def expire(self, now_s: float) -> None:
+        """What is over its time has failed; such a goal is also cancelled."""
+        for number in self._calls.expired(now_s):
+            service = self._calls.close(number)
+            self._steps.happen("{}.error".format(service), None, "timeout")
+            self._steps.settle()
+        for goal in self._goals.expired(now_s):
+            goal.is_running = False
+            self._steps.happen(goal.action + ".error", None, "timeout")
+            self._steps.settle()
+            request_cancel(self._middleware, goal)
+
+    def reply(self, request_id: int, data: Any) -> bool:
+        """A service call was answered."""
+        service = self._close_call(request_id)
+        if service is None:
+            return False
+        self._steps.happen_with_data(service + ".response", data)
+        return True
+
+    def call_failed(self, request_id: int, reason: str) -> bool:
+        """A service call will not be answered."""
+        service = self._close_call(request_id)
+        if service is None:
+            return False
+        self._steps.happen(service + ".error", None, reason)
+        return True
+
+    def goal_accepted(self, goal_id: int) -> None:
+        """A goal was accepted: a cancel that was decided before is sent now."""
+        goal = self._find_goal(goal_id, "an acceptance")
+        if goal is not None:
+            goal.is_accepted = True
+            if goal.is_cancel_wanted:
+                request_cancel(self._middleware, goal)
+
+    def feedback(self, goal_id: int, data: Any) -> bool:
+        """A goal's server told how far it is."""
+        goal = self._find_goal(goal_id, "feedback")
+        if goal is None:
+            return False
+        if not goal.is_running:
+            self._recorder.unexpected({"event": goal.action + ".feedback"})
+            return False
+        self._steps.happen_with_data(goal.action + ".feedback", data)
+        return True
+
+    def goal_ended(self, goal_id: int, outcome: str, data: Any) -> bool:
+        """A goal's end is known, or its server is lost.
+
+        Raises:
+            ExecutionError: There is no such outcome.
+        """
+        if outcome not in OUTCOMES:
+            raise ExecutionError("a goal cannot end as '{}'".format(outcome))
+        goal = self._find_goal(goal_id, "a result")
+        if goal is None:
+            return False
+        self._goals.close(goal_id)
+        # Its action may be requested again.
+        self._steps.enabled = None
+        if goal.is_running and outcome == "succeeded":
+            self._steps.happen_with_data(goal.action + ".response", data)
+        elif goal.is_running:
+            self._steps.happen(goal.action + ".error", None, outcome)
+        elif outcome == "succeeded":
+            self._recorder.unexpected({"event": goal.action + ".response"})
+        return goal.is_running
+
+    def cancel_refused(self, goal_id: int, ended: bool) -> None:
+        """A cancel was refused; that means nothing if the goal had ended.
+
+        Raises:
+            ExecutionError: The goal is running.
+        """
+        goal = None if ended else self._find_goal(goal_id, "a refused cancel")
+        if goal is not None:
+            raise ExecutionError("the cancel of a running goal of {} was refused".format(goal.action))
+
+    def _close_call(self, request_id: int) -> Optional[str]:
+        service = self._calls.close(request_id)
+        if service is None:
+            self._recorder.unexpected({"what": "a reply to no call"})
+        return service
+
+    def _find_goal(self, goal_id: int, what: str) -> Optional[Goal]:
+        goal = self._goals.find(goal_id)
+        if goal is None:
+            self._recorder.unexpected({"what": "{} of no goal".format(what)})
+        return goal

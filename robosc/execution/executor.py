@@ -173,7 +173,21 @@ class Executor:
             if self._may_request:
                 if self._decisions.decide(now):
                     self._deadline_s = self._next_deadline(now)
-            elif self._rest.restless:
+            elif self._rest.reasons:
+                self._rest.retry()
+        except Exception as error:
+            self._fail(describe_error(error))
+
+    def watch(self) -> None:
+        """Time has passed, but no period: stale sensors, replies that did not come, messages and cancels still owed.
+
+        An adapter with a long period calls this in between: none of these may wait for the next decision.
+        """
+        if not self._is_started:
+            return
+        try:
+            self._look_at_clock()
+            if self._rest.reasons:
                 self._rest.retry()
         except Exception as error:
             self._fail(describe_error(error))

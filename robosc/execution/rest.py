@@ -55,18 +55,15 @@ class Rest:
     def come_to_rest(self, now_s: float) -> List[str]:
         """Send every default message and cancel every goal; what failed, in words. Never raises."""
         self.restless = self._releases.identifiers
+        for goal in self._goals.all():
+            goal.is_cancel_wanted = True
+        self.awaited_until_s = now_s + CANCEL_WAIT_S
         failures = self.retry()
         self._releases.clear()
-        self.awaited_until_s = now_s + CANCEL_WAIT_S
-        for goal in self._goals.all():
-            try:
-                request_cancel(self._middleware, goal)
-            except Exception as error:
-                failures.append("cancel of {} failed: {}".format(goal.action, describe_error(error)))
         return failures
 
     def retry(self) -> List[str]:
-        """Send the default messages that are still owed; what failed, in words. Never raises."""
+        """Send the default messages and cancels that are still owed; what failed, in words. Never raises."""
         failures: List[str] = []
         owed: List[str] = []
         for identifier in self.restless:
@@ -76,6 +73,12 @@ class Rest:
                 owed.append(identifier)
                 failures.append("the default message on {} failed: {}".format(identifier, describe_error(error)))
         self.restless = tuple(owed)
+        for goal in self._goals.all():
+            if goal.is_cancel_wanted:
+                try:
+                    request_cancel(self._middleware, goal)
+                except Exception as error:
+                    failures.append("cancel of {} failed: {}".format(goal.action, describe_error(error)))
         return failures
 
     def is_awaiting(self, now_s: float) -> bool:

@@ -112,16 +112,22 @@ def read_boolean(value: Any) -> Any:
     return value if value is True or value is False else None
 
 
-def read_integer(value: Any) -> Any:
-    """A received integer; None where something else came or it needs more than 32 bits.
+def read_whole(value: Any) -> Any:
+    """A received integer of any size; None where something else came.
 
     Numbers of array libraries (an element of a fixed-size array of a ROS message is one) count as well.
     """
-    if type(value) is not int:
-        if value is True or value is False or not isinstance(value, numbers.Integral):
-            return None
-        value = int(value)
-    return value if -2147483648 <= value <= 2147483647 else None
+    if type(value) is int:
+        return value
+    if value is True or value is False or not isinstance(value, numbers.Integral):
+        return None
+    return int(value)
+
+
+def read_integer(value: Any) -> Any:
+    """A received integer; None where something else came or it needs more than 32 bits."""
+    value = read_whole(value)
+    return value if value is not None and -2147483648 <= value <= 2147483647 else None
 
 
 def read_double(value: Any) -> Any:

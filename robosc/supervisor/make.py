@@ -140,7 +140,12 @@ def _certify(
             f"the verifier refuses the supervisor: {verification.message or 'another number of states'}"
             + (f" after {', '.join(verification.trace)}" if verification.trace else "")
         )
-    method = "explicit forward search; permissiveness by explicit recomputation"
+    recomputed = (
+        f"permissiveness not recomputed: more than {PERMISSIVENESS_LIMIT} states"
+        if verification.maximally_permissive == "not checked"
+        else "permissiveness by explicit recomputation"
+    )
+    method = f"explicit forward search; {recomputed}"
     results = tuple[CheckResult, ...]("passed" if outcome == "passed" else "not checked" for outcome in outcomes)
     return _certificate(result, bundle, deployment, method, results, verification.transitions)
 

@@ -99,8 +99,10 @@ class _Datum:
         match type_:
             case BooleanType():
                 return values.read_boolean(raw)  # type: ignore[no-any-return]
+            case IntegerType(low=int(low), high=int(high)):
+                return self._in_range(values.read_whole(raw), low, high, path)
             case IntegerType():
-                return self._in_range(values.read_integer(raw), type_, path)
+                return values.read_integer(raw)  # type: ignore[no-any-return]
             case DoubleType():
                 return values.read_double(raw)  # type: ignore[no-any-return]
             case StringType():
@@ -110,12 +112,13 @@ class _Datum:
             case _:
                 return None
 
-    def _in_range(self, value: int | None, type_: IntegerType, path: Path) -> int | None:
-        if value is None or type_.low is None or type_.high is None:
-            return value
-        clamped = min(max(value, type_.low), type_.high)
+    def _in_range(self, value: int | None, low: int, high: int, path: Path) -> int | None:
+        """A number of a declared range: however far outside, it is moved to the nearest bound."""
+        if value is None:
+            return None
+        clamped = min(max(value, low), high)
         if clamped != value:
-            self.unknown.append(f"{path_text(path)} is {value}, outside {type_.low}..{type_.high}")
+            self.unknown.append(f"{path_text(path)} is {value}, outside {low}..{high}")
         return clamped
 
     def _enum_value(self, raw: Any, enum: _CompiledEnum, path: Path) -> str:

@@ -15,7 +15,8 @@ from robosc.execution.interpreter.functions import (
     holds,
     no_data,
 )
-from robosc.expressions import DoubleType, Expression, IntegerType, Received, Type, Value, domain, leaves, values
+from robosc.expressions import DoubleType, IntegerType, Type, Value, domain, values
+from robosc.model.received import converted_paths
 from robosc.model.structure import (
     CONTROLLABLE_KINDS,
     Behaviour,
@@ -90,7 +91,7 @@ class EventRule:
         conditions: What must be true beside plants and ranges.
         added: What the supervisor adds, or None.
         received: Declared type of its data, or None.
-        paths: The parts of its data that updates read.
+        paths: The parts of its data that are converted.
     """
 
     is_controllable: bool
@@ -156,7 +157,7 @@ def _event(
         conditions=conditions,
         added=None if diagram is None else diagram_function(diagram, domains),
         received=None if communication is None or kind is None else communication.received_type(kind),
-        paths=_paths(model, event),
+        paths=converted_paths(model, event),
     )
 
 
@@ -217,20 +218,6 @@ def _participant(component: Component, behaviour: Behaviour, event: str) -> Part
             for state in behaviour.states
         },
     )
-
-
-def _paths(model: Model, event: str) -> tuple[Path, ...]:
-    """The parts of received data that updates on an event read, each once, in source order."""
-    read: list[Expression] = [
-        leaf
-        for component in model.components
-        if component.behaviour
-        for transition in component.behaviour.transitions
-        if transition.event == event
-        for update in transition.updates
-        for leaf in leaves(update.expression)
-    ]
-    return tuple(dict.fromkeys(leaf.path for leaf in read if isinstance(leaf, Received)))
 
 
 def provided_function(provided: ProvidedValue) -> Callable[[State], tuple[bool, Any]]:

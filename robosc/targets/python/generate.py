@@ -16,7 +16,7 @@ from robosc.targets.python.text import indent, printable
 from robosc.targets.python.writer import Writer, make_writer
 
 _READING_FUNCTIONS = frozenset(
-    {"clamped", "element", "integer", "known", "member", "moved", "number", "number_at", "stays_in_range"}
+    {"clamped", "element", "integer", "known", "member", "moved", "number", "number_at", "stays_in_range", "whole"}
 )
 
 OLDEST_PYTHON = (3, 8)

@@ -15,7 +15,7 @@ from robosc.expressions import (
     Received,
     StringType,
     Type,
-    leaves,
+    children,
 )
 from robosc.expressions.text import expression_text
 from robosc.model.structure import EnumDefinition, Model
@@ -35,15 +35,6 @@ from robosc.targets.python.naming import Namer
 from robosc.targets.python.text import comment, indent
 
 Path = tuple[PathStep, ...]
-
-
-def received_paths(expressions: list[Expression]) -> tuple[Path, ...]:
-    """Every path of received data that the expressions read, each once, in order of appearance."""
-    return tuple(
-        dict.fromkeys(
-            leaf.path for expression in expressions for leaf in leaves(expression) if isinstance(leaf, Received)
-        )
-    )
 
 
 def path_text(path: Path) -> str:
@@ -141,7 +132,7 @@ class Reader:
                 return self._assign(path, type_, self._call("number", self._access(path)), Unknown.NAN)
             case IntegerType(low=int(low), high=int(high)):
                 received = self._local(path, "_received")
-                self._lines.append(f"{received} = {self._call('integer', self._access(path))}")
+                self._lines.append(f"{received} = {self._call('whole', self._access(path))}")
                 self.words.append(self._call("moved", repr(path_text(path)), received, repr(low), repr(high)))
                 text = self._call("clamped", received, repr(low), repr(high))
                 return self._assign(path, type_, text, Unknown.NAN)
@@ -204,8 +195,18 @@ def _flags(reader: Reader) -> str:
     return " or ".join(reader.enum_flags) or "False"
 
 
+_ARITHMETIC = frozenset({"+", "-", "*", "/"})
+
+
 def _may_be_unknown(conditions: list[Expression]) -> bool:
-    return any(isinstance(leaf, Received) for condition in conditions for leaf in leaves(condition))
+    """Whether a condition reads received data or computes: even constants can leave 32 bits."""
+    stack = list(conditions)
+    while stack:
+        node = stack.pop()
+        if isinstance(node, Received) or getattr(node, "operator", None) in _ARITHMETIC:
+            return True
+        stack.extend(children(node))
+    return False
 
 
 def _no_variable(component: str, variable: str) -> tuple[str, Type]:
@@ -216,4 +217,4 @@ def _no_location(automaton: str) -> str:
     raise InternalError(f"an enum rule reads the state of {automaton}")
 
 
-__all__ = ["Path", "Reader", "converter", "path_text", "path_type", "received_paths"]
+__all__ = ["Path", "Reader", "converter", "path_text", "path_type"]

@@ -22,12 +22,13 @@ from robosc.expressions import (
     leaves,
 )
 from robosc.expressions.text import expression_text
+from robosc.model.received import converted_paths
 from robosc.model.structure import Behaviour, EventKind, Transition, Update, Variable, is_tau
 from robosc.targets.python.allow import accepted
 from robosc.targets.python.expressions import TRUE_CODE, Code, Scope, Sort, Unknown, code_for, negated, value
 from robosc.targets.python.layout import has_plant_location, is_controllable, plant_step, split
 from robosc.targets.python.naming import Namer
-from robosc.targets.python.received import Path, Reader, path_text, path_type, received_paths
+from robosc.targets.python.received import Path, Reader, path_text, path_type
 from robosc.targets.python.text import comment, docstring, indent
 from robosc.targets.python.writer import Writer
 
@@ -37,10 +38,10 @@ _Branch = tuple[tuple[str, ...], Transition]
 
 def read_method(writer: Writer, event: str) -> list[str]:
     """The method that converts what came with an uncontrollable event."""
-    paths = event_paths(writer, event)
+    paths = converted_paths(writer.model, event)
     head = [f"def {writer.layout.methods['read', event]}(self, data):"]
     if not paths:
-        return [*head, f"    {docstring(f'{event}: no update reads its data.')}", "    return NO_DATA"]
+        return [*head, f"    {docstring(f'{event}: nothing of its data is converted.')}", "    return NO_DATA"]
     reader = Reader(writer.layout, _event_type(writer, event), writer.used)
     codes = [reader.read(path) for path in paths]
     entries = ", ".join(f"{path_text(path)!r}: {reader.seen(path)}" for path in paths)
@@ -54,23 +55,10 @@ def read_method(writer: Writer, event: str) -> list[str]:
     ]
 
 
-def event_paths(writer: Writer, event: str) -> tuple[Path, ...]:
-    """The paths of received data that updates on an event read, in order of appearance."""
-    return received_paths([update.expression for _, _, update in _updates(writer, event)])
-
-
-def _updates(writer: Writer, event: str) -> Iterator[tuple[str, Transition, Update]]:
-    for component, behaviour in writer.layout.behaviours:
-        for transition in behaviour.transitions:
-            if transition.event == event:
-                for update in transition.updates:
-                    yield component, transition, update
-
-
 def _event_type(writer: Writer, event: str) -> Type:
     name, kind = split(event)
     type_ = writer.model.communication(name).received_type(EventKind(kind))
-    assert type_ is not None  # noqa: S101  # An update may read data only where data comes (language A.3).
+    assert type_ is not None  # noqa: S101  # There are paths only where data comes.
     return type_
 
 
@@ -86,7 +74,7 @@ class _StepWriter:
         self.writer = writer
         self.event = event
         self.namer = Namer(("self", "values", "skipped", "reading"))
-        self.paths = event_paths(writer, event)
+        self.paths = converted_paths(writer.model, event)
         self.received: dict[Path, Code] = {}
         self.copies: dict[str, str] = {}
         self.may_skip = False

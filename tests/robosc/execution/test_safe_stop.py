@@ -219,6 +219,45 @@ def test_a_cancel_that_fails_keeps_nothing_else_from_stopping() -> None:
     assert b.executor.is_faulty
 
 
+@pytest.mark.parametrize("again", ["tick", "watch"])
+def test_a_cancel_that_failed_is_tried_again(again: str) -> None:
+    b = going()
+    b.executor.on_goal_accepted(1)
+    b.middleware.failing.add("cancel_goal")
+    b.executor.stop("SIGINT")
+    b.middleware.failing.clear()
+    b.middleware.sent.clear()
+    for _ in range(3):
+        getattr(b.executor, again)()
+    assert b.middleware.sent == [("cancel", "go", 1)]
+
+
+def test_a_stale_sensor_is_noticed_between_two_distant_decisions() -> None:
+    b = bench(ROBOT, policy="priority", priority=("move",), period_s=60.0, max_age_s={"/scan": 0.25})
+    b.receive("/scan", True)
+    b.executor.tick()
+    assert b.middleware.sent == [MOVE]
+    b.middleware.sent.clear()
+    b.clock.advance(0.2)
+    b.executor.watch()
+    assert b.middleware.sent == []
+    b.clock.advance(0.1)
+    b.executor.watch()
+    assert b.middleware.sent == ZEROS * 2
+    assert b.status() is Status.STOPPED
+
+
+def test_watching_before_the_start_or_with_a_broken_clock_harms_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    b = Bench(system_of(ROBOT), start=False)
+    b.executor.watch()
+    assert b.status() is Status.NEW
+    b.executor.start()
+    monkeypatch.setattr(b.executor, "_check_time", None)
+    monkeypatch.setattr(b.executor, "_deadline_s", 0.0)
+    b.executor.watch()
+    assert b.executor.is_faulty
+
+
 def test_after_a_fault_it_stays_stopped_until_a_restart_in_the_initial_state() -> None:
     b = moving()
     b.receive("/scan", True)

@@ -212,7 +212,17 @@ def test_an_update_that_is_unknown_leaves_its_variable(value: Any) -> None:
 
 @pytest.mark.parametrize(
     ("value", "expected", "unknown"),
-    [(3, 3, 0), (9, 5, 1), (-4, 0, 1), (2**31, 3, 1), (2.0, 3, 1), (True, 3, 1), ("4", 3, 1), (NAN, 3, 1)],
+    [
+        (3, 3, 0),
+        (9, 5, 1),
+        (-4, 0, 1),
+        (2**31, 5, 1),
+        (-(2**70), 0, 1),
+        (2.0, 3, 1),
+        (True, 3, 1),
+        ("4", 3, 1),
+        (NAN, 3, 1),
+    ],
 )
 def test_a_received_integer_is_moved_into_its_range(value: Any, expected: int, unknown: int) -> None:
     b = bench(RADAR)
@@ -229,7 +239,32 @@ def test_a_clamped_integer_is_no_fault_even_where_unknown_is() -> None:
     assert b.variable("Sensor", "n") == 5
 
 
-def test_only_what_updates_read_is_converted() -> None:
+UNREAD = """
+robot Unread {
+  datatype enum Range from double to { value > 1.0 -> far default -> near }
+  component Sensor {
+    outgoing message range with identifier: "/range", type: Range
+    behaviour { initial marked state waiting { on response from range goto seen } marked state seen { } }
+  }
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("on_unknown", "state", "status"),
+    [("default", "seen", Status.RUNNING), ("keep", "waiting", Status.WAITING), ("fault", "seen", Status.STOPPED)],
+)
+def test_an_enum_that_no_update_reads_counts_as_well(on_unknown: str, state: str, status: Status) -> None:
+    b = bench(UNREAD, on_unknown=on_unknown, max_age_s={"/range": 1.0})
+    b.receive("/range", NAN)
+    assert b.executor.counters.unknown == 1
+    assert len(b.entries("unknown")) == 1
+    assert b.status() is status
+    if on_unknown != "fault":
+        assert b.state("Sensor") == state
+
+
+def test_a_number_that_no_update_reads_is_not_converted() -> None:
     b = bench(RADAR)
     b.receive("level", 5)
     b.tick()

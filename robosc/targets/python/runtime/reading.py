@@ -51,6 +51,12 @@ def integer(value: Any) -> Any:
     return NAN if result is None else result
 
 
+def whole(value: Any) -> Any:
+    """A received integer of any size, for a declared range; NaN where something else came."""
+    result = values.read_whole(value)
+    return NAN if result is None else result
+
+
 def clamped(value: Any, low: int, high: int) -> Any:
     """A received integer moved into its declared range; NaN stays NaN."""
     if value < low:

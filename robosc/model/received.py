@@ -1,0 +1,43 @@
+"""Which parts of received data are converted when an event happens: the same in every executor."""
+
+from collections.abc import Iterator
+
+from robosc.expressions import EnumType, ObjectType, PathStep, Received, Type, leaves
+from robosc.model.structure import EventKind, Model, is_tau
+
+Path = tuple[PathStep, ...]
+
+
+def converted_paths(model: Model, event: str) -> tuple[Path, ...]:
+    """What updates on an event read, then every other enum that it carries, each part once.
+
+    An enum is converted whether an update reads it or not: only then is it noticed that a datum leaves it
+    unknown (language B.4). Elements of arrays, of which there may be any number, only count where they are read.
+    """
+    return tuple(dict.fromkeys((*_read_paths(model, event), *_enum_paths(model, event))))
+
+
+def _read_paths(model: Model, event: str) -> Iterator[Path]:
+    for component in model.components:
+        for transition in component.behaviour.transitions if component.behaviour else ():
+            if transition.event == event:
+                for update in transition.updates:
+                    yield from (leaf.path for leaf in leaves(update.expression) if isinstance(leaf, Received))
+
+
+def _enum_paths(model: Model, event: str) -> Iterator[Path]:
+    if is_tau(event):
+        return
+    name, _, kind = event.partition(".")
+    received = model.communication(name).received_type(EventKind(kind))
+    if received is not None:
+        yield from _enums_in(model, received, ())
+
+
+def _enums_in(model: Model, type_: Type, path: Path) -> Iterator[Path]:
+    match type_:
+        case EnumType():
+            yield path
+        case ObjectType(name=name):
+            for item in model.object(name).properties:
+                yield from _enums_in(model, item.type, (*path, item.name))

@@ -1,0 +1,107 @@
+"""The whole pipeline in one call: outcomes, certificate, cancellation."""
+
+from typing import Any
+
+import pytest
+
+from robosc.automata import System, to_automata
+from robosc.errors import InternalError, SynthesisCancelled
+from robosc.model.structure import Deployment
+from robosc.supervisor import MadeStatus, Progress, encode, make_supervisor, summary_json, summary_text
+from robosc.supervisor.conditions import state_predicates
+from robosc.supervisor.structure import AddedCondition, DecisionDiagram
+from robosc.synthesis import SynthesisResult, synthesize
+from robosc.verification import verify
+from support.models import EXAMPLE_NAMES, bundle_of, example_bundle
+
+COUNTER = """robot Counter {
+    component C {
+        service count with request: none, response: none links i
+        behaviour {
+            variable n: integer(0..99)
+            on response from count do n := n + 1
+            initial marked state s { }
+        }
+    }
+    interface i use S from p
+    requirement count needs C.n >= 0
+}"""
+
+
+@pytest.mark.parametrize("name", EXAMPLE_NAMES)
+@pytest.mark.parametrize("deployment", list(Deployment))
+def test_the_examples_get_a_certified_supervisor(name: str, deployment: Deployment) -> None:
+    bundle = example_bundle(name)
+    made = make_supervisor(bundle, deployment=deployment)
+    assert made.status is MadeStatus.SUPERVISOR
+    assert made.supervisor is not None
+    certificate = made.supervisor.certificate
+    assert (certificate.deployment, certificate.bundle_sha256) == (deployment, bundle.digest)
+    checks = (certificate.safe, certificate.controllable, certificate.nonblocking, certificate.maximally_permissive)
+    assert set(checks) == {"passed"}
+    system = to_automata(made.supervisor.model, deployment)
+    found = verify(system, state_predicates(system, made.supervisor.added))
+    assert (str(found.states), str(found.transitions)) == (certificate.states, certificate.transitions)
+    assert summary_json(made.supervisor)["states"] == found.states
+    assert f"{found.states} states, {found.transitions} transitions" in summary_text(made.supervisor)
+
+
+def test_the_same_bundle_gives_the_same_bytes() -> None:
+    made = [make_supervisor(example_bundle("navigation/navigation"), engine=engine) for engine in ("cudd", "autoref")]
+    contents = {encode(item.supervisor) for item in made if item.supervisor}
+    assert len(contents) == 1
+
+
+def test_a_count_that_nobody_could_stop_is_stopped_in_time() -> None:
+    """A response cannot be forbidden, so the request before it must be, at the last value."""
+    made = make_supervisor(bundle_of(COUNTER))
+    assert made.supervisor is not None
+    assert summary_json(made.supervisor)["added"] == {
+        "count.request": "C.n <= 98",
+        "count.reset": "true",
+    }
+
+
+def test_what_is_too_large_to_search_is_not_called_checked(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robosc.supervisor.make.PERMISSIVENESS_LIMIT", 50)
+    made = make_supervisor(bundle_of(COUNTER))
+    assert made.supervisor is not None
+    certificate = made.supervisor.certificate
+    assert (certificate.safe, certificate.maximally_permissive) == ("passed", "not checked")
+    assert "not recomputed: more than 50" in certificate.method
+    monkeypatch.setattr("robosc.supervisor.make.VERIFICATION_LIMIT", 50)
+    made = make_supervisor(bundle_of(COUNTER))
+    assert made.supervisor is not None
+    assert made.supervisor.certificate.safe == "not checked"
+    assert made.supervisor.certificate.transitions is None
+    assert made.supervisor.certificate.states == certificate.states
+
+
+def test_a_model_with_errors_and_a_library_have_none() -> None:
+    broken = make_supervisor(bundle_of("robot R { requirement x needs true }"))
+    assert (broken.status, broken.supervisor) == (MadeStatus.MODEL_ERRORS, None)
+    assert [item.code for item in broken.diagnostics] == ["unknown-name"]
+    library = make_supervisor(bundle_of("library L { component C { incoming message m with type: none } }"))
+    assert library.status is MadeStatus.MODEL_ERRORS
+    assert "no robot" in library.reason
+
+
+def test_a_wrong_synthesis_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The verifier stands between a fault of the synthesizer and a robot."""
+
+    def wrong(system: System, **options: Any) -> SynthesisResult:
+        result = synthesize(system, **options)
+        spoilt = tuple(AddedCondition(item.event, DecisionDiagram((), 1)) for item in result.added)
+        return SynthesisResult(result.status, spoilt, result.statistics)
+
+    monkeypatch.setattr("robosc.supervisor.make.synthesize", wrong)
+    with pytest.raises(InternalError, match="the verifier refuses the supervisor: not safe"):
+        make_supervisor(bundle_of(COUNTER))
+
+
+def test_progress_and_cancellation() -> None:
+    told: list[Progress] = []
+    make_supervisor(bundle_of(COUNTER), on_progress=told.append)
+    assert list(dict.fromkeys(item.stage for item in told)) == ["check", "synthesis", "verification"]
+    with pytest.raises(SynthesisCancelled):
+        make_supervisor(bundle_of(COUNTER), should_stop=lambda: True)

@@ -199,7 +199,8 @@ def judge(log: Path, record: Path) -> list[str]:
 
 def main() -> int:
     """Run the demonstration; 0 if the robot did what its requirements say."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.default_int_handler)
     try:
         with tempfile.TemporaryDirectory(prefix="robosc-demo-") as folder:
             faults = run(Path(folder))

@@ -56,8 +56,8 @@ def guarded(program: str, run: Callable[[], int]) -> int:
         return ExitCode.USAGE
     except RoboscError as error:
         sys.stderr.write(f"{program}: {error}\n")
-        # An engine or target that nobody has is wrong use, not a fault of the model.
-        return ExitCode.USAGE if isinstance(error, LookupError) else ExitCode.FAILED
+        # An engine or target that nobody has, or a folder that cannot be written, is no fault of the model.
+        return ExitCode.USAGE if isinstance(error, LookupError | OSError) else ExitCode.FAILED
     except KeyboardInterrupt:
         sys.stderr.write(f"{program}: interrupted\n")
         return ExitCode.INTERRUPTED

@@ -5,7 +5,9 @@ goes to standard output and holds the findings too.
 """
 
 import json
+import os
 import sys
+import tempfile
 from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from pathlib import Path
@@ -68,18 +70,36 @@ def has_errors(diagnostics: Sequence[Diagnostic], *, strict: bool = False) -> bo
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write a result file whole or not at all.
+    """Write a result file whole or not at all; what is no plain file (a device, a pipe) is written to as it is.
 
     Raises:
         UsageError: The place cannot be written.
     """
-    temporary = path.with_name(path.name + ".part")
+    temporary: Path | None = None
     try:
-        temporary.write_bytes(content)
-        temporary.replace(path)
+        target = path.resolve()
+        if target.exists() and not target.is_file():
+            with target.open("wb") as place:
+                place.write(content)
+            return
+        mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~_umask()
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+        temporary = Path(name)
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        temporary.chmod(mode)
+        temporary.replace(target)
     except OSError as error:
-        temporary.unlink(missing_ok=True)
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
         raise UsageError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def _umask() -> int:
+    """The permissions that this process takes from new files; it can only be read by setting it."""
+    mask = os.umask(0o077)
+    os.umask(mask)
+    return mask
 
 
 class ProgressLine:

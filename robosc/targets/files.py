@@ -25,6 +25,10 @@ class OverwriteError(RoboscError):
     """Writing would lose something of the user's; nothing was written."""
 
 
+class UnwritableError(OverwriteError, OSError):
+    """The folder that files should go to cannot be written."""
+
+
 class GeneratedFiles(Mapping[str, str]):
     """Texts by relative path (with `/`), sorted; frozen.
 
@@ -87,8 +91,8 @@ def write_files(files: GeneratedFiles, directory: Path, force: bool = False) -> 
         The path of every generated file, sorted.
 
     Raises:
-        OverwriteError: A file was changed by somebody, or the place cannot be written; nothing was written
-            in the first case.
+        OverwriteError: A file was changed by somebody; nothing was written.
+        UnwritableError: The place cannot be written.
     """
     try:
         earlier = _read_manifest(directory)
@@ -100,7 +104,7 @@ def write_files(files: GeneratedFiles, directory: Path, force: bool = False) -> 
         _write_atomically(directory / MANIFEST, _manifest_text(files, earlier), is_executable=False)
     except OSError as error:
         place = error.filename or directory
-        raise OverwriteError(f"cannot write to {place}: {(error.strerror or str(error)).lower()}") from error
+        raise UnwritableError(f"cannot write to {place}: {(error.strerror or str(error)).lower()}") from error
     return tuple(directory / path for path in files)
 
 

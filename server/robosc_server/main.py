@@ -17,6 +17,7 @@ from grpc_health.v1 import health, health_pb2, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection
 
 from robosc_server import convert
+from robosc_server.malformed import MalformedRequests
 from robosc_server.pool import WORKER_COMMAND, StartError, WorkerPool
 from robosc_server.service import SynthesisService
 from robosc_server.settings import Settings, parse_settings
@@ -61,12 +62,13 @@ async def running_server(settings: Settings, worker_command: Sequence[str] = WOR
         StartError: No worker can be started.
     """
     server = grpc.aio.server(
+        interceptors=[MalformedRequests(convert.SERVICE_NAME)],
         options=[
             # Without this two servers could share a port and each get some of the requests.
             ("grpc.so_reuseport", 0),
             # Room for what is not text in a request; the bundle itself is measured when it is there.
             ("grpc.max_receive_message_length", settings.max_bundle_bytes + 2**20),
-        ]
+        ],
     )
     host = f"[{settings.host}]" if ":" in settings.host and not settings.host.startswith("[") else settings.host
     try:

@@ -61,7 +61,10 @@ def test_the_demonstration_passes_and_leaves_nothing(demo: tuple["subprocess.Pop
     assert leftovers(folder) == []
 
 
-def test_ctrl_c_stops_everything(demo: tuple["subprocess.Popen[str]", Path]) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
+def test_ctrl_c_or_a_closed_terminal_stops_everything(
+    demo: tuple["subprocess.Popen[str]", Path], number: signal.Signals
+) -> None:
     child, folder = demo
     assert child.stdout is not None
     started = time.monotonic()
@@ -69,7 +72,7 @@ def test_ctrl_c_stops_everything(demo: tuple["subprocess.Popen[str]", Path]) -> 
         if "are running" in line:
             break
         assert time.monotonic() - started < LIMIT_S
-    child.send_signal(signal.SIGINT)
+    child.send_signal(number)
     _, errors = child.communicate(timeout=LIMIT_S)
     assert child.returncode == 130, errors
     assert errors == "interrupted; everything is stopped\n"

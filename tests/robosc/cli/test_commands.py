@@ -145,6 +145,24 @@ def test_a_library_has_no_supervisor(capsys: pytest.CaptureFixture[str], tmp_pat
     assert "a library has no robot" in capsys.readouterr().err
 
 
+def test_an_output_that_is_no_plain_file_stays_what_it_is(tmp_path: Path) -> None:
+    pipe, link, target = tmp_path / "pipe", tmp_path / "link.rsup", tmp_path / "target.rsup"
+    os.mkfifo(pipe)
+    reader = subprocess.Popen(["cat", str(pipe)], stdout=subprocess.PIPE)
+    assert main(["synth", LINE_FOLLOWER, "-o", str(pipe)]) == 0
+    content, _ = reader.communicate(timeout=30)
+    assert pipe.is_fifo()
+    target.write_bytes(b"old")
+    target.chmod(0o640)
+    link.symlink_to(target.name)
+    (tmp_path / "link.rsup.part").write_bytes(b"somebody's")
+    assert main(["synth", LINE_FOLLOWER, "-o", str(link)]) == 0
+    assert link.is_symlink()
+    assert target.read_bytes() == content
+    assert target.stat().st_mode & 0o777 == 0o640
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["link.rsup", "link.rsup.part", "pipe", "target.rsup"]
+
+
 def test_explore_prints_the_graph(capsys: pytest.CaptureFixture[str]) -> None:
     status, document = run_json(capsys, "explore", LINE_FOLLOWER)
     assert status == 0
@@ -186,6 +204,8 @@ def test_generate_writes_a_package_and_keeps_what_a_user_changed(
         (["check", "{folder}"], "is a folder"),
         (["check", LINE_FOLLOWER, "-L", "{folder}/nowhere"], "there is no library folder"),
         (["synth", LINE_FOLLOWER, "-o", "{folder}/no/such/place.rsup"], "cannot write"),
+        (["synth", LINE_FOLLOWER, "-o", "{folder}"], "cannot write"),
+        (["generate", LINE_FOLLOWER, "--target", "python", "-o", LINE_FOLLOWER], "cannot write"),
     ],
 )
 def test_wrong_use_is_one_line_and_status_2(

@@ -2,6 +2,7 @@ import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import grpc
 import pytest
@@ -34,17 +35,17 @@ NOWHERE = "127.0.0.1:1"
 
 
 @pytest.fixture(scope="module")
-def fake():
+def fake() -> Any:
     """A client of a server whose work does what the model's text says."""
     with served(Settings(port=0, workers=2, max_bundle_bytes=1000), FAKE_WORKER) as address, Client(address) as client:
         yield client
 
 
-def result(**fields):
+def result(**fields: Any) -> Any:
     return [pb.SynthesizeResponse(result=pb.SynthesisResult(**fields))]
 
 
-def test_public_names():
+def test_public_names() -> None:
     assert set(robosc_client.__all__) == {
         "Client",
         "ClientError",
@@ -63,7 +64,7 @@ def test_public_names():
 
 
 class TestErrors:
-    def test_kin(self):
+    def test_kin(self) -> None:
         assert issubclass(ServerUnavailableError, ConnectionError)
         assert issubclass(DeadlineError, TimeoutError)
         for error in (ServerUnavailableError, DeadlineError, RequestRefusedError, ServiceError):
@@ -77,11 +78,11 @@ class TestErrors:
             lambda client: client.generate(bundle_of(""), target="python"),
         ],
     )
-    def test_nobody_there(self, call):
+    def test_nobody_there(self, call: Any) -> None:
         with Client(NOWHERE) as client, pytest.raises(ServerUnavailableError, match=NOWHERE):
             call(client)
 
-    def test_deadline(self, fake):
+    def test_deadline(self, fake: Any) -> None:
         pids = []
         with pytest.raises(DeadlineError, match=r"within 1\.5 seconds"):
             fake.synthesize(
@@ -90,7 +91,7 @@ class TestErrors:
         assert len(pids) == 1
         assert eventually(lambda: not is_running(pids[0]))
 
-    def test_the_servers_own_limit(self):
+    def test_the_servers_own_limit(self) -> None:
         settings = Settings(port=0, workers=1, max_synthesis_seconds=1.0)
         with (
             served(settings, FAKE_WORKER) as address,
@@ -99,7 +100,7 @@ class TestErrors:
         ):
             client.check(bundle_of("stuck"), deadline_s=PATIENCE_S)
 
-    def test_refused(self, fake):
+    def test_refused(self, fake: Any) -> None:
         with pytest.raises(RequestRefusedError, match="there is no such thing"):
             fake.check(bundle_of("refuse"))
         with pytest.raises(RequestRefusedError, match="1011 bytes"):
@@ -107,12 +108,12 @@ class TestErrors:
         with pytest.raises(RequestRefusedError, match="Unicode"):
             fake.check(bundle_of("", "robot\udcff.rscd"))
 
-    def test_server_fault(self, fake):
+    def test_server_fault(self, fake: Any) -> None:
         with pytest.raises(ServiceError, match=r"internal error [0-9a-f]{8}") as caught:
             fake.check(bundle_of("fault"))
         assert "Traceback" not in str(caught.value)
 
-    def test_a_stranger_answers(self):
+    def test_a_stranger_answers(self) -> None:
         with ThreadPoolExecutor(1) as threads:
             server = grpc.server(threads)
             port = server.add_insecure_port("127.0.0.1:0")
@@ -123,19 +124,19 @@ class TestErrors:
 
 
 class TestProgress:
-    def test_every_report_in_order(self, fake):
+    def test_every_report_in_order(self, fake: Any) -> None:
         messages = []
         synthesis = fake.synthesize(bundle_of("reports"), on_progress=lambda item: messages.append(item.message))
         assert messages == [f"step {number}" for number in range(100)]
         assert (synthesis.status, synthesis.reason) == (SynthesisStatus.EMPTY, "because")
 
-    def test_an_exception_of_the_caller_ends_the_work(self, fake):
+    def test_an_exception_of_the_caller_ends_the_work(self, fake: Any) -> None:
         pids = []
 
         class StopNowError(Exception):
             pass
 
-        def stop(progress):
+        def stop(progress: Any) -> None:
             pids.append(int(progress.message))
             raise StopNowError
 
@@ -147,7 +148,7 @@ class TestProgress:
         assert caught.tb
         print(f"work ended after {time.monotonic() - begun:.3f} s")
 
-    def test_two_threads_share_a_client(self, fake):
+    def test_two_threads_share_a_client(self, fake: Any) -> None:
         results = []
         threads = [
             threading.Thread(target=lambda: results.append(fake.synthesize(bundle_of("reports")).status))
@@ -174,12 +175,12 @@ class TestHostileServers:
             result(status=pb.SYNTHESIS_STATUS_SUPERVISOR, supervisor=b"x", summary=pb.Summary(states="many")),
         ],
     )
-    def test_synthesis(self, answers):
+    def test_synthesis(self, answers: Any) -> None:
         with scripted(Scripted(synthesize=answers)) as address, Client(address) as client, pytest.raises(ServiceError):
             client.synthesize(bundle_of(""))
 
     @pytest.mark.parametrize("path", ["/etc/passwd", "../x", "a/../../x", "", "a\0b", "a//b", "C:\\x"])
-    def test_paths_of_generated_files(self, path):
+    def test_paths_of_generated_files(self, path: Any) -> None:
         response = pb.GenerateResponse(
             status=pb.SYNTHESIS_STATUS_SUPERVISOR, files=[pb.GeneratedFile(path=path, content="x")]
         )
@@ -190,7 +191,7 @@ class TestHostileServers:
         ):
             client.generate(bundle_of(""), target="python")
 
-    def test_severity(self):
+    def test_severity(self) -> None:
         response = pb.CheckResponse(diagnostics=[pb.Diagnostic()])
         with (
             scripted(Scripted(check=response)) as address,
@@ -213,7 +214,7 @@ FINDINGS = (
 class TestConversion:
     """What one side packs the other unpacks to the same values."""
 
-    def test_bundle(self):
+    def test_bundle(self) -> None:
         bundle = Bundle(
             SourceFile("robot.rscd", "robot \u00e9"), (SourceFile("../shared/a.rscd", ""),), ("here", "../shared")
         )
@@ -224,20 +225,20 @@ class TestConversion:
         assert server_convert.generate_job(generate, 1000).target == "ros2"
         assert server_convert.check_job(client_convert.check_request(bundle), 1000).bundle == bundle
 
-    def test_libraries_are_sorted_for_the_core(self):
+    def test_libraries_are_sorted_for_the_core(self) -> None:
         files = [pb.SourceFile(name=name) for name in ("b", "a")]
         request = pb.CheckRequest(bundle=pb.Bundle(main=pb.SourceFile(name="m"), libraries=files))
         assert [file.name for file in server_convert.check_job(request, 1000).bundle.libraries] == ["a", "b"]
 
-    def test_no_options_are_the_defaults(self):
+    def test_no_options_are_the_defaults(self) -> None:
         request = pb.SynthesizeRequest(bundle=pb.Bundle(main=pb.SourceFile(name="m")))
         job = server_convert.synthesize_job(request, 1000)
         assert (job.deployment, job.engine) == (Deployment.CONTROLLER, "auto")
 
-    def test_diagnostics(self):
+    def test_diagnostics(self) -> None:
         assert client_convert.check_diagnostics(server_convert.check_response(CheckOutcome(FINDINGS))) == FINDINGS
 
-    def test_diagnostics_of_every_example(self):
+    def test_diagnostics_of_every_example(self) -> None:
         found = [check(load_bundle(model)).diagnostics for model in EXAMPLES]
         assert any(found)
         for diagnostics in found:
@@ -247,12 +248,12 @@ class TestConversion:
             )
 
     @pytest.mark.parametrize("status", list(SynthesisStatus))
-    def test_synthesis(self, status):
+    def test_synthesis(self, status: Any) -> None:
         is_made = status is SynthesisStatus.SUPERVISOR
         figures = Figures(2, 3, str(10**40), "", (("move.request", "true"),), "text\n") if is_made else None
         statistics = Statistics("autoref", 7, 3, 10**12, 5) if is_made else None
         outcome = SynthesizeOutcome(str(status), FINDINGS, "why", b"x" if is_made else b"", figures, statistics)
-        there = client_convert.progress_or_synthesis(server_convert.synthesize_response(outcome))
+        there: Any = client_convert.progress_or_synthesis(server_convert.synthesize_response(outcome))
         assert (there.status, there.diagnostics, there.reason) == (status, FINDINGS, "why")
         assert there.supervisor == outcome.supervisor
         if figures:
@@ -267,9 +268,9 @@ class TestConversion:
             assert there.statistics is None
 
     @pytest.mark.parametrize("status", list(SynthesisStatus))
-    def test_generation(self, status):
+    def test_generation(self, status: Any) -> None:
         files = (("a/b.py", "text", True), ("c", "", False)) if status is SynthesisStatus.SUPERVISOR else ()
-        there = client_convert.generation(
+        there: Any = client_convert.generation(
             server_convert.generate_response(GenerateOutcome(str(status), FINDINGS, "why", files))
         )
         assert (there.status, there.diagnostics, there.reason) == (status, FINDINGS, "why")

@@ -1,7 +1,9 @@
 import signal
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -56,7 +58,11 @@ library Parts {
 """
 
 
-def long_work(count):
+def has_ended(pid: int) -> bool:
+    return not is_running(pid)
+
+
+def long_work(count: Any) -> Any:
     """A model whose synthesis takes many times the deadline: counters that are multiplied with each other."""
     components = "".join(
         f"""
@@ -78,24 +84,24 @@ def long_work(count):
 
 
 @pytest.fixture(scope="module")
-def server():
+def server() -> Any:
     """Address of a real server, a program of its own."""
     with server_process() as (_, address):
         yield address
 
 
 @pytest.fixture(scope="module")
-def fake():
+def fake() -> Any:
     """Address of a server whose work does what the model's text says."""
     with served(Settings(port=0, workers=2, max_bundle_bytes=1000), FAKE_WORKER) as address:
         yield address
 
 
 @pytest.fixture
-def both(tmp_path, monkeypatch, capfd, server):
+def both(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], server: Any) -> Any:
     """Run a command here and on the server, each in a folder of its own; gives what each did."""
 
-    def run(*arguments):
+    def run(*arguments: Any) -> Any:
         outcomes = []
         for name, program, more in (("here", robosc, []), ("there", robosc_client, ["--server", server])):
             folder = tmp_path / name
@@ -114,26 +120,26 @@ def both(tmp_path, monkeypatch, capfd, server):
     return run
 
 
-def write(folder, text, name="robot.rscd"):
+def write(folder: Any, text: str, name: str = "robot.rscd") -> Any:
     path = folder / name
     path.write_text(text)
     return path
 
 
 class TestSameAsHere:
-    def test_there_are_examples(self):
+    def test_there_are_examples(self) -> None:
         assert len(EXAMPLES) >= 4
 
     @pytest.mark.parametrize("json", [[], ["--json"]])
     @pytest.mark.parametrize("model", EXAMPLES, ids=lambda path: path.stem)
-    def test_check(self, both, model, json):
+    def test_check(self, both: Any, model: Any, json: Any) -> None:
         here, there = both("check", model, *json)
         assert here == there
         assert here[0] == 0
 
     @pytest.mark.parametrize("deployment", ["controller", "layer"])
     @pytest.mark.parametrize("model", EXAMPLES, ids=lambda path: path.stem)
-    def test_synth(self, both, model, deployment):
+    def test_synth(self, both: Any, model: Any, deployment: Any) -> None:
         here, there = both("synth", model, "-o", "robot.rsup", "--deployment", deployment)
         assert here == there
         assert here[0] == 0
@@ -141,20 +147,20 @@ class TestSameAsHere:
         assert supervisor.deployment == deployment
         assert supervisor.certificate.bundle_sha256 == load_bundle(model).digest
 
-    def test_synth_json(self, both):
+    def test_synth_json(self, both: Any) -> None:
         here, there = both("synth", EXAMPLES[0], "--json")
         assert here == there
         assert '"summary"' in here[1]
 
     @pytest.mark.parametrize("target", ["python", "ros2"])
-    def test_generate(self, both, target):
+    def test_generate(self, both: Any, target: Any) -> None:
         model = next(path for path in EXAMPLES if path.stem == "line_follower")
         here, there = both("generate", model, "--target", target, "-o", "package")
         assert here == there
         assert here[0] == 0
         assert len(here[3]) > 3
 
-    def test_libraries(self, both, tmp_path):
+    def test_libraries(self, both: Any, tmp_path: Path) -> None:
         model, library = tmp_path / "robot", tmp_path / "parts"
         model.mkdir()
         library.mkdir()
@@ -168,14 +174,16 @@ class TestSameAsHere:
         "command",
         [["check"], ["synth", "-o", "robot.rsup"], ["synth", "--json"], ["generate", "--target", "ros2", "-o", "out"]],
     )
-    def test_trouble(self, both, tmp_path, text, command):
+    def test_trouble(self, both: Any, tmp_path: Path, text: str, command: Any) -> None:
         here, there = both(command[0], write(tmp_path, text), *command[1:])
         assert here == there
         assert here[0] == (0 if command == ["check"] and text in (EMPTY, LIBRARY) else 1)
         assert here[3] == {}
         assert "Traceback" not in here[1] + here[2]
 
-    def test_not_overwritten(self, both, tmp_path, monkeypatch, capfd, server):
+    def test_not_overwritten(
+        self, both: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], server: Any
+    ) -> None:
         model = EXAMPLES[0]
         changed = tmp_path / "out"
         assert (
@@ -191,19 +199,19 @@ class TestSameAsHere:
 
 
 class TestExitCodes:
-    def run(self, capfd, *arguments):
+    def run(self, capfd: pytest.CaptureFixture[str], *arguments: Any) -> Any:
         status = robosc_client([*map(str, arguments)])
         printed = capfd.readouterr()
         assert "Traceback" not in printed.err
         return status, printed.err
 
     @pytest.mark.parametrize("command", [["check"], ["synth"], ["generate", "--target", "ros2", "-o", "out"]])
-    def test_nobody_there(self, tmp_path, capfd, command):
+    def test_nobody_there(self, tmp_path: Path, capfd: pytest.CaptureFixture[str], command: Any) -> None:
         model = write(tmp_path, "")
         status, error = self.run(capfd, command[0], model, *command[1:], "--server", "127.0.0.1:1")
         assert (status, error) == (3, "robosc-client: no server answers at 127.0.0.1:1\n")
 
-    def test_deadline(self, tmp_path, capfd, fake):
+    def test_deadline(self, tmp_path: Path, capfd: pytest.CaptureFixture[str], fake: Any) -> None:
         status, error = self.run(
             capfd, "synth", write(tmp_path, "stuck"), "--server", fake, "--deadline", "1", "-o", tmp_path / "x.rsup"
         )
@@ -211,24 +219,26 @@ class TestExitCodes:
         assert "within 1 seconds" in error
         assert not (tmp_path / "x.rsup").exists()
 
-    def test_deadline_of_a_long_synthesis(self, tmp_path, capfd, server):
+    def test_deadline_of_a_long_synthesis(self, tmp_path: Path, capfd: pytest.CaptureFixture[str], server: Any) -> None:
         status, error = self.run(capfd, "synth", write(tmp_path, long_work(9)), "--server", server, "--deadline", "0.7")
         assert (status, error) == (3, f"robosc-client: no result from {server} within 0.7 seconds\n")
         # Its worker is gone and another one does the next work.
         assert robosc_client(["check", str(EXAMPLES[0]), "--server", server]) == 0
 
-    def test_too_large(self, tmp_path, capfd, fake):
+    def test_too_large(self, tmp_path: Path, capfd: pytest.CaptureFixture[str], fake: Any) -> None:
         status, error = self.run(capfd, "check", write(tmp_path, "x" * 2000), "--server", fake)
         assert status == 3
         assert "at most 1000" in error
 
-    def test_fault(self, tmp_path, capfd, fake):
+    def test_fault(self, tmp_path: Path, capfd: pytest.CaptureFixture[str], fake: Any) -> None:
         status, error = self.run(capfd, "check", write(tmp_path, "fault"), "--server", fake)
         assert status == 3
         assert "internal error" in error.splitlines()[-1]
 
     @pytest.mark.parametrize("arguments", [["--engine", "abacus"], ["--target", "toaster"]])
-    def test_unknown_names(self, tmp_path, capfd, server, arguments):
+    def test_unknown_names(
+        self, tmp_path: Path, capfd: pytest.CaptureFixture[str], server: Any, arguments: Any
+    ) -> None:
         chosen = {"--target": "python", "-o": str(tmp_path / "out"), arguments[0]: arguments[1]}
         more = [part for pair in chosen.items() for part in pair]
         status, error = self.run(capfd, "generate", EXAMPLES[0], "--server", server, *more)
@@ -236,7 +246,7 @@ class TestExitCodes:
         assert arguments[1] in error
         assert error.count("\n") == 1
 
-    def test_no_file(self, tmp_path, capfd, fake):
+    def test_no_file(self, tmp_path: Path, capfd: pytest.CaptureFixture[str], fake: Any) -> None:
         status, error = self.run(capfd, "check", tmp_path / "none.rscd", "--server", fake)
         assert status == 2
         assert "none.rscd" in error
@@ -254,13 +264,13 @@ class TestExitCodes:
             ["--server", "localhost:1", "--deployment", "space"],
         ],
     )
-    def test_wrong_use(self, tmp_path, capfd, arguments):
+    def test_wrong_use(self, tmp_path: Path, capfd: pytest.CaptureFixture[str], arguments: Any) -> None:
         with pytest.raises(SystemExit) as left:
             robosc_client(["synth", str(write(tmp_path, "")), *arguments])
         assert left.value.code == 2
         assert "usage:" in capfd.readouterr().err
 
-    def test_help_tells_them(self, capfd):
+    def test_help_tells_them(self, capfd: pytest.CaptureFixture[str]) -> None:
         for arguments in (["--help"], ["synth", "--help"]):
             with pytest.raises(SystemExit):
                 robosc_client(arguments)
@@ -273,7 +283,9 @@ class TestExitCodes:
             ({"status": pb.SYNTHESIS_STATUS_SUPERVISOR, "supervisor": b"{}"}, 3, "supervisor is refused"),
         ],
     )
-    def test_odd_answers(self, tmp_path, capfd, answer, status, words):
+    def test_odd_answers(
+        self, tmp_path: Path, capfd: pytest.CaptureFixture[str], answer: Any, status: Any, words: str
+    ) -> None:
         response = pb.SynthesizeResponse(result=pb.SynthesisResult(**answer))
         with scripted(Scripted(synthesize=[response])) as address:
             model = write(tmp_path, "robot R { }")
@@ -285,14 +297,14 @@ class TestExitCodes:
 
 
 class TestPrograms:
-    def test_client_as_a_program(self, server):
+    def test_client_as_a_program(self, server: Any) -> None:
         command = [sys.executable, "-m", "robosc_client.main", "check", str(EXAMPLES[0]), "--server", server]
         outcome = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
         assert outcome.returncode == 0
         assert "Traceback" not in outcome.stderr
 
     @pytest.mark.parametrize("command", [["check"], ["synth"], ["generate", "--target", "ros2", "-o", "out"]])
-    def test_interrupted_client(self, tmp_path, fake, command):
+    def test_interrupted_client(self, tmp_path: Path, fake: Any, command: Any) -> None:
         note = tmp_path / "pid"
         model = write(tmp_path, f"stuck, see {note}")
         command = [sys.executable, "-m", "robosc_client.main", command[0], str(model), *command[1:], "--server", fake]
@@ -304,27 +316,29 @@ class TestPrograms:
         assert eventually(lambda: not is_running(int(note.read_text())))
 
     @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-    def test_server_stops_gracefully(self, number, capfd):
+    def test_server_stops_gracefully(self, number: Any, capfd: pytest.CaptureFixture[str]) -> None:
         with server_process() as (process, address):
             workers = children(process.pid)
             assert workers
             assert robosc_client(["check", str(EXAMPLES[0]), "--server", address]) == 0
             process.send_signal(number)
             assert process.wait(PATIENCE_S) == 0
+            assert process.stdout is not None
+            assert process.stderr is not None
             assert process.stdout.read() == ""
             assert process.stderr.read() == ""
         assert not any(is_running(pid) for pid in workers)
 
-    def test_a_killed_server_leaves_no_workers(self):
+    def test_a_killed_server_leaves_no_workers(self) -> None:
         with server_process() as (process, _):
             workers = children(process.pid)
             assert workers
             process.kill()
             process.wait(PATIENCE_S)
-            assert all(eventually(lambda pid=pid: not is_running(pid)) for pid in workers)
+            assert all(eventually(partial(has_ended, pid)) for pid in workers)
 
 
-def children(pid):
+def children(pid: Any) -> Any:
     """Numbers of a process's children."""
     return [
         int(child) for task in Path(f"/proc/{pid}/task").iterdir() for child in (task / "children").read_text().split()

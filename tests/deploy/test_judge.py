@@ -28,8 +28,11 @@ def record(rest_after_s: float, *, moves_before: bool = True, moves_after: bool 
     samples = [(step / 100, 0.15 if moves_before else 0.0) for step in range(100)]
     samples += [(1.0 + step / 100, 0.1 if step / 100 <= rest_after_s else 0.0) for step in range(1, 100)]
     samples += [(2.0 + step / 100, 0.15 if moves_after else 0.0) for step in range(1, 100)]
-    happenings = [{"time_s": 1.0, "happening": "obstacle"}, {"time_s": 2.0, "happening": "gone"}]
-    return [*happenings, *({"time_s": time_s, "speed_m_s": speed} for time_s, speed in samples)]
+    entries: list[dict[str, object]] = [
+        {"time_s": 1.0, "happening": "obstacle"},
+        {"time_s": 2.0, "happening": "gone"},
+    ]
+    return entries + [{"time_s": time_s, "speed_m_s": speed} for time_s, speed in samples]
 
 
 def test_an_allowed_move_passes() -> None:

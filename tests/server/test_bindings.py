@@ -4,6 +4,7 @@ import subprocess
 import sys
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,7 +14,7 @@ PROTO = Path(__file__).parents[2] / "proto"
 SOURCE = PROTO / "robosc_api" / "v1" / "synthesis.proto"
 
 
-def test_committed_bindings_are_what_the_generator_makes(tmp_path):
+def test_committed_bindings_are_what_the_generator_makes(tmp_path: Path) -> None:
     subprocess.run([PROTO / "generate.sh", tmp_path], check=True, env={**os.environ, "PYTHON": sys.executable})
     made = sorted((tmp_path / "robosc_api" / "v1").iterdir())
     assert [file.name for file in made] == ["synthesis_pb2.py", "synthesis_pb2.pyi", "synthesis_pb2_grpc.py"]
@@ -21,7 +22,7 @@ def test_committed_bindings_are_what_the_generator_makes(tmp_path):
         assert file.read_text() == (SOURCE.parent / file.name).read_text(), file.name
 
 
-def test_everything_in_the_interface_is_documented():
+def test_everything_in_the_interface_is_documented() -> None:
     lines = SOURCE.read_text().splitlines()
     defined = re.compile(r"\s*(message|enum|service|rpc|oneof|repeated \w+ \w+ =|\w+ \w+ =|[A-Z_]+ =)")
     undocumented = [
@@ -33,7 +34,7 @@ def test_everything_in_the_interface_is_documented():
     assert undocumented == []
 
 
-def test_names_follow_the_rules():
+def test_names_follow_the_rules() -> None:
     """The basic rules of the usual linter for protobuf interfaces."""
     for message in pb.DESCRIPTOR.message_types_by_name.values():
         assert re.fullmatch(r"([A-Z][a-z]+)+", message.name)
@@ -47,7 +48,7 @@ def test_names_follow_the_rules():
 
 
 @pytest.mark.parametrize("service", pb.DESCRIPTOR.services_by_name.values(), ids=lambda service: service.name)
-def test_each_rpc_has_messages_of_its_own(service):
+def test_each_rpc_has_messages_of_its_own(service: Any) -> None:
     assert service.name.endswith("Service")
     assert [method.name for method in service.methods] == ["Check", "Synthesize", "Generate"]
     for method in service.methods:

@@ -5,9 +5,7 @@ from hypothesis import given, settings
 
 from robosc.expressions import (
     Binary,
-    BooleanType,
     Constant,
-    DoubleType,
     EnumType,
     EnumValue,
     Expression,
@@ -279,7 +277,6 @@ def test_property_types_are_followed_through_objects_and_arrays() -> None:
         Received(("points", 3, "n")),
     ]
     assert {type(variable.type) for variable in behaviour.variables} == {EnumType, IntegerType}
-    assert BooleanType() != DoubleType()
 
 
 HOME = """robot R {{

@@ -4,6 +4,7 @@ import random
 import re
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
@@ -28,55 +29,57 @@ def canonical() -> bytes:
     return encode(supervisor())
 
 
-def document() -> dict:
-    return json.loads(canonical())
+def document() -> dict[str, Any]:
+    found = json.loads(canonical())
+    assert isinstance(found, dict)
+    return found
 
 
 def as_bytes(value: object) -> bytes:
     return json.dumps(value).encode()
 
 
-def with_requirement(expression) -> Supervisor:
+def with_requirement(expression: Any) -> Supervisor:
     made = supervisor()
     requirement = Requirement(("move",), RequirementForm.NEEDS, expression)
     return msgspec.structs.replace(made, model=msgspec.structs.replace(made.model, requirements=(requirement,)))
 
 
-def negations(depth: int):
-    expression = TRUE
+def negations(depth: int) -> Any:
+    expression: Any = TRUE
     for _ in range(depth):
         expression = Unary("not", expression)
     return expression
 
 
 class TestRoundTrip:
-    def test_there_and_back(self):
+    def test_there_and_back(self) -> None:
         assert decode(canonical()) == supervisor()
         assert encode(decode(canonical())) == canonical()
 
-    def test_canonical_form(self):
+    def test_canonical_form(self) -> None:
         text = canonical().decode("utf-8")
         assert text == json.dumps(json.loads(text), sort_keys=True, separators=(",", ":"), ensure_ascii=False) + "\n"
 
-    def test_kinds_of_numbers_stay(self):
-        made = decode(canonical()).model
+    def test_kinds_of_numbers_stay(self) -> None:
+        made: Any = decode(canonical()).model
         x, y = made.provides[0].value.properties[0][1].properties
         assert repr(x[1]) == "Constant(value=1.0)"
         assert repr(y[1].operand) == "Constant(value=2)"
         assert repr(made.component("Sensor").behaviour.variables[2].initial) == "1.0"
 
-    def test_other_layouts_are_read(self):
+    def test_other_layouts_are_read(self) -> None:
         assert decode(json.dumps(document(), indent=3).encode()) == supervisor()
 
     @pytest.mark.parametrize("depth", [0, 1, 399])
-    def test_deep_expressions(self, depth):
+    def test_deep_expressions(self, depth: int) -> None:
         made = with_requirement(negations(depth))
         assert decode(encode(made)) == made
 
 
 @pytest.mark.parametrize("model", EXAMPLES, ids=lambda path: path.stem)
 @pytest.mark.parametrize("deployment", list(Deployment))
-def test_made_supervisors_there_and_back(model, deployment):
+def test_made_supervisors_there_and_back(model: Any, deployment: Any) -> None:
     made = make_supervisor(load_bundle(model), deployment=deployment).supervisor
     assert made is not None
     assert decode(encode(made)) == made
@@ -84,29 +87,29 @@ def test_made_supervisors_there_and_back(model, deployment):
 
 
 class TestLimits:
-    def test_size(self):
+    def test_size(self) -> None:
         with pytest.raises(InvalidSupervisorError, match=f"at most {MAXIMUM_BYTES} bytes"):
             decode(b" " * (MAXIMUM_BYTES + 1))
 
     @pytest.mark.parametrize("depth", [MAXIMUM_EXPRESSION_DEPTH + 15, 5000])
-    def test_too_deep_to_write(self, depth):
+    def test_too_deep_to_write(self, depth: int) -> None:
         with pytest.raises(UnsupportedModelError, match="deep"):
             encode(with_requirement(negations(depth)))
 
     @pytest.mark.parametrize("depth", [500, 5_000, 1_000_000])
     @pytest.mark.parametrize(("opening", "closing"), [(b'{"a":', b"}"), (b"[", b"]"), (b"[", b"")])
-    def test_too_deep_to_read(self, depth, opening, closing):
+    def test_too_deep_to_read(self, depth: int, opening: Any, closing: Any) -> None:
         with pytest.raises(InvalidSupervisorError):
             decode(opening * depth + b"1" + closing * depth)
 
-    def test_deep_expression_to_read(self):
+    def test_deep_expression_to_read(self) -> None:
         nested = '{"node":"unary","operator":"not","operand":' * 600 + '{"node":"constant","value":true}' + "}" * 600
         value = document()
         value["supervisor"]["model"]["requirements"][0]["expression"] = "HERE"
         with pytest.raises(InvalidSupervisorError, match="nested too deeply"):
             decode(as_bytes(value).replace(b'"HERE"', nested.encode()))
 
-    def test_many_fields_take_linear_time(self):
+    def test_many_fields_take_linear_time(self) -> None:
         fields = ",".join(f'"{number}":1' for number in range(300_000))
         with pytest.raises(InvalidSupervisorError, match="format"):
             decode(f"{{{fields}}}".encode())
@@ -135,13 +138,13 @@ class TestMalformed:
             (b'{"a":' + b"1" * 5000 + b"}", "no UTF-8 JSON"),
         ],
     )
-    def test_document(self, data, words):
+    def test_document(self, data: Any, words: str) -> None:
         with pytest.raises(InvalidSupervisorError, match=words) as caught:
             decode(data)
         assert "\n" not in str(caught.value)
         assert len(str(caught.value)) < 500
 
-    def test_unknown_fields_anywhere(self):
+    def test_unknown_fields_anywhere(self) -> None:
         places = list(objects(document()))
         assert len(places) > 100
         for place in places:
@@ -150,7 +153,7 @@ class TestMalformed:
             with pytest.raises(InvalidSupervisorError, match="unknown_field"):
                 decode(as_bytes(value))
 
-    def test_missing_fields_anywhere(self):
+    def test_missing_fields_anywhere(self) -> None:
         optional = {"interface", "request", "response", "feedback", "behaviour", "low", "high", "path"}
         for place in objects(document()):
             for key in at(document(), place):
@@ -161,7 +164,7 @@ class TestMalformed:
                         decode(as_bytes(value))
 
 
-def objects(value, place=()):
+def objects(value: Any, place: Any = ()) -> Any:
     """The place of every JSON object."""
     if isinstance(value, dict):
         yield place
@@ -170,7 +173,7 @@ def objects(value, place=()):
             yield from objects(inner, (*place, key))
 
 
-def at(value, place):
+def at(value: Any, place: Any) -> Any:
     for key in place:
         value = value[key]
     return value
@@ -298,7 +301,7 @@ INCONSISTENT = [
 
 
 @pytest.mark.parametrize(("path", "new", "words"), INCONSISTENT)
-def test_inconsistent(path, new, words):
+def test_inconsistent(path: Any, new: Any, words: str) -> None:
     value = document()
     *place, last = [int(key) if key.isdigit() else key for key in path.split(".")]
     at(value["supervisor"], place)[last] = new
@@ -311,14 +314,14 @@ def test_inconsistent(path, new, words):
     assert str(caught.value).isprintable()
 
 
-def test_an_event_has_one_added_condition():
+def test_an_event_has_one_added_condition() -> None:
     value = document()
     value["supervisor"]["added"] *= 2
     with pytest.raises(InvalidSupervisorError, match="twice"):
         decode(as_bytes(value))
 
 
-def test_a_layer_may_not_restrict_cancel():
+def test_a_layer_may_not_restrict_cancel() -> None:
     value = document()
     value["supervisor"]["added"][0]["event"] = "navigate.cancel"
     assert decode(as_bytes(value))
@@ -344,7 +347,7 @@ def survives(data: bytes) -> bool:
 
 @settings(deadline=None, max_examples=300)
 @given(seed=st.integers(0, 2**64))
-def test_mutated_bytes(seed):
+def test_mutated_bytes(seed: Any) -> None:
     chance = random.Random(seed)
     data = bytearray(canonical())
     for _ in range(chance.randint(1, 3)):
@@ -363,7 +366,7 @@ def test_mutated_bytes(seed):
 
 @settings(deadline=None, max_examples=600)
 @given(seed=st.integers(0, 2**64))
-def test_mutated_values(seed):
+def test_mutated_values(seed: Any) -> None:
     chance = random.Random(seed)
     value = document()
     slots = list(all_slots(value))
@@ -373,7 +376,7 @@ def test_mutated_values(seed):
     survives(as_bytes(value))
 
 
-def _other_value(chance, slots, old):
+def _other_value(chance: Any, slots: Any, old: Any) -> Any:
     """A value of a kind that may just fit."""
     if chance.random() < 0.7:
         same_kind = [value for holder, key in slots if type(value := holder[key]) is type(old)]
@@ -381,7 +384,7 @@ def _other_value(chance, slots, old):
     return chance.choice([None, True, False, 0, 1, -1, 2**31, 2**70, 0.5, 1e308, "", "x", "Base", "a.b", [], {}, [[]]])
 
 
-def all_slots(value):
+def all_slots(value: Any) -> Any:
     """Every place of a JSON value, as container and key."""
     for key, inner in list(value.items()) if isinstance(value, dict) else list(enumerate(value)):
         yield value, key
@@ -389,7 +392,7 @@ def all_slots(value):
             yield from all_slots(inner)
 
 
-def test_mutations_reach_both_outcomes():
+def test_mutations_reach_both_outcomes() -> None:
     accepted = 0
     for seed in range(400):
         chance = random.Random(seed)
@@ -402,12 +405,12 @@ def test_mutations_reach_both_outcomes():
     print(f"accepted {accepted} of 400 changed supervisors")
 
 
-def test_a_constant_beyond_binary64_is_refused():
+def test_a_constant_beyond_binary64_is_refused() -> None:
     data = canonical().replace(b'"value":0.5', b'"value":1e999')
     assert data != canonical()
     with pytest.raises(InvalidSupervisorError, match="out of range"):
         decode(data)
 
 
-def test_values_are_compared_with_their_kind():
+def test_values_are_compared_with_their_kind() -> None:
     assert encode(with_requirement(Constant(True))) != encode(with_requirement(Constant(1)))

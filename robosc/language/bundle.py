@@ -1,21 +1,18 @@
 """Finds the files of a run: the model, and the libraries that it imports from (language A.4)."""
 
 import os
-import re
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from robosc.errors import Diagnostic, LanguageError, Severity
+from robosc.language.scan import declared_libraries, imported_libraries
 from robosc.source import Bundle, Location, SourceFile
 
 MAXIMUM_BYTES = 16 * 1024 * 1024
 """A larger file is refused."""
 
 SUFFIX = ".rscd"
-
-_SKIPPED = re.compile(r"""//[^\n]*|/\*(?:[^*]|\*(?!/))*\*/|"(?:\\[\s\S]|[^"\\])*"|'(?:\\[\s\S]|[^'\\])*'""")
-_LIBRARY = re.compile(r"(?<![A-Za-z_0-9^])library\s+\^?([A-Za-z_][A-Za-z_0-9]*)\s*\{")
-_IMPORT = re.compile(r"(?<![A-Za-z_0-9^])from\s+\^?([A-Za-z_][A-Za-z_0-9]*)\s+import(?![A-Za-z_0-9])")
 
 
 def load_bundle(model: Path, library_paths: Sequence[Path] = ()) -> Bundle:
@@ -30,22 +27,27 @@ def load_bundle(model: Path, library_paths: Sequence[Path] = ()) -> Bundle:
         library_paths: More folders to look in.
 
     Raises:
-        LanguageError: A file is too large, empty, not UTF-8, or contains NUL.
+        LanguageError: The model, or a library that it needs, is too large or not UTF-8.
         OSError: The model's file cannot be read.
     """
-    main = SourceFile(model.name, _read(model, model.name))
+    main = SourceFile(_printable(model.name), _read(model, _printable(model.name)))
     folders = _folders(model, library_paths)
-    found = _candidates(model, folders)
+    wanted, seen = list(imported_libraries(main.text)), set[str]()
+    found = _candidates(model, folders) if wanted else ()
     chosen: dict[str, SourceFile] = {}
-    wanted, seen = _imports(main.text), set[str]()
     while wanted:
         name = wanted.pop(0)
         if name in seen:
             continue
         seen.add(name)
-        for file in (file for file in found if name in _libraries(file.text)):
+        declaring = [candidate for candidate in found if name in candidate.declared]
+        readable = [candidate.file for candidate in declaring if candidate.fault is None]
+        for candidate in declaring:
+            if candidate.fault is not None and not readable:
+                raise candidate.fault
+        for file in readable:
             chosen[file.name] = file
-            wanted.extend(_imports(file.text))
+            wanted.extend(imported_libraries(file.text))
     return Bundle(
         main=main,
         libraries=tuple(chosen[name] for name in sorted(chosen)),
@@ -82,40 +84,57 @@ def _read(path: Path, name: str) -> str:
 
 def _folders(model: Path, library_paths: Iterable[Path]) -> tuple[Path, ...]:
     """The folders to look in, each once however it is reached."""
-    folder = model.resolve().parent
-    places = [folder, folder.parent / "shared", *(path.resolve() for path in library_paths)]
+    folder = Path(os.path.realpath(model)).parent
+    places = [folder, folder.parent / "shared", *(Path(os.path.realpath(path)) for path in library_paths)]
     return tuple(dict.fromkeys(place for place in places if place.is_dir()))
 
 
-def _candidates(model: Path, folders: Iterable[Path]) -> tuple[SourceFile, ...]:
-    """Every other readable model file of the folders, by name; one that cannot be read is nobody's yet."""
-    files: dict[Path, SourceFile] = {}
+@dataclass(frozen=True, slots=True)
+class _Candidate:
+    """A file that may hold a library.
+
+    Attributes:
+        file: Its text, as far as it could be read.
+        declared: The libraries that it declares.
+        fault: Why it cannot be used, or None; an error only of who asks for one of its libraries.
+    """
+
+    file: SourceFile
+    declared: frozenset[str]
+    fault: LanguageError | None = None
+
+
+def _candidates(model: Path, folders: Iterable[Path]) -> tuple[_Candidate, ...]:
+    """Every other model file of the folders, by name; one that cannot be opened is none."""
+    files: dict[str, _Candidate] = {}
     for folder in folders:
         for path in sorted(folder.iterdir()):
-            real = path.resolve()
-            if path.suffix != SUFFIX or real == model.resolve() or real in files or not path.is_file():
+            real = os.path.realpath(path)
+            if path.suffix != SUFFIX or real == os.path.realpath(model) or real in files:
                 continue
-            name = _shown(path, model)
             try:
-                files[real] = SourceFile(name, _read(path, name))
-            except (LanguageError, OSError):
-                # Unreadable as text, so it declares no library that could be asked for by name.
+                if path.is_file():
+                    files[real] = _candidate(path, _shown(path, model))
+            except OSError:
                 continue
-    return tuple(sorted(files.values(), key=lambda file: file.name))
+    return tuple(sorted(files.values(), key=lambda candidate: candidate.file.name))
+
+
+def _candidate(path: Path, name: str) -> _Candidate:
+    with path.open("rb") as file:
+        content = file.read(MAXIMUM_BYTES + 1)
+    try:
+        text, fault = decode_source(content, name), None
+    except LanguageError as error:
+        text, fault = content.decode("utf-8", errors="replace"), error
+    return _Candidate(SourceFile(name, text), declared_libraries(text), fault)
 
 
 def _shown(path: Path, model: Path) -> str:
     """A path as seen from the model's folder: names must not depend on where the project lies."""
-    return Path(os.path.relpath(path, model.resolve().parent)).as_posix()
+    return _printable(Path(os.path.relpath(path, Path(os.path.realpath(model)).parent)).as_posix())
 
 
-def _plain(text: str) -> str:
-    return _SKIPPED.sub(" ", text)
-
-
-def _libraries(text: str) -> frozenset[str]:
-    return frozenset(_LIBRARY.findall(_plain(text)))
-
-
-def _imports(text: str) -> list[str]:
-    return list(dict.fromkeys(_IMPORT.findall(_plain(text))))
+def _printable(name: str) -> str:
+    r"""A file's name as text; bytes of it that are no UTF-8 are shown as `\xNN`."""
+    return os.fsencode(name).decode("utf-8", errors="backslashreplace")

@@ -1,7 +1,42 @@
-class _Converter:
+"""textX objects to syntax tree: what the grammar found becomes our own values, and textX goes no further."""
+
+import re
+from bisect import bisect_right
+from typing import Any
+
+from robosc.errors import Diagnostic, Severity
+from robosc.language import precedence, syntax
+from robosc.language.scan import MAXIMUM_NESTING
+from robosc.source import Location, SourceFile
+
+MAXIMUM_NAME = 255
+"""Characters that a name may have."""
+
+
+class Places:
+    """Offsets to lines and columns."""
+
+    def __init__(self, file: SourceFile) -> None:
+        self._name = file.name
+        self._starts = [0, *(match.end() for match in re.finditer("\n", file.text))]
+        self._ends = [*(start - 1 for start in self._starts[1:]), len(file.text)]
+
+    def location(self, begin: int, end: int) -> Location:
+        """The place from `begin` to `end`, cut at the end of its first line."""
+        line = bisect_right(self._starts, begin) - 1
+        end = min(end, self._ends[line])
+        return Location(self._name, line + 1, begin - self._starts[line] + 1, max(1, end - begin))
+
+
+def error(code: str, message: str, location: Location, mend: str = "Simplify the text.") -> Diagnostic:
+    """An error of a text."""
+    return Diagnostic(Severity.ERROR, code, message, location, mend)
+
+
+class Converter:
     """textX objects to syntax tree; collects what the grammar alone cannot say."""
 
-    def __init__(self, places: _Places) -> None:
+    def __init__(self, places: Places) -> None:
         self.diagnostics: list[Diagnostic] = []
         self._places = places
 
@@ -12,7 +47,7 @@ class _Converter:
         return self._places.location(node._tx_position, node._tx_position + len(word))
 
     def _report(self, code: str, message: str, location: Location, mend: str) -> None:
-        self.diagnostics.append(_error(code, message, location, mend))
+        self.diagnostics.append(error(code, message, location, mend))
 
     def file(self, root: Any) -> syntax.File:
         """A robot or a library."""
@@ -120,17 +155,28 @@ class _Converter:
     # Types and expressions
 
     def _type(self, node: Any) -> syntax.Type:
-        if node.array is not None:
-            return syntax.ArrayType(self._type(node.array.element), self._at(node))
+        tree: syntax.Type = self._plain_type(node)
+        for opening in reversed(node.arrays):
+            place = self._places.location(opening._tx_position, node._tx_position_end)
+            tree = syntax.ArrayType(tree, place)
+        for opening in node.arrays[len(node.closings) :]:
+            place = self._keyword(opening, "array")
+            self._report("syntax-error", "the '(' of this array is never closed", place, "Close it with ')'.")
+        for closing in node.closings[len(node.arrays) :]:
+            self._report("syntax-error", "this ')' closes nothing", self._at(closing), "Remove it.")
+        return tree
+
+    def _plain_type(self, node: Any) -> syntax.BasicType | syntax.NamedType:
         if node.name is not None:
             return syntax.NamedType(self._name(node.name))
-        if node.integer is not None:
-            bounds = node.integer
-            if not bounds.low:
-                return syntax.BasicType(syntax.BasicTypeName.INTEGER, None, None, self._at(node))
-            low, high = self._integer(bounds.low, self._at(node)), self._integer(bounds.high, self._at(node))
-            return syntax.BasicType(syntax.BasicTypeName.INTEGER, low, high, self._at(node))
-        return syntax.BasicType(syntax.BasicTypeName(node.basic), None, None, self._at(node))
+        if node.integer is None:
+            place = self._places.location(node._tx_position_end - len(node.basic), node._tx_position_end)
+            return syntax.BasicType(syntax.BasicTypeName(node.basic), None, None, place)
+        bounds, place = node.integer, self._at(node.integer)
+        if not bounds.low:
+            return syntax.BasicType(syntax.BasicTypeName.INTEGER, None, None, place)
+        low, high = self._integer(bounds.low, place), self._integer(bounds.high, place)
+        return syntax.BasicType(syntax.BasicTypeName.INTEGER, low, high, place)
 
     def _integer(self, text: str, location: Location) -> int:
         digits = text.lstrip("0") or "0"
@@ -157,43 +203,39 @@ class _Converter:
         return tree
 
     def _flat(self, node: Any) -> syntax.Expression:
-        operands = [self._operand(node.first), *(self._operand(item.operand) for item in node.rest)]
-        operators = [(item.operator, self._keyword(item, item.operator)) for item in node.rest]
-        return precedence.build(operands, operators, self._report)
+        builder = precedence.ExpressionBuilder(self._report)
+        self._operand(node.first, builder)
+        for item in node.rest:
+            builder.operator(item.operator, self._keyword(item, item.operator))
+            self._operand(item.operand, builder)
+        return builder.finish()
 
-    def _operand(self, node: Any) -> syntax.Expression:
-        tree = self._flat(node.inner) if node.inner is not None else self._primary(node)
-        signs = [(prefix.text, self._at(prefix)) for prefix in node.prefixes]
-        for (text, _), (following, place) in pairwise(signs):
-            if text == "-" and following == "!":
-                self._report(
-                    "syntax-error", "'-' cannot stand before '!'; expected a number", place, f"Remove the {text}."
-                )
-        for text, location in reversed(signs):
-            tree = syntax.Unary(text, tree, location)
-        return tree
+    def _operand(self, node: Any, builder: precedence.ExpressionBuilder) -> None:
+        for prefix in node.prefixes:
+            builder.prefix(prefix.text, self._at(prefix))
+        builder.operand(self._primary(node))
+        for closing in node.closings:
+            builder.closing(self._at(closing))
 
     def _primary(self, node: Any) -> syntax.Literal | syntax.Access:
-        if node.number is not None:
-            return self._number(node.number)
-        if node.string is not None:
-            return syntax.Literal(unescape(node.string.token), self._at(node.string))
-        if node.boolean is not None:
-            return syntax.Literal(node.boolean.word == "true", self._at(node.boolean))
-        return self._access(node.access)
+        return self._access(node.access) if node.literal is None else self._literal(node.literal)
 
-    def _number(self, node: Any) -> syntax.Literal:
-        location = self._at(node)
-        if "." not in node.token:
-            return syntax.Literal(self._integer(node.token, location), location)
-        value = float(node.token)
+    def _literal(self, node: Any) -> syntax.Literal:
+        token, location = node.token, self._at(node)
+        if token[0] in "\"'":
+            return syntax.Literal(unescape(token), location)
+        if token in ("true", "false"):
+            return syntax.Literal(token == "true", location)
+        if "." not in token:
+            return syntax.Literal(self._integer(token, location), location)
+        value = float(token)
         if value == float("inf"):
             self._report("number-too-large", "the number does not fit into a double", location, "Use a smaller number.")
             value = 0.0
         return syntax.Literal(value, location)
 
     def _access(self, node: Any) -> syntax.Access:
-        root = None if node.root.name is None else self._name(node.root.name)
+        root = None if node.root.text == "value" else self._name(node.root)
         steps: list[syntax.Name | syntax.Index] = []
         for step in node.steps:
             if step.name is not None:

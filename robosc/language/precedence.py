@@ -2,8 +2,9 @@
 
 One climber over A.3's table replaces a tower of grammar rules, which a recursive-descent parser would walk down for
 every literal; parentheses are matched with a stack, so their depth costs no recursion either (E. W. Dijkstra,
-Algol 60 translation, 1961: the shunting-yard). Binary operators associate to the left. Long chains of `and` and `or` become balanced trees:
-both are associative, and a chain of a thousand conditions must not need a thousand levels of recursion.
+Algol 60 translation, Mathematisch Centrum report MR 34/61, 1961: the shunting-yard). Binary operators associate to
+the left. Long chains of `and` and `or` become balanced trees: both are associative, and a chain of a thousand
+conditions must not need a thousand levels of recursion.
 """
 
 from collections.abc import Callable, Sequence

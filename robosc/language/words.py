@@ -1,5 +1,7 @@
 """The reserved words of part A, and the language's words for what the parser expects."""
 
+import difflib
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -15,33 +17,70 @@ RESERVED_WORDS = frozenset(
 
 _RULES = {
     "NameToken": "a name",
-    "NumberToken": "a number",
+    "RootToken": "a name",
+    "LiteralToken": "a number",
     "Integer": "a whole number",
     "StringToken": "a text in quotes",
     "Operator": "an operator",
-    "PrefixSign": "",
-    "ReceivedValue": "'value'",
+    "PrefixSign": "'('",
+    "ClosingSign": "",
     "PropertyColon": "':'",
     "Arrow": "'->'",
     "EOF": "the end of the file",
     "Comment": "",
 }
+
+_GROUPS: tuple[tuple[str, frozenset[str]], ...] = (
+    ("an expression", frozenset({"a name", "a number", "'('"})),
+    ("a value", frozenset({"a name", "a number"})),
+    ("a definition", frozenset({"'component'", "'datatype'", "'interface'", "'requirement'", "'provide'"})),
+    ("a type", frozenset({"a name", "'array'", "'integer'", "'string'", "'boolean'", "'double'", "'none'"})),
+)
+"""Words that are told in one, the larger groups before the smaller ones that they contain."""
+
 _MAXIMUM_WORDS = 8
+
+_FOREIGN = {
+    "&": "Write 'and' for '&&'.",
+    "|": "Write 'or' for '||'.",
+    ";": "Remove the ';': nothing ends with one.",
+}
+"""What other languages write."""
 
 
 def expected_words(rules: Iterable[Any]) -> str:
     """What a parser's expected rules are called, at most eight of them, as one phrase."""
     words = dict.fromkeys(_word(rule) for rule in rules)
     words.pop("", None)
-    if "a name" in words and "a number" in words:
-        # All that begins an expression, told in one word.
-        for part in ("a name", "a number", "a text in quotes", "'value'", "'true'", "'false'", "'('"):
-            words.pop(part, None)
-        words = {"an expression": None, **words}
+    for name, group in _GROUPS:
+        if group <= words.keys():
+            words = {name: None} | {word: None for word in words if word not in group}
     shown = sorted(words, key=lambda word: (not word.startswith("a"), word))
     if len(shown) > _MAXIMUM_WORDS:
         shown = [*shown[:_MAXIMUM_WORDS], "..."]
     return " or ".join([", ".join(shown[:-1]), shown[-1]]) if len(shown) > 1 else "".join(shown)
+
+
+def mend_syntax(before: str, token: str, expected: str) -> str:
+    """How to mend a syntax error.
+
+    Args:
+        before: The line up to the token that does not fit.
+        token: That token; empty at the end of a line.
+        expected: What `expected_words` said.
+    """
+    if token in _FOREIGN:
+        return _FOREIGN[token]
+    if before.split()[-1:] == ["not"] and "an operator" in expected:
+        return "Write '!' for 'not'."
+    if token == "=" and before.endswith("="):
+        return "Write '=' once: it compares."
+    if token in RESERVED_WORDS and any(word in expected for word in ("a name", "an expression", "a value", "a type")):
+        return f"If '{token}' is meant as a name, write '^{token}'."
+    near = difflib.get_close_matches(token, re.findall(r"'([a-z]+)'", expected), n=1, cutoff=0.75)
+    if near:
+        return f"Did you mean '{near[0]}'?"
+    return "Write one of the expected words here, or look for a bracket or comma missing before."
 
 
 def _word(rule: Any) -> str:

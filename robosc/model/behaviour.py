@@ -53,6 +53,10 @@ _PREPOSITIONS = {
 }
 
 
+_MAXIMUM_SHOWN = 10
+"""Names that one finding lists."""
+
+
 @dataclass(frozen=True, slots=True)
 class BehaviourTree:
     """A behaviour as written, sorted into its parts.
@@ -177,6 +181,7 @@ class BehaviourBuilder:
         self._findings = findings
         self._unknown_communication = unknown_communication
         self._taus = 0
+        self._states_by_name = {state.name.text: state for state in tree.states}
 
     def build(self) -> Behaviour:
         """The behaviour, as far as it is sound; every variable still counted as code-only."""
@@ -260,9 +265,8 @@ class BehaviourBuilder:
     def _target(self, name: syntax.Name | None) -> str | None:
         if name is None:
             return None
-        states = [state.name.text for state in self._tree.states]
-        if name.text not in states:
-            self._findings.unknown("state", name.text, name.location, states)
+        if name.text not in self._states_by_name:
+            self._findings.unknown("state", name.text, name.location, self._states_by_name)
             return None
         return name.text
 
@@ -333,13 +337,13 @@ class BehaviourBuilder:
                 names = names[1:]
         name = names[0]
         if own is None or len(names) != 1 or not isinstance(name, syntax.Name) or name.text not in own.variables:
-            known = own.variables if own else {}
+            known = sorted(own.variables)[:_MAXIMUM_SHOWN] if own else []
             wanted = name.text if isinstance(name, syntax.Name) and len(names) == 1 else "this"
             self._findings.error(
                 "update-out-of-scope",
                 f"'{wanted}' is no variable of this behaviour",
                 access.location,
-                "Assign a variable of this behaviour" + (f": {', '.join(sorted(known))}." if known else "."),
+                "Assign a variable of this behaviour" + (f": {', '.join(known)}." if known else "."),
             )
             return None
         return name.text

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from robosc.errors import Diagnostic, InternalError, LanguageError, RelatedPlace, Severity, sorted_diagnostics
-from robosc.expressions import EnumType, StateTest, conjuncts
+from robosc.expressions import StateTest, conjuncts
 from robosc.language import parse, syntax
 from robosc.model.behaviour import (
     BehaviourBuilder,
@@ -23,7 +23,7 @@ from robosc.model.expressions import ExpressionChecker
 from robosc.model.findings import Findings
 from robosc.model.places import Places
 from robosc.model.requirements import ProvideBuilder, build_requirement
-from robosc.model.scope import ComponentNames, Scope
+from robosc.model.scope import Scopes
 from robosc.model.structure import (
     Behaviour,
     Communication,
@@ -95,7 +95,8 @@ class _RobotChecker:
         self._findings = findings
         self._types = Types(findings)
         self._unit = make_unit(tree, findings)
-        self._parts = parts_of(self._unit, Libraries(bundle, findings), findings)
+        self._libraries = Libraries(bundle, self._unit, findings)
+        self._parts = parts_of(self._unit, self._libraries, findings)
         self.places = Places(tree.name.location)
 
     def model(self) -> Model | None:
@@ -108,9 +109,10 @@ class _RobotChecker:
             part.name: component_names(part, behaviour_trees[part.name], self._types, self._findings)
             for part in self._parts
         }
-        enums = self._enums()
-        behaviours = self._behaviours(behaviour_trees, names, communications)
-        checker = ExpressionChecker(self._scope(self._unit, names, imported=True), self._findings)
+        scopes = Scopes(self._types, self._parts, self._libraries, names)
+        enums = self._enums(scopes)
+        behaviours = self._behaviours(behaviour_trees, scopes, communications)
+        checker = ExpressionChecker(scopes.of(self._unit), self._findings)
         requirements, provides = self._restrictions(checker, communications)
         marked = mark_synthesis_variables(behaviours, requirements, provides)
         for name, behaviour in marked.items():
@@ -120,6 +122,7 @@ class _RobotChecker:
                 partial_updates(tree, behaviour, self._findings)
         self._check_requests(communications, marked, requirements)
         self._check_empty(communications)
+        self.places.objects.update(self._types.object_places)
         if self._findings.has_errors:
             return None
         return Model(
@@ -149,49 +152,21 @@ class _RobotChecker:
         check_topics(found.values(), self.places.communications, self._types, self._findings)
         return found
 
-    # Names
-
-    def _scope(
-        self, unit: Unit, names: Mapping[str, ComponentNames], *, imported: bool = False, own: str | None = None
-    ) -> Scope:
-        """The names of a file: its components as it calls them, the values of its enums."""
-        components: dict[str, ComponentNames] = {}
-        for part in self._parts:
-            if unit is self._unit:
-                components[part.name] = names[part.name]
-            elif part.unit is unit:
-                components.setdefault(part.tree.name.text, names[part.name])
-        if own is not None:
-            # Inside its own behaviour a component is always itself, whatever else was imported under its name.
-            part = next(part for part in self._parts if part.name == own)
-            components[part.tree.name.text] = names[own]
-        enums = self._enums_of(unit, imported=imported)
-        return Scope(self._types, components, enums, names.get(own) if own else None)
-
-    def _enums_of(self, unit: Unit, *, imported: bool = False) -> dict[str, EnumType]:
-        """The enums of a file by the names they have there; with `imported`, those of other files by theirs."""
-        enums: dict[str, EnumType] = {}
-        for key, (enum, home, tree) in self._types.enums.items():
-            if home is unit:
-                enums[tree.name.text] = enum
-            elif imported:
-                enums.setdefault(key, enum)
-        return enums
-
-    def _enums(self) -> tuple[EnumDefinition, ...]:
+    def _enums(self, scopes: Scopes) -> tuple[EnumDefinition, ...]:
         """The definition of every enum, its rules resolved."""
         found = []
         for key, (enum, unit, tree) in self._types.enums.items():
-            scope = Scope(self._types, {}, self._enums_of(unit), None, self._types.sources[key])
-            checker = ExpressionChecker(scope, self._findings)
+            source = self._types.sources[key]
+            checker = ExpressionChecker(scopes.for_rules(unit, source), self._findings)
             rules = []
             for rule in tree.rules:
                 condition = None if rule.condition is None else checker.condition(rule.condition)
                 if condition is not None:
                     rules.append(EnumRule(condition, rule.value.text))
             default = next((rule.value.text for rule in tree.rules if rule.condition is None), None)
+            self.places.enums[key] = tree.name.location
             if default is not None:
-                found.append(EnumDefinition(key, self._types.sources[key], enum.values, tuple(rules), default))
+                found.append(EnumDefinition(key, source, enum.values, tuple(rules), default))
         return tuple(found)
 
     # Behaviours
@@ -199,7 +174,7 @@ class _RobotChecker:
     def _behaviours(
         self,
         trees: Mapping[str, BehaviourTree | None],
-        names: Mapping[str, ComponentNames],
+        scopes: Scopes,
         communications: Mapping[str, Communication],
     ) -> dict[str, Behaviour]:
         defaults = {
@@ -213,11 +188,8 @@ class _RobotChecker:
             tree = trees[part.name]
             if tree is None:
                 continue
-            imported = part.unit is self._unit
-            scope = self._scope(part.unit, names, imported=imported, own=part.name)
-            builder = BehaviourBuilder(
-                tree, scope, communications, defaults, self._findings, self._unknown_communication(part, communications)
-            )
+            unknown = self._unknown_communication(part, communications)
+            builder = BehaviourBuilder(tree, scopes.inside(part), communications, defaults, self._findings, unknown)
             found[part.name] = builder.build()
             self._place_behaviour(tree)
         return found

@@ -69,8 +69,8 @@ def build_communication(item: CommunicationTree, types: Types, findings: Finding
             kind = CommunicationKind.ACTION
             parts |= {"request": request, "response": response, "feedback": feedback}
     resolved = {name: types.resolve(type_, part.unit) for name, type_ in parts.items()}
-    for name, type_tree in parts.items():
-        _check_link(tree, kind, resolved[name], type_tree, types, findings)
+    if tree.link is None:
+        _check_link(tree, kind, zip(resolved.values(), parts.values(), strict=True), types, findings)
     if any(type_ is None for type_ in resolved.values()):
         return None
     identifier = tree.identifier.value if tree.identifier else tree.name.text
@@ -107,27 +107,21 @@ def _interface(link: syntax.Name | None, part: Part, findings: Findings) -> Inte
 def _check_link(
     tree: syntax.Communication,
     kind: CommunicationKind,
-    type_: Type | None,
-    type_tree: syntax.Type,
+    parts: Iterable[tuple[Type | None, syntax.Type]],
     types: Types,
     findings: Findings,
 ) -> None:
     """Objects, enums made from objects, services and actions need `links`."""
-    if tree.link is not None or type_ is None:
-        return
-    crossing = types.sources[type_.name] if isinstance(type_, EnumType) else type_
+    mend = "Define 'interface x use Type from ros_package' and write 'links x'."
     if kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION):
-        reason = f"the {kind} '{tree.name.text}'"
-    elif isinstance(crossing, ObjectType):
-        reason = "an enum made from an object" if isinstance(type_, EnumType) else "an object"
-    else:
+        message = f"the {kind} '{tree.name.text}' needs a middleware type"
+        findings.error("links-required", message, tree.name.location, mend)
         return
-    findings.error(
-        "links-required",
-        f"{reason} needs a middleware type",
-        type_tree.location,
-        "Define 'interface x use Type from ros_package' and write 'links x'.",
-    )
+    for type_, type_tree in parts:
+        crossing = types.sources[type_.name] if isinstance(type_, EnumType) else type_
+        if isinstance(crossing, ObjectType):
+            reason = "an enum made from an object" if isinstance(type_, EnumType) else "an object"
+            findings.error("links-required", f"{reason} needs a middleware type", type_tree.location, mend)
 
 
 def middleware_type(communication: Communication, types: Types) -> str:

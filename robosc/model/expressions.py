@@ -1,6 +1,7 @@
 """Resolves and types expressions (language A.3 to A.5)."""
 
 from dataclasses import dataclass
+from itertools import chain
 
 from robosc.expressions import (
     MAXIMUM_INTEGER,
@@ -211,7 +212,7 @@ class ExpressionChecker:
                 self._no_parts(tree.steps[1], "a state")
                 return None
             return Typed(StateTest(component.name, step.text), _BOOLEAN)
-        known = [*component.variables, *component.states]
+        known = chain(component.variables, component.states)
         self._findings.unknown(f"state or variable of '{component.name}'", step.text, step.location, known)
         return None
 
@@ -238,11 +239,12 @@ class ExpressionChecker:
         if len(enums) == 1:
             return Typed(EnumValue(enums[0].name, name), enums[0])
         names = sorted(here for here, enum in self._scope.enums.items() if enum in enums)
+        sayable = [f"'{here}.{name}'" for here in names if "." not in here]
         self._findings.error(
             "ambiguous-name",
             f"'{name}' is a value of {' and '.join(names)}",
             tree.location,
-            f"Say which is meant: '{names[0]}.{name}'.",
+            f"Say which is meant: {' or '.join(sayable)}." if sayable else "Compare it with a variable of its type.",
         )
         return None
 

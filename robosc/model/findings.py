@@ -6,12 +6,19 @@ from collections.abc import Iterable
 from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.source import Location
 
+_MAXIMUM_COMPARISONS = 20_000
+"""Names that are compared in one check at most: to look for every unknown name among all names is quadratic."""
+
+_MAXIMUM_COMPARED = 64
+"""Characters of a name that is compared."""
+
 
 class Findings:
     """A growing list of diagnostics: the one thing that the checks share and add to."""
 
     def __init__(self) -> None:
         self.diagnostics: list[Diagnostic] = []
+        self._comparisons = _MAXIMUM_COMPARISONS
 
     def error(self, code: str, message: str, location: Location, mend: str, *related: RelatedPlace) -> None:
         """Add an error."""
@@ -27,13 +34,21 @@ class Findings:
 
     def unknown(self, what: str, name: str, location: Location, known: Iterable[str], mend: str = "") -> None:
         """Add an `unknown-name` error with the nearest known name, if one is near."""
-        near = did_you_mean(name, known)
+        near = self._near(name, known)
         self.error(
             "unknown-name",
             f"unknown {what} '{name}'" + (f"; did you mean '{near}'?" if near else ""),
             location,
             mend or (f"Write '{near}'." if near else f"Define the {what} '{name}' or use one that exists."),
         )
+
+    def _near(self, name: str, known: Iterable[str]) -> str | None:
+        """The nearest known name, until so many names have been compared that more would take noticeable time."""
+        if self._comparisons <= 0:
+            return None
+        names = set(known)
+        self._comparisons -= len(names)
+        return did_you_mean(name, names) if self._comparisons >= 0 else None
 
     @property
     def has_errors(self) -> bool:
@@ -43,9 +58,11 @@ class Findings:
 
 def did_you_mean(name: str, known: Iterable[str]) -> str | None:
     """The known name nearest to a misspelt one, or None."""
-    names = sorted(set(known))
+    names = sorted({item for item in known if len(item) <= _MAXIMUM_COMPARED})
     folded = {item.casefold(): item for item in names}
     if name.casefold() in folded:
         return folded[name.casefold()]
+    if len(name) > _MAXIMUM_COMPARED:
+        return None
     near = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.7)
     return folded[near[0]] if near else None

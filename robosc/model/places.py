@@ -15,6 +15,8 @@ class Places:
         communications: By name.
         states: By component and state.
         variables: By component and variable.
+        enums: By model name.
+        objects: By model name.
         transitions: By component, in the order of its behaviour's transitions.
         requirements: In the order of the model's requirements.
         provides: In the order of the model's provide statements.
@@ -25,6 +27,8 @@ class Places:
     communications: dict[str, Location] = field(default_factory=dict)
     states: dict[tuple[str, str], Location] = field(default_factory=dict)
     variables: dict[tuple[str, str], Location] = field(default_factory=dict)
+    enums: dict[str, Location] = field(default_factory=dict)
+    objects: dict[str, Location] = field(default_factory=dict)
     transitions: dict[str, tuple[Location, ...]] = field(default_factory=dict)
     requirements: list[Location] = field(default_factory=list)
     provides: list[Location] = field(default_factory=list)

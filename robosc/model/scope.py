@@ -1,10 +1,11 @@
 """What a name can mean at one place of a model (language A.4)."""
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from robosc.expressions import EnumType, Type
 from robosc.model.types import Types
+from robosc.model.units import Libraries, Part, Unit
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +44,7 @@ class Scope:
 
     def with_received(self, received: Type | None) -> "Scope":
         """The same names, with `value` of another type."""
-        return Scope(self.types, self.components, self.enums, self.own, received, self._values)
+        return replace(self, received=received)
 
     def enums_with(self, value: str) -> tuple[EnumType, ...]:
         """The enums that have a value."""
@@ -55,7 +56,73 @@ class Scope:
             self._values.update({name: tuple(enums) for name, enums in found.items()})
         return self._values.get(value, ())
 
-    def known_names(self) -> Iterable[str]:
+    def known_names(self) -> Iterator[str]:
         """Every name that an expression may begin with."""
-        own = self.own.variables if self.own else ()
-        return [*self.components, *own, *(value for enum in self.enums.values() for value in enum.values)]
+        yield from self.components
+        yield from self.own.variables if self.own else ()
+        for enum in self.enums.values():
+            yield from enum.values
+
+
+class Scopes:
+    """The scopes of a robot: one for each of its files, shared by all behaviours in it.
+
+    Args:
+        types: All types, already resolved.
+        parts: The components of the robot.
+        libraries: The libraries that they come from.
+        names: What can be read of each component, by its name in the robot.
+    """
+
+    def __init__(
+        self, types: Types, parts: Sequence[Part], libraries: Libraries, names: Mapping[str, ComponentNames]
+    ) -> None:
+        self._types = types
+        self._libraries = libraries
+        self._names = names
+        self._parts = {(part.unit, part.tree.name.text): part.name for part in parts}
+        self._scopes: dict[Unit, Scope] = {}
+
+    def of(self, unit: Unit) -> Scope:
+        """The names of a file, outside every behaviour."""
+        if unit not in self._scopes:
+            self._scopes[unit] = Scope(self._types, self._components(unit), self._enums(unit))
+        return self._scopes[unit]
+
+    def inside(self, part: Part) -> Scope:
+        """The names in the behaviour of a component."""
+        return replace(self.of(part.unit), own=self._names[part.name])
+
+    def for_rules(self, unit: Unit, source: Type) -> Scope:
+        """The names in the rules of an enum: received data, and values of other enums in it."""
+        return replace(self.of(unit), components={}, received=source)
+
+    def _components(self, unit: Unit) -> dict[str, ComponentNames]:
+        """The components of the robot by what a file calls them, whichever way they came into the robot."""
+        found: dict[str, ComponentNames] = {}
+        for name in unit.components:
+            origin = self._libraries.origin(unit, name)
+            if origin in self._parts:
+                found[name] = self._names[self._parts[origin]]
+        return found
+
+    def _enums(self, unit: Unit) -> dict[str, EnumType]:
+        """The enums of a file by name, and those of the files that its imported components come from.
+
+        One of the latter whose name is not unique here goes by a name that no text can write: its values can be used.
+        """
+        origins = [self._libraries.origin(unit, name) for name in unit.components]
+        visible = {origin[0] for origin in origins if origin is not None}
+        found: dict[str, EnumType] = {}
+        imported: dict[str, list[EnumType]] = {}
+        for enum, home, tree in self._types.enums.values():
+            if home is unit:
+                found[tree.name.text] = enum
+            elif home in visible:
+                imported.setdefault(tree.name.text, []).append(enum)
+        for name, enums in imported.items():
+            if len(enums) == 1 and name not in unit.types:
+                found[name] = enums[0]
+            else:
+                found |= {enum.name: enum for enum in enums}
+        return found

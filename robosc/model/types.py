@@ -1,5 +1,7 @@
 """Resolves the types of a model: names to definitions, each once, in the scope of its file."""
 
+from collections.abc import Iterable
+
 from robosc.errors import RelatedPlace
 from robosc.expressions import (
     ArrayType,
@@ -13,9 +15,11 @@ from robosc.expressions import (
     Type,
 )
 from robosc.language import syntax
+from robosc.language.scan import MAXIMUM_NESTING
 from robosc.model.findings import Findings
 from robosc.model.structure import ObjectDefinition, Property
 from robosc.model.units import Unit, unique
+from robosc.source import Location
 
 _BASIC: dict[syntax.BasicTypeName, Type] = {
     syntax.BasicTypeName.STRING: StringType(),
@@ -30,16 +34,19 @@ class Types:
 
     Attributes:
         objects: Object definitions by model name.
+        object_places: Where they stand.
         enums: Enum types by model name, with the unit and tree they come from.
         sources: Source type of each enum by model name.
     """
 
     def __init__(self, findings: Findings) -> None:
         self.objects: dict[str, ObjectDefinition] = {}
+        self.object_places: dict[str, Location] = {}
         self.enums: dict[str, tuple[EnumType, Unit, syntax.EnumDefinition]] = {}
         self.sources: dict[str, Type] = {}
         self._findings = findings
         self._open: list[str] = []
+        self._depths: dict[str, int] = {}
 
     def resolve(self, tree: syntax.Type, unit: Unit, *, in_object: bool = False) -> Type | None:
         """The type that a tree means in a unit, or None after reporting why it means none."""
@@ -48,7 +55,7 @@ class Types:
                 return self._integer(tree)
             case syntax.BasicType(name=name):
                 return _BASIC[name]
-            case syntax.ArrayType(element=element):
+            case syntax.ArrayType():
                 if not in_object:
                     self._findings.error(
                         "array-not-allowed",
@@ -57,10 +64,18 @@ class Types:
                         "Make an object type with the array as a property.",
                     )
                     return None
-                inner = self.resolve(element, unit, in_object=True)
-                return None if inner is None else ArrayType(inner)
+                return self._array(tree, unit)
             case syntax.NamedType(name=name):
                 return self.named(name, unit)
+
+    def _array(self, tree: syntax.ArrayType, unit: Unit) -> Type | None:
+        element, depth = tree.element, 1
+        while isinstance(element, syntax.ArrayType):
+            element, depth = element.element, depth + 1
+        found = self.resolve(element, unit, in_object=True)
+        for _ in range(depth):
+            found = None if found is None else ArrayType(found)
+        return found
 
     def named(self, name: syntax.Name, unit: Unit) -> Type | None:
         """The type that a name means in a unit, or None after reporting an unknown name."""
@@ -76,6 +91,9 @@ class Types:
                 name.location,
                 "Remove the property or rule source that leads back to it.",
             )
+            return None
+        if len(self._open) >= MAXIMUM_NESTING:
+            self._too_deep(name)
             return None
         if isinstance(definition, syntax.ObjectDefinition):
             if key not in self.objects:
@@ -105,7 +123,31 @@ class Types:
             if found is not None:
                 properties.setdefault(item.name.text, Property(item.name.text, found))
         self._open.pop()
+        self._depths[key] = self._depth(tree, properties.values())
         self.objects[key] = ObjectDefinition(key, tuple(properties.values()))
+        self.object_places[key] = tree.name.location
+
+    def _depth(self, tree: syntax.ObjectDefinition, properties: Iterable[Property]) -> int:
+        """How deeply an object is nested, arrays counted; after an error 0, so that it is not repeated."""
+        deepest = 0
+        for item in properties:
+            type_, arrays = item.type, 0
+            while isinstance(type_, ArrayType):
+                type_, arrays = type_.element, arrays + 1
+            inner = self._depths[type_.name] if isinstance(type_, ObjectType) else 0
+            deepest = max(deepest, arrays + inner)
+        if deepest >= MAXIMUM_NESTING:
+            self._too_deep(tree.name)
+            return 0
+        return deepest + 1
+
+    def _too_deep(self, name: syntax.Name) -> None:
+        self._findings.error(
+            "nesting-too-deep",
+            f"types are nested deeper than {MAXIMUM_NESTING}",
+            name.location,
+            "Nest the objects less deeply.",
+        )
 
     def _define_enum(self, key: str, tree: syntax.EnumDefinition, unit: Unit) -> None:
         self._open.append(key)

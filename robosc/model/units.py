@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from robosc.errors import RelatedPlace
 from robosc.language import parse, syntax
+from robosc.language.scan import declared_libraries
 from robosc.model.findings import Findings
 from robosc.source import Bundle, Location
 
@@ -86,33 +87,53 @@ def unique(names: list[syntax.Name], code: str, what: str, findings: Findings) -
 class Libraries:
     """The libraries of a bundle, parsed when they are asked for."""
 
-    def __init__(self, bundle: Bundle, findings: Findings) -> None:
+    def __init__(self, bundle: Bundle, main: Unit, findings: Findings) -> None:
         self._bundle = bundle
         self._findings = findings
-        self._units: dict[str, Unit | None] = {}
+        self._units: dict[str, Unit] = {main.tree.name.text: main} if main.tree.is_library else {}
+        self._broken = set[str]()
         self._parsed: dict[str, syntax.File | None] = {}
 
     def unit(self, name: syntax.Name) -> Unit | None:
         """The library called `name`, or None after reporting why there is none."""
-        if name.text not in self._units:
-            self._units[name.text] = self._find(name)
-        return self._units[name.text]
+        if name.text not in self._units and name.text not in self._broken:
+            found = self._find(name)
+            if found is not None:
+                self._units[name.text] = found
+        return self._units.get(name.text)
+
+    def origin(self, unit: Unit, component: str) -> tuple[Unit, str] | None:
+        """The file that defines a component which `unit` has or imports, and its name there.
+
+        None where the chain of imports does not end, or leads to a library that nothing has been imported from.
+        """
+        seen = set[tuple[Unit, str]]()
+        here: Unit | None = unit
+        while here is not None and (here, component) not in seen and component in here.components:
+            seen.add((here, component))
+            source = here.components[component].imported
+            if source is None:
+                return here, component
+            here, component = self._units.get(source.library.text), source.component.text
+        return None
 
     def _find(self, name: syntax.Name) -> Unit | None:
-        broken = False
         found: dict[str, syntax.File] = {}
         for file in self._bundle.libraries:
+            # A broken library that nothing imports is nobody's error, so only those that are asked for are parsed.
+            if name.text not in declared_libraries(file.text):
+                continue
             if file.name not in self._parsed:
                 parsed = parse(file)
                 self._parsed[file.name] = parsed.tree
-                # Loading keeps only files that declare a library that is wanted, so this one is.
                 self._findings.diagnostics.extend(parsed.diagnostics)
             tree = self._parsed[file.name]
-            broken = broken or tree is None
-            if tree is not None and tree.is_library and tree.name.text == name.text:
+            if tree is None:
+                self._broken.add(name.text)
+            elif tree.is_library and tree.name.text == name.text:
                 found[file.name] = tree
-        texts = {file.text for file in self._bundle.libraries if file.name in found}
-        if len(texts) > 1:
+        if len({file.text for file in self._bundle.libraries if file.name in found}) > 1:
+            self._broken.add(name.text)
             self._findings.error(
                 "ambiguous-library",
                 f"the library '{name.text}' is defined by {' and '.join(sorted(found))}",
@@ -122,13 +143,13 @@ class Libraries:
             return None
         if found:
             return make_unit(next(iter(found.values())), self._findings)
-        if not broken:
+        if name.text not in self._broken:
             self._unknown(name)
         return None
 
     def _unknown(self, name: syntax.Name) -> None:
         looked = ", ".join(self._bundle.searched) or "the files that came with the model"
-        known = [tree.name.text for tree in self._parsed.values() if tree is not None and tree.is_library]
+        known = sorted(set[str]().union(*(declared_libraries(file.text) for file in self._bundle.libraries)))
         mend = f"Put the library into one of the folders looked at ({looked}) or name its folder with -L."
         self._findings.unknown("library", name.text, name.location, known, mend)
 

@@ -148,7 +148,7 @@ def run(folder: Path) -> list[str]:
         node = stack.enter_context(
             process(
                 "the controller",
-                [sys.executable, "-m", f"{name}.node", "--ros-args", "-p", f"log_folder:={log}"],
+                [sys.executable, "-m", f"{name}.node", "--ros-args", "-p", "period:=0.05", "-p", f"log_folder:={log}"],
                 {**environment, "PYTHONPATH": os.pathsep.join([str(package), environment.get("PYTHONPATH", "")])},
                 folder / "node.log",
             )

@@ -1,0 +1,43 @@
+"""What the README shows is true."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from robosc.cli.main import make_parser
+from robosc.supervisor import MadeStatus, make_supervisor
+from robosc_client.main import make_parser as client_parser
+from support.models import bundle_of
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"```\n(.*?)```", README, re.DOTALL)
+COMMANDS = [line.partition("#")[0].rstrip(" &") for block in BLOCKS for line in block.splitlines()]
+
+
+def test_the_model_has_no_findings_and_a_supervisor() -> None:
+    (model,) = [block for block in BLOCKS if block.startswith("robot ")]
+    made = make_supervisor(bundle_of(model))
+    assert (made.status, made.diagnostics) == (MadeStatus.SUPERVISOR, ())
+
+
+@pytest.mark.parametrize("command", [line for line in COMMANDS if re.match(r"robosc(-client)? ", line)])
+def test_the_commands_are_understood(command: str) -> None:
+    program, *arguments = shlex.split(command)
+    parser = make_parser() if program == "robosc" else client_parser()
+    parsed = parser.parse_args(arguments)
+    assert (ROOT / parsed.model).is_file()
+
+
+@pytest.mark.parametrize("command", [line for line in COMMANDS if line.startswith("make ")])
+def test_the_make_targets_exist(command: str) -> None:
+    assert f"\n{command.split()[1]}: " in (ROOT / "Makefile").read_text(encoding="utf-8")
+
+
+def test_everything_on_the_map_is_there() -> None:
+    table = README.partition("## Where does X live?")[2].partition("## Develop")[0]
+    places = re.findall(r"`([^`]+)`", table.partition("| --- | --- |")[2])
+    assert len(places) > 15
+    assert [place for place in places if not (ROOT / place).exists()] == []

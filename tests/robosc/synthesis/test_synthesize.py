@@ -2,6 +2,7 @@
 
 import os
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -65,7 +66,7 @@ def agree(system: System) -> str:
     return "disables" if disables else "free"
 
 
-def test_random_systems(capsys: pytest.CaptureFixture[str]) -> None:
+def test_random_systems(record_property: Callable[[str, object], None]) -> None:
     shares: Counter[str] = Counter()
 
     @settings(max_examples=EXAMPLES, deadline=None, database=None, derandomize=True)
@@ -78,8 +79,8 @@ def test_random_systems(capsys: pytest.CaptureFixture[str]) -> None:
 
     compare()
     total = sum(shares.values())
-    with capsys.disabled():
-        print(f"\nrandom systems: {total}, " + ", ".join(f"{n} {shares[n] / total:.0%}" for n in sorted(shares)))
+    told = ", ".join(f"{name} {shares[name] / total:.0%}" for name in sorted(shares))
+    record_property("random systems against the explicit twin", f"{total}, {told}")
     assert shares["disables"] >= total / 2
     assert shares["empty"] >= total / 10
 

@@ -159,7 +159,7 @@ class Converter:
         for opening in reversed(node.arrays):
             place = self._places.location(opening._tx_position, node._tx_position_end)
             tree = syntax.ArrayType(tree, place)
-        for opening in node.arrays[len(node.closings) :]:
+        for opening in node.arrays[: max(0, len(node.arrays) - len(node.closings))]:
             place = self._keyword(opening, "array")
             self._report("syntax-error", "the '(' of this array is never closed", place, "Close it with ')'.")
         for closing in node.closings[len(node.arrays) :]:
@@ -170,8 +170,7 @@ class Converter:
         if node.name is not None:
             return syntax.NamedType(self._name(node.name))
         if node.integer is None:
-            place = self._places.location(node._tx_position_end - len(node.basic), node._tx_position_end)
-            return syntax.BasicType(syntax.BasicTypeName(node.basic), None, None, place)
+            return syntax.BasicType(syntax.BasicTypeName(node.basic.word), None, None, self._at(node.basic))
         bounds, place = node.integer, self._at(node.integer)
         if not bounds.low:
             return syntax.BasicType(syntax.BasicTypeName.INTEGER, None, None, place)

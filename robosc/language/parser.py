@@ -39,7 +39,8 @@ def parse(file: SourceFile) -> Parsed:
     from textx.exceptions import TextXSyntaxError
 
     try:
-        root = _metamodel().model_from_str(file.text)
+        # In a text without any line end, Arpeggio looks for the first one again at every token, which is quadratic.
+        root = _metamodel().model_from_str(file.text if "\n" in file.text else f"{file.text}\n")
         converter = Converter(Places(file))
         tree = converter.file(root.content)
     except TextXSyntaxError as error:
@@ -69,6 +70,8 @@ _MAXIMUM_SHOWN = 40
 def _syntax_error(file: SourceFile, error: Any) -> Diagnostic:
     """What the parser met, and what would have fitted there."""
     line, column = int(error.line), int(error.col)
+    if "\n" not in file.text and line > 1:
+        line, column = 1, len(file.text) + 1
     text = file.line(line)
     token = _TOKEN.match(text, column - 1)
     found = token.group() if token else ""

@@ -17,7 +17,8 @@ MAXIMUM_BRACES = 40
 
 _COMMENT = r"//[^\n]*|/\*[\s\S]*?\*/"
 _STRING = r""""[^"\\]*+(?:\\[\s\S][^"\\]*+)*+"|'[^'\\]*+(?:\\[\s\S][^'\\]*+)*+'"""
-_TOKEN = re.compile(rf"""{_COMMENT}|{_STRING}|/\*|["'{{(\[\])}}]""")
+_SIGNS = rf"(?:[!-]\s*+){{{MAXIMUM_NESTING + 1}}}"
+_TOKEN = re.compile(rf"""{_COMMENT}|{_STRING}|/\*|["'{{(\[\])}}]|{_SIGNS}""")
 # What is never closed hides the rest: to look for its end once more at every later beginning would take forever.
 _HIDDEN = re.compile(rf"""{_COMMENT}|{_STRING}|/\*[\s\S]*|["'][\s\S]*""")
 _LIBRARY = re.compile(r"(?<![A-Za-z_0-9^])library\s+\^?([A-Za-z_][A-Za-z_0-9]*)")
@@ -67,6 +68,9 @@ def scan(file: SourceFile) -> Scanned:
             return found("unclosed-comment", "this comment is never closed", match.start(), "Close it with '*/'.")
         if token in ('"', "'"):
             return found("unclosed-string", "this text is never closed", match.start(), f"Close it with {token}.")
+        if len(token) > MAXIMUM_NESTING and token[0] in "!-":
+            what = f"more than {MAXIMUM_NESTING} signs stand before one operand"
+            return found("nesting-too-deep", what, match.start(), "Remove signs that cancel each other.")
         if token in "})]":
             depth -= 1
             braces -= token == "}"

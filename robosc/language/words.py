@@ -75,6 +75,8 @@ def mend_syntax(before: str, token: str, expected: str) -> str:
         return "Write '!' for 'not'."
     if token == "=" and before.endswith("="):
         return "Write '=' once: it compares."
+    if not token.isascii():
+        return "Names are made of the letters A to Z, digits and '_' only."
     if token in RESERVED_WORDS and any(word in expected for word in ("a name", "an expression", "a value", "a type")):
         return f"If '{token}' is meant as a name, write '^{token}'."
     near = difflib.get_close_matches(token, re.findall(r"'([a-z]+)'", expected), n=1, cutoff=0.75)

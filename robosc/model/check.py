@@ -64,11 +64,16 @@ class Checked:
         """The model.
 
         Raises:
-            LanguageError: There is none; it carries the findings.
+            LanguageError: There is none; it carries the findings, at least one of them an error.
         """
-        if self.model is None:
+        if self.model is not None:
+            return self.model
+        if self.has_errors:
             raise LanguageError(self.diagnostics)
-        return self.model
+        library = Diagnostic(
+            Severity.ERROR, "no-robot", "the file holds a library, not a robot", None, "Give the file of a robot."
+        )
+        raise LanguageError([library, *self.diagnostics])
 
 
 def check(bundle: Bundle) -> Checked:
@@ -109,7 +114,7 @@ class _RobotChecker:
             part.name: component_names(part, behaviour_trees[part.name], self._types, self._findings)
             for part in self._parts
         }
-        scopes = Scopes(self._types, self._parts, self._libraries, names)
+        scopes = Scopes(self._unit, self._types, self._parts, self._libraries, names)
         enums = self._enums(scopes)
         behaviours = self._behaviours(behaviour_trees, scopes, communications)
         checker = ExpressionChecker(scopes.of(self._unit), self._findings)
@@ -244,7 +249,7 @@ class _RobotChecker:
                         )
 
     def _check_empty(self, communications: Mapping[str, Communication]) -> None:
-        if not communications and not self._findings.has_errors:
+        if not communications and not self._tree.is_library and not self._findings.has_errors:
             self._findings.warning(
                 "empty-model",
                 f"'{self._tree.name.text}' has no communication: there is nothing to synthesize",

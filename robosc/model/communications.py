@@ -137,12 +137,13 @@ def check_topics(
     communications: Iterable[Communication], places: dict[str, Location], types: Types, findings: Findings
 ) -> None:
     """Who shares an identifier: one middleware type on each, and one component that publishes on it."""
-    first: dict[tuple[bool, str], Communication] = {}
+    first: dict[tuple[str, str], Communication] = {}
     for item in communications:
         is_topic = item.kind in (CommunicationKind.INCOMING_MESSAGE, CommunicationKind.OUTGOING_MESSAGE)
-        if not is_topic:
-            continue
-        other = first.setdefault((True, item.identifier), item)
+        if not is_topic and item.interface is None:
+            continue  # Its missing link has been reported; without one there is nothing to compare.
+        # Topics, services and actions have name spaces of their own.
+        other = first.setdefault(("topic" if is_topic else item.kind, item.identifier), item)
         if other is not item and middleware_type(other, types) != middleware_type(item, types):
             findings.warning(
                 "conflicting-topic",
@@ -152,7 +153,7 @@ def check_topics(
                 RelatedPlace("the other type is used here", places[other.name]),
             )
         if item.kind is CommunicationKind.OUTGOING_MESSAGE:
-            speaker = first.setdefault((False, item.identifier), item)
+            speaker = first.setdefault(("speaker", item.identifier), item)
             if speaker.component != item.component:
                 findings.warning(
                     "shared-topic",

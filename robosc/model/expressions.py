@@ -194,7 +194,7 @@ class ExpressionChecker:
                 tree.root.location,
                 f"Write '{own.name}.{name}'.",
             )
-        else:
+        elif name not in self._scope.absent:
             self._findings.unknown("name", name, tree.root.location, self._scope.known_names())
         return None
 

@@ -33,6 +33,7 @@ class Scope:
         enums: Enums whose values can be named here, by the name they have here.
         own: The component whose behaviour this is, if any.
         received: Type of `value`, or None where there is no received data.
+        absent: Components whose import has failed, which has been reported.
     """
 
     types: Types
@@ -40,6 +41,7 @@ class Scope:
     enums: Mapping[str, EnumType]
     own: ComponentNames | None = None
     received: Type | None = None
+    absent: frozenset[str] = frozenset()
     _values: dict[str, tuple[EnumType, ...]] = field(default_factory=dict)
 
     def with_received(self, received: Type | None) -> "Scope":
@@ -68,6 +70,7 @@ class Scopes:
     """The scopes of a robot: one for each of its files, shared by all behaviours in it.
 
     Args:
+        main: The robot, or the library that is checked.
         types: All types, already resolved.
         parts: The components of the robot.
         libraries: The libraries that they come from.
@@ -75,8 +78,9 @@ class Scopes:
     """
 
     def __init__(
-        self, types: Types, parts: Sequence[Part], libraries: Libraries, names: Mapping[str, ComponentNames]
+        self, main: Unit, types: Types, parts: Sequence[Part], libraries: Libraries, names: Mapping[str, ComponentNames]
     ) -> None:
+        self._main = main
         self._types = types
         self._libraries = libraries
         self._names = names
@@ -86,7 +90,9 @@ class Scopes:
     def of(self, unit: Unit) -> Scope:
         """The names of a file, outside every behaviour."""
         if unit not in self._scopes:
-            self._scopes[unit] = Scope(self._types, self._components(unit), self._enums(unit))
+            components = self._components(unit)
+            absent = frozenset(unit.components.keys() - components) if unit is self._main else frozenset()
+            self._scopes[unit] = Scope(self._types, components, self._enums(unit), absent=absent)
         return self._scopes[unit]
 
     def inside(self, part: Part) -> Scope:

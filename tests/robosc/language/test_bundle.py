@@ -1,5 +1,6 @@
 """Where libraries are found, which files become part of a bundle, and what cannot be read."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -46,6 +47,12 @@ def test_an_unknown_library_says_where_it_was_looked_for(model: Path, tmp_path: 
     assert "., ../shared" in found.mend
 
 
+def test_libraries_of_libraries_are_found(model: Path, tmp_path: Path) -> None:
+    write(tmp_path / "robots" / "lib.rscd", "library Lib { component Base from Deep import Base }")
+    write(tmp_path / "shared" / "deep.rscd", library("Deep", message="deep"))
+    assert messages(model) == ["deep"]
+
+
 def test_only_wanted_files_are_in_the_bundle(model: Path, tmp_path: Path) -> None:
     write(tmp_path / "robots" / "lib.rscd", library())
     write(tmp_path / "robots" / "broken.rscd", "library Broken { component")
@@ -80,6 +87,45 @@ def test_a_broken_library_that_is_imported_is_reported(model: Path, tmp_path: Pa
     (found,) = check(load_bundle(model)).diagnostics
     assert found.location is not None
     assert (found.location.file, found.location.line) == ("lib.rscd", 2)
+
+
+def test_a_library_broken_from_its_first_brace_on_is_still_found(model: Path, tmp_path: Path) -> None:
+    write(tmp_path / "robots" / "lib.rscd", "library Lib component Base { }")
+    (found,) = check(load_bundle(model)).diagnostics
+    assert (found.code, found.location and found.location.file) == ("syntax-error", "lib.rscd")
+
+
+def test_a_needed_library_that_is_no_text_is_reported(model: Path, tmp_path: Path) -> None:
+    path = tmp_path / "shared" / "lib.rscd"
+    path.parent.mkdir()
+    path.write_bytes(b"library Lib {\n // \xe9\n component Base { } }")
+    with pytest.raises(LanguageError) as raised:
+        load_bundle(model)
+    (found,) = raised.value.diagnostics
+    assert (found.code, str(found.location)) == ("not-utf8", "../shared/lib.rscd:2:5")
+
+
+def test_a_model_that_imports_nothing_needs_no_other_file(tmp_path: Path) -> None:
+    model = write(tmp_path / "model.rscd", "robot R { component C { incoming message m with type: none } }")
+    write(tmp_path / "lib.rscd", library())
+    assert load_bundle(model).libraries == ()
+
+
+def test_odd_files_beside_a_model_do_no_harm(model: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "robots"
+    (folder / "loop.rscd").symlink_to("loop.rscd")
+    (folder / "gone.rscd").symlink_to("nowhere")
+    (folder / "folder.rscd").mkdir()
+    write(folder / "lib.rscd", library())
+    assert messages(model) == ["go"]
+
+
+def test_a_file_name_that_is_no_text_is_shown_escaped(tmp_path: Path) -> None:
+    path = tmp_path / os.fsdecode(b"m\xff.rscd")
+    path.write_text("robot R { component C { incoming message m with type: none } }", encoding="utf-8")
+    bundle = load_bundle(path)
+    assert bundle.main.name == "m\\xff.rscd"
+    assert len(bundle.digest) == 64
 
 
 def test_the_digest_depends_on_every_file_and_not_on_the_folder(tmp_path: Path) -> None:

@@ -150,12 +150,66 @@ def test_a_long_chain_needs_no_deep_recursion() -> None:
         ("é", "syntax-error", 1),
         ("state", "syntax-error", 1),
         ("a ->b", "syntax-error", 3),
+        ("(a or (b and c)", "syntax-error", 1),
+        ("a or b) and c", "syntax-error", 7),
+        ("a or ()", "syntax-error", 7),
+        ("a or !", "syntax-error", 8),
     ],
 )
 def test_broken_expressions(text: str, code: str, column: int) -> None:
     prefix = "robot R { requirement r needs "
     (found,) = faults(prefix + text + " }")
     assert (found.code, found.location and found.location.column) == (code, len(prefix) + column)
+
+
+def test_every_parenthesis_without_a_partner_is_found() -> None:
+    found = faults("robot R { requirement r needs (a or b requirement r needs a) and c }")
+    assert [item.message for item in found] == ["this '(' is never closed", "this ')' closes nothing"]
+
+
+@pytest.mark.parametrize("opening", ["(", "!(", "-(", "a = (", "a => ("])
+def test_parentheses_up_to_the_limit_need_no_recursion(opening: str) -> None:
+    depth = 190
+    assert shape(expression(opening * depth + "b" + ")" * depth)).count("b") == 1
+
+
+def test_arrays_of_arrays_up_to_the_limit() -> None:
+    (found,) = tree_of("library L { datatype object O { x: " + "array(" * 190 + "double" + ")" * 190 + " } }").items
+    assert isinstance(found, syntax.ObjectDefinition)
+    type_, depth = found.properties[0].type, 0
+    while isinstance(type_, syntax.ArrayType):
+        type_, depth = type_.element, depth + 1
+    assert depth == 190
+    assert (type_.location.column, type_.location.length) == (36 + 190 * 6, 6)
+
+
+@pytest.mark.parametrize(
+    ("text", "column", "words"),
+    [("array(array(double)", 1, "never closed"), ("array(double))", 14, "closes nothing"), ("double)", 7, "closes")],
+)
+def test_parentheses_of_arrays_are_matched(text: str, column: int, words: str) -> None:
+    prefix = "library L { datatype object O { x: "
+    (found,) = faults(f"{prefix}{text} }} }}")
+    assert (found.code, found.location and found.location.column) == ("syntax-error", len(prefix) + column)
+    assert words in found.message
+
+
+@pytest.mark.parametrize(
+    ("text", "mend"),
+    [
+        ("robot R { requirement r needs a && b }", "Write 'and' for '&&'."),
+        ("robot R { requirement r needs a || b }", "Write 'or' for '||'."),
+        ("robot R { requirement r needs a == b }", "Write '=' once: it compares."),
+        ("robot R { requirement r needs not a }", "Write '!' for 'not'."),
+        ("robot R { component Caméra { } }", "Names are made of the letters A to Z, digits and '_' only."),
+        ("robot R { component C { } ; }", "Remove the ';': nothing ends with one."),
+        ("robot R { requirement r needs state = a }", "If 'state' is meant as a name, write '^state'."),
+        ("robot R { component C { incomming message m with type: none } }", "Did you mean 'incoming'?"),
+    ],
+)
+def test_common_slips_are_mended(text: str, mend: str) -> None:
+    (found,) = faults(text)
+    assert found.mend == mend
 
 
 def test_both_readings_of_a_mixed_implication_are_shown() -> None:
@@ -197,6 +251,16 @@ def test_places_count_characters_and_cover_names() -> None:
         ("robot R {\n /* open", "unclosed-comment", 2, 2, "never closed"),
         ('robot R { component C { incoming message m with identifier: "x', "unclosed-string", 1, 61, "never closed"),
         ("robot R { \0 }", "invalid-character", 1, 11, "NUL"),
+        ("robot R {\n // \0\n }", "invalid-character", 2, 5, "NUL"),
+        (
+            'robot R { component C { incoming message m with identifier: "\0", type: none } }',
+            "invalid-character",
+            1,
+            62,
+            "NUL",
+        ),
+        ("robot R { provide m with " + "{a:" * 100, "nesting-too-deep", 1, 143, "braces"),
+        ("robot R { " + "x" * 100000, "syntax-error", 1, 11, "x..."),
         ("robot R { " + "(" * 300, "nesting-too-deep", 1, 210, "200"),
         ("robot R { requirement r needs " + "!" * 300 + "a }", "nesting-too-deep", 1, 31, "200"),
         ("robot R { requirement r needs " + "-" * 100000 + "a }", "nesting-too-deep", 1, 31, "200"),
@@ -220,6 +284,20 @@ def test_a_reserved_word_as_a_name_is_explained() -> None:
 
 
 EXAMPLE_TEXTS = [(EXAMPLES / f"{name}.rscd").read_text(encoding="utf-8") for name in EXAMPLE_NAMES]
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("piece", ["/*", '"\\', "'\\", "(", "{", "a ", "robot ", "//\n", "!"])
+def test_a_long_hostile_text_takes_no_time_worth_mentioning(piece: str) -> None:
+    faults(piece * 300_000)
+
+
+@pytest.mark.parametrize("end", ["", "\n", "\n\n"])
+def test_the_end_of_a_file_is_found_with_and_without_a_line_end(end: str) -> None:
+    (found,) = faults("robot R {" + end)
+    assert found.message.startswith("the end of the file does not fit here")
+    assert found.location is not None
+    assert (found.location.line, found.location.column) == ((1, 10) if not end else (1 + len(end), 1))
 
 
 @settings(max_examples=150, deadline=None)

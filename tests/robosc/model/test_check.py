@@ -1,8 +1,13 @@
 """What a checked model holds: names bound, types known, source order, imports, synthesis variables, places."""
 
+import re
+from random import Random
+
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from robosc.errors import LanguageError
 from robosc.expressions import (
     Binary,
     Constant,
@@ -17,9 +22,10 @@ from robosc.expressions import (
     VariableRead,
 )
 from robosc.expressions.text import expression_text
-from robosc.expressions.tree import children
+from robosc.expressions.tree import children, leaves
+from robosc.language.words import RESERVED_WORDS
 from robosc.model.structure import ObjectValue, RequirementForm, Update
-from support.models import EXAMPLE_NAMES, checked, example_model, model_of
+from support.models import EXAMPLE_NAMES, checked, example_bundle, example_model, model_of
 from support.random_expressions import conditions
 
 
@@ -228,10 +234,201 @@ def test_broken_imports(text: str, libraries: dict[str, str], code: str, words: 
     assert found.location.file == ("a.rscd" if code == "import-cycle" else "model.rscd")
 
 
+CHAIN = """library Chain {
+    component Chassis from Lib import Platform
+    component Watcher {
+        incoming message warn with type: none
+        behaviour { initial marked state calm { transition if Chassis.seen = high and Chassis.ready goto calm } }
+    }
+}"""
+
+
+@pytest.mark.parametrize("base", ["Chain import Chassis", "Lib import Platform"])
+def test_a_library_reads_a_component_that_it_imports_however_the_robot_has_it(base: str) -> None:
+    model = model_of(
+        f"robot R {{ component Base from {base} component W from Chain import Watcher }}", lib=LIBRARY, chain=CHAIN
+    )
+    behaviour = model.component("W").behaviour
+    assert behaviour is not None
+    assert behaviour.transitions[0].guard == Binary(
+        "and",
+        Binary("=", VariableRead("Base", "seen"), EnumValue("Lib.Level", "high")),
+        StateTest("Base", "ready"),
+    )
+
+
+def test_a_library_that_reads_a_component_which_is_not_imported_is_refused() -> None:
+    found = checked("robot R { component W from Chain import Watcher }", lib=LIBRARY, chain=CHAIN).diagnostics
+    assert {item.code for item in found} == {"unknown-name"}
+    assert {item.location and item.location.file for item in found} == {"chain.rscd"}
+
+
+def test_two_libraries_may_import_from_each_other() -> None:
+    main = (
+        "library Main { component A from Other import B component C { behaviour { initial marked state idle { } } } }"
+    )
+    other = """library Other {
+        component E from Main import C
+        component B { behaviour { initial marked state s { transition if E.idle goto s } } }
+    }"""
+    assert checked(main, other=other).diagnostics == ()
+
+
+IMPORTER = """robot R {{
+    component Base from Lib import Platform
+    component Twin from Copy import Platform
+    requirement drive needs {condition}
+}}"""
+COPY = LIBRARY.replace("Lib ", "Copy ").replace("message drive", "message go").replace("level", "level2")
+
+
+def test_an_imported_enum_can_be_named() -> None:
+    model = model_of(
+        "robot R { component Base from Lib import Platform requirement drive needs Base.seen = Level.high }",
+        lib=LIBRARY,
+    )
+    assert model.requirements[0].expression == Binary("=", VariableRead("Base", "seen"), EnumValue("Lib.Level", "high"))
+
+
+def test_an_own_type_hides_an_imported_enum_of_its_name_but_not_the_values() -> None:
+    robot = (
+        "robot R {{ datatype object Level {{ }} component Base from Lib import Platform requirement drive needs {} }}"
+    )
+    assert not checked(robot.format("Base.seen = high"), lib=LIBRARY).has_errors
+    (found,) = checked(robot.format("Base.seen = Level.high"), lib=LIBRARY).diagnostics
+    assert found.message == "unknown name 'Level'"
+
+
+def test_a_library_knows_no_enum_of_a_library_that_it_does_not_import() -> None:
+    text = "robot R { component Base from Lib import Platform component W from Blind import Watcher }"
+    blind = CHAIN.replace("component Chassis from Lib import Platform", "").replace("Chain", "Blind")
+    found = checked(text, lib=LIBRARY, blind=blind.replace("Chassis.seen = high and Chassis.ready", "high = high"))
+    assert [item.message for item in found.diagnostics] == ["unknown name 'high'"] * 2
+
+
+def test_a_set_of_communications_holds_each_once() -> None:
+    model = model_of("robot R { component C { incoming message m with type: none } requirement { m, m } needs true }")
+    assert model.requirements[0].communications == ("m",)
+
+
+@pytest.mark.parametrize(
+    ("update", "leaves"),
+    [
+        ("value", False),
+        ("value + 1", True),
+        ("value + 0 - 1", True),
+        ("10 - value", False),
+        ("value - value", True),
+        ("-value", True),
+        ("-(-value)", False),
+        ("0 - -value", False),
+        ("value * 1", False),
+        ("value * 2", True),
+        ("value * -1 + 10", False),
+        ("(value - 10) * (value - 10) - 90", True),
+    ],
+)
+def test_whether_an_update_can_leave_the_range_is_computed_from_its_bounds(update: str, leaves: bool) -> None:
+    found = checked(f"""robot R {{ component C {{
+        outgoing message n with type: integer(0..10)
+        behaviour {{ variable v: integer(0..10) on response from n do v := {update} initial marked state s {{ }} }}
+    }} }}""")
+    assert [item.code for item in found.diagnostics] == ["may-leave-range"] * leaves
+
+
+def test_the_type_decides_between_imported_enums_of_one_name() -> None:
+    model = model_of(IMPORTER.format(condition="Twin.seen = high or high = Base.seen"), lib=LIBRARY, copy=COPY)
+    assert [leaf.enum for leaf in leaves(model.requirements[0].expression) if isinstance(leaf, EnumValue)] == [
+        "Copy.Level",
+        "Lib.Level",
+    ]
+    (first, _) = checked(IMPORTER.format(condition="high = high"), lib=LIBRARY, copy=COPY).diagnostics
+    assert (first.code, first.mend) == ("ambiguous-name", "Compare it with a variable of its type.")
+
+
+def test_a_broken_library_that_nothing_imports_is_nobodys_error() -> None:
+    text = "robot R { component Base from Lib import Platform }"
+    assert checked(text, lib=LIBRARY, broken="library Broken { component").diagnostics == ()
+
+
+def test_what_is_read_of_a_component_whose_import_failed_is_no_error_of_its_own() -> None:
+    text = """robot R {
+        component Base from Nowhere import X
+        component C {
+            incoming message go with type: none
+            behaviour { initial marked state s { transition if Base.ready goto s } }
+        }
+        requirement go needs Base.ready and C.s
+    }"""
+    (found,) = checked(text).diagnostics
+    assert "unknown library" in found.message
+
+
+def test_an_unknown_library_is_reported_at_every_import() -> None:
+    text = (
+        "robot R { component A from Nowhere import X component B from Nowhere import Y component C from Libb import Z }"
+    )
+    found = checked(text, lib=LIBRARY).diagnostics
+    assert [item.location and item.location.column for item in found] == [28, 62, 96]
+    assert "did you mean 'Lib'" in found[2].message
+
+
+@pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.parametrize(("depth", "codes"), [(150, []), (1500, ["nesting-too-deep"])])
+def test_nested_types_need_no_deep_recursion(order: int, depth: int, codes: list[str]) -> None:
+    types = [f"datatype object O{n} {{ next: O{n + 1} }}" for n in range(depth)]
+    text = " ".join([*types, f"datatype object O{depth} {{ }}"][::order])
+    found = checked(f"robot R {{ component C {{ incoming message m with type: none }} {text} }}").diagnostics
+    assert sorted({item.code for item in found}) == codes
+
+
+@pytest.mark.timeout(60)
+def test_very_many_unknown_names_are_reported_without_comparing_all_of_them() -> None:
+    number = 1000
+    messages = " ".join(f"incoming message message_{n} with type: none" for n in range(number))
+    requirements = " ".join(f"requirement massage_{n}x needs C.stat or C.idle{n}" for n in range(number))
+    text = (
+        f"robot R {{ component C {{ {messages} behaviour {{ initial marked state state_ {{ }} }} }} {requirements} }}"
+    )
+    found = checked(text).diagnostics
+    assert len(found) == 3 * number
+    assert "did you mean 'message_0'" in found[0].message
+
+
+TOKENS = re.compile(r'//[^\n]*|"[^"]*"|[A-Za-z_]\w*|\d+(?:\.\d+)?|->|\.\.|:=|=>|!=|<=|>=|\S|\s+')
+
+
+def kind_of(token: str) -> str:
+    """Tokens of one kind can stand for each other without a syntax error, mostly."""
+    if token in ("double", "string", "integer", "boolean", "none"):
+        return "type"
+    if token in ("request", "response", "feedback", "error", "cancel"):
+        return "kind"
+    if token in ("and", "or", "=", "!=", "<", ">", "+", "-", "*", "/"):
+        return "operator"
+    if token in ("true", "false") or token[0].isdigit():
+        return "literal"
+    return "name" if token.isidentifier() and token not in RESERVED_WORDS else token
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.sampled_from(EXAMPLE_NAMES), st.randoms(use_true_random=False))
+def test_models_with_swapped_words_never_raise(name: str, random: Random) -> None:
+    tokens = TOKENS.findall(example_bundle(name).main.text)
+    for _ in range(random.randint(1, 5)):
+        place = random.randrange(len(tokens))
+        tokens[place] = random.choice([token for token in tokens if kind_of(token) == kind_of(tokens[place])])
+    found = checked("".join(tokens))
+    assert (found.model is None) == found.has_errors
+    assert all(item.location is not None and item.mend for item in found.diagnostics)
+
+
 def test_a_library_can_be_checked_by_itself() -> None:
     found = checked(LIBRARY)
     assert found.model is None
     assert not found.has_errors
+    with pytest.raises(LanguageError, match="no-robot"):
+        found.model_or_raise()
     broken = checked(LIBRARY.replace("seen := value", "sen := value"))
     assert [item.code for item in broken.diagnostics] == ["update-out-of-scope"]
 

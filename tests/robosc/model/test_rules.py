@@ -176,6 +176,12 @@ RULES: list[tuple[str, str, str, str]] = [
         robot(component("variable v: double on response from seen do v := 3 " + STATES)),
     ),
     (
+        "type-mismatch",
+        "error",
+        robot(component("variable v: integer(1..3) = §4 " + STATES)),
+        robot(component("variable v: integer(1..3) = 3 " + STATES)),
+    ),
+    (
         "unknown-name",
         "error",
         robot(component(STATES), "requirement go needs C.§c"),
@@ -331,6 +337,29 @@ RULES: list[tuple[str, str, str, str]] = [
         ),
     ),
     (
+        "conflicting-topic",
+        "warning",
+        robot(
+            "interface i use A from p interface j use B from p",
+            'component A { service s with identifier: "/t", request: none, response: none links i }',
+            'component B { service §r with identifier: "/t", request: none, response: none links j }',
+        ),
+        robot(
+            "interface i use A from p interface j use B from p",
+            'component A { service s with identifier: "/t", request: none, response: none links i }',
+            'component B { outgoing message r with identifier: "/t", type: none links j }',
+        ),
+    ),
+    (
+        "links-required",
+        "error",
+        robot("component C { action §act with request: none, response: none, feedback: none }"),
+        robot(
+            "interface i use A from p",
+            "component C { action act with request: none, response: none, feedback: none links i }",
+        ),
+    ),
+    (
         "partial-update",
         "note",
         robot(
@@ -385,6 +414,12 @@ def test_rule(code: str, severity: str, broken: str, sound: str) -> None:
     assert found[0].mend.endswith(".")
     assert code not in {item.code for item in checked(sound).diagnostics}
     assert not checked(sound).has_errors, checked(sound).diagnostics
+
+
+def test_services_without_a_link_have_no_type_that_could_conflict() -> None:
+    service = 'service {} with identifier: "/t", request: {}, response: none'
+    text = robot(f"component C {{ {service.format('a', 'none')} {service.format('b', 'double')} }}")
+    assert [item.code for item in checked(text).diagnostics] == ["links-required"] * 2
 
 
 def test_all_findings_come_in_one_run_sorted_by_place() -> None:

@@ -3,9 +3,13 @@
 from typing import Any
 
 from robosc.automata.state import Subject
+from robosc.errors import UnsupportedModelError
 from robosc.supervisor.structure import DecisionDiagram, DecisionNode
 from robosc.synthesis.encoding import Bits, Encoding
 from robosc.synthesis.nodes import cofactors, is_constant
+
+MAXIMUM_BRANCHES = 1_000_000
+"""Ranges of one variable's values beyond which a diagram is refused."""
 
 _Run = tuple[int, Any]
 """A first index and the predicate that holds from there on."""
@@ -67,9 +71,18 @@ class _Extractor:
         for start, below in self._runs(bits, high, place + 1):
             if start or runs[-1][1] != below:
                 runs.append((half + start, below))
+        if len(runs) > MAXIMUM_BRANCHES:
+            raise UnsupportedModelError(
+                f"a condition of the supervisor tells apart more than {MAXIMUM_BRANCHES} ranges of the values of "
+                f"'{self._home[bits.names[0]]}'; use a smaller range"
+            )
         return runs
 
 
 def extract(encoding: Encoding, predicate: Any) -> DecisionDiagram:
-    """The decision diagram of a state predicate, with numbers that depend on its function and the order alone."""
+    """The decision diagram of a state predicate, with numbers that depend on its function and the order alone.
+
+    Raises:
+        UnsupportedModelError: It tells apart more than `MAXIMUM_BRANCHES` ranges of one variable's values.
+    """
     return _Extractor(encoding).diagram(predicate)

@@ -1,9 +1,12 @@
 """Locations, variables and received data as Boolean variables, and expressions as predicates over them.
 
 A value of a finite domain is encoded by its index, most significant bit first. Each bit has a variable for
-the current state and, next to it in the order, one for the next state, which only forward images use.
+the current state and, next to it in the order, one for the next state, which only forward images use. Bits of
+received data stand among those of the variable that is first in the order of those they are written to: were they
+apart, a relation that copies several data would have to remember all of them at once.
 """
 
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,8 +14,8 @@ from typing import Any
 from robosc.automata.state import Subject, initial_state, subject_domain, subject_type, subjects
 from robosc.automata.structure import InputVariable, System
 from robosc.expressions import IntegerType, PathStep, Type, Value, domain
-from robosc.synthesis.engines import Manager
-from robosc.synthesis.order import subject_order
+from robosc.synthesis.engines import Manager, allow_depth
+from robosc.synthesis.order import input_targets, subject_order
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,13 +55,13 @@ class Encoding:
         self.manager = manager
         self.subjects: dict[Subject, Bits] = {}
         for number, subject in enumerate(subject_order(system)):
-            bits = self._bits(f"s{number}", subject_domain(system, subject), self._type(subject))
-            self.subjects[subject] = bits
-            for name in bits.names:
-                manager.declare(name, next_name(name))
+            self.subjects[subject] = self._bits(f"s{number}", subject_domain(system, subject), self._type(subject))
         self.state_names = tuple(name for bits in self.subjects.values() for name in bits.names)
-        self.inputs = tuple(self._input(number, item) for number, item in enumerate(system.inputs))
+        self.inputs = tuple((item, self._input(number, item)) for number, item in enumerate(system.inputs))
         self._choices = 0
+        self._declare()
+        # Twice the bits of a state, for the next one; choices are few.
+        allow_depth(2 * len(self.state_names) + sum(len(_names(bits)) for _, bits in self.inputs))
 
     def _type(self, subject: Subject) -> Type | None:
         return None if subject.variable is None else subject_type(self.system, subject)
@@ -68,11 +71,21 @@ class Encoding:
         width = (len(values) - 1).bit_length()
         return Bits(tuple(f"{prefix}.{place}" for place in range(width)), values, type_, known)
 
-    def _input(self, number: int, item: InputVariable) -> tuple[InputVariable, Bits]:
+    def _input(self, number: int, item: InputVariable) -> Bits:
         known = f"i{number}.known" if item.may_be_unknown else None
-        bits = self._bits(f"i{number}", domain(item.type), item.type, known)
-        self.manager.declare(*bits.names, *([known] if known else []))
-        return item, bits
+        return self._bits(f"i{number}", domain(item.type), item.type, known)
+
+    def _declare(self) -> None:
+        """Put all variables in order."""
+        targets = input_targets(self.system)
+        beside: defaultdict[Subject | None, list[Bits]] = defaultdict(list)
+        for item, bits in self.inputs:
+            written = targets.get((item.event, item.path), set())
+            beside[next((subject for subject in self.subjects if subject in written), None)].append(bits)
+        for subject, bits in self.subjects.items():
+            self.manager.declare(*_interleaved(bits, beside[subject]))
+        for bits in beside[None]:
+            self.manager.declare(*_names(bits))
 
     def choice(self, count: int) -> Bits:
         """Fresh variables for a choice among `count` edges."""
@@ -161,12 +174,23 @@ class Encoding:
 
     def input_names(self, event: str) -> tuple[str, ...]:
         """The variables of the data that an event carries."""
-        return tuple(
-            name
-            for item, bits in self.inputs
-            if item.event == event
-            for name in (*bits.names, *([bits.known] if bits.known else []))
-        )
+        return tuple(name for item, bits in self.inputs if item.event == event for name in _names(bits))
+
+
+def _names(bits: Bits) -> tuple[str, ...]:
+    return bits.names if bits.known is None else (bits.known, *bits.names)
+
+
+def _interleaved(place: Bits, inputs: Sequence[Bits]) -> list[str]:
+    """Names of a place of the state and of received data; bits of equal weight stand together."""
+    ranked = [
+        (len(bits.names) - rank, name, bits is place)
+        for bits in (place, *inputs)
+        for rank, name in enumerate(_names(bits), start=0 if bits.known is None else -1)
+    ]
+    # Stable: within one weight the state comes first.
+    ranked.sort(key=lambda item: -item[0])
+    return [each for _, name, is_state in ranked for each in ((name, next_name(name)) if is_state else (name,))]
 
 
 def _implied(later: InputVariable, earlier: InputVariable) -> bool:

@@ -5,7 +5,7 @@ what the two do differently (counting, restricting, complemented edges) is not u
 """
 
 import importlib
-import importlib.util
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from importlib.metadata import entry_points
 from typing import Any, Protocol
@@ -14,18 +14,21 @@ from robosc.errors import RoboscError
 
 ENTRY_POINTS = "robosc.bdd_engines"
 
+_FRAMES = 1000
+"""Frames for everything but the walk through a diagram: Python's own limit when it starts."""
+
+_FRAMES_PER_LEVEL = 4
+
 
 class Manager(Protocol):
     """A store of shared nodes over ordered Boolean variables.
 
-    A node has `var`, `level`, `negated`, `low`, `high`, a number (`int`), and the operators `&`, `|`, `~`, `==`.
+    A node has `var`, `level`, `negated`, `low`, `high`, `dag_size` (nodes below it, itself and the constants included),
+    a number (`int`), and the operators `&`, `|`, `~`, `==`.
     """
 
     true: Any
     false: Any
-
-    def __len__(self) -> int:
-        """Nodes in the store."""
 
     def declare(self, *names: str) -> Any:
         """Add variables below those there are."""
@@ -77,7 +80,7 @@ def resolve_engine(name: str) -> str:
     """The engine that a name stands for: `auto` is CUDD where its extension is installed.
 
     Raises:
-        UnknownEngineError: There is no such engine.
+        UnknownEngineError: There is no such engine, or it is not installed.
     """
     if name == "auto":
         return "cudd" if _has_cudd() else "autoref"
@@ -89,15 +92,38 @@ def resolve_engine(name: str) -> str:
 
 
 def make_manager(name: str) -> Manager:
-    """A fresh manager of a resolved engine."""
+    """A fresh manager of a resolved engine.
+
+    Raises:
+        UnknownEngineError: Another package offers the engine but cannot be imported.
+    """
     if name in _FACTORIES:
         return _FACTORIES[name]()
-    (point,) = entry_points(group=ENTRY_POINTS, name=name)
-    return point.load()()  # type: ignore[no-any-return]
+    point = next(iter(entry_points(group=ENTRY_POINTS, name=name)))
+    try:
+        factory: Callable[[], Manager] = point.load()
+    except (ImportError, AttributeError) as error:
+        raise UnknownEngineError(f"the engine '{name}' cannot be loaded from {point.value}: {error}") from error
+    return factory()
+
+
+def allow_depth(levels: int) -> None:
+    """Let Python recurse through diagrams of so many levels.
+
+    The plain engine and the walks of `nodes` and `diagrams` go down a level at a time. The limit belongs to the whole
+    interpreter, so it is raised and never lowered: another thread may be deep in a diagram of its own.
+    """
+    needed = _FRAMES + _FRAMES_PER_LEVEL * levels
+    if sys.getrecursionlimit() < needed:
+        sys.setrecursionlimit(needed)
 
 
 def _has_cudd() -> bool:
-    return importlib.util.find_spec("dd.cudd") is not None
+    try:
+        importlib.import_module("dd.cudd")
+    except ImportError:
+        return False
+    return True
 
 
 register("cudd", _make_cudd)

@@ -64,7 +64,9 @@ class _Counter:
         found = self._known.get(int(node))
         if found is None:
             here = self.place(node) + 1
-            total = sum(self.from_node(child) << (self.place(child) - here) for child in cofactors(node))
+            low, high = cofactors(node)
+            total = self.from_node(low) << (self.place(low) - here)
+            total += self.from_node(high) << (self.place(high) - here)
             # The node is kept with its count: its number could otherwise be given to another one.
             found = self._known[int(node)] = (node, total)
         return found[1]

@@ -4,11 +4,12 @@ Source: F. A. Aloul, I. L. Markov and K. A. Sakallah, "FORCE: a fast and easy-to
 heuristic", Great Lakes Symposium on VLSI, 2003, pp. 116-119.
 """
 
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
 from robosc.automata.state import Subject, subjects
 from robosc.automata.structure import System
-from robosc.expressions import Expression, StateTest, VariableRead, leaves
+from robosc.expressions import Expression, PathStep, Received, StateTest, VariableRead, leaves
 
 
 def subject_order(system: System) -> tuple[Subject, ...]:
@@ -47,6 +48,18 @@ def _read(expression: Expression) -> set[Subject]:
             case StateTest(component=component):
                 found.add(Subject(component))
     return found
+
+
+def input_targets(system: System) -> dict[tuple[str, tuple[PathStep, ...]], set[Subject]]:
+    """For each received datum, by event and path, the variables it is written to, directly or computed with."""
+    found: defaultdict[tuple[str, tuple[PathStep, ...]], set[Subject]] = defaultdict(set)
+    for automaton in system.automata:
+        for edge in automaton.edges:
+            for update in edge.updates:
+                for leaf in leaves(update.expression):
+                    if isinstance(leaf, Received):
+                        found[edge.event, leaf.path].add(Subject(automaton.name, update.variable))
+    return dict(found)
 
 
 def force(count: int, edges: Sequence[Sequence[int]]) -> tuple[int, ...]:

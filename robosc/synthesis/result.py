@@ -19,9 +19,9 @@ class Progress:
     """Where a synthesis is.
 
     Attributes:
-        phase: `encoding`, `fixed point` or `reachability`.
-        iteration: Rounds of the phase so far.
-        nodes: Nodes in the manager.
+        phase: `encoding`; `coreachability`, `controllability` and, around these two, `fixed point`; `reachability`.
+        iteration: Events encoded so far, or rounds of the phase.
+        nodes: Nodes of what was found last: where an event is enabled, or a set of states.
     """
 
     phase: str
@@ -29,7 +29,8 @@ class Progress:
     nodes: int
 
     def __str__(self) -> str:
-        return f"{self.phase}, round {self.iteration}, {self.nodes} nodes"
+        unit = "event" if self.phase == "encoding" else "round"
+        return f"{self.phase}, {unit} {self.iteration}, {self.nodes} nodes"
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +41,7 @@ class Statistics:
         engine: Engine that was used.
         state_bits: Boolean variables that encode a state.
         iterations: Rounds of the fixed point.
-        peak_nodes: Most nodes in the manager at the end of a round.
+        peak_nodes: Most nodes that such a predicate took at the end of a round; the same for every engine.
         states: Reachable states of the controlled system, exact; 0 where there is no supervisor.
     """
 

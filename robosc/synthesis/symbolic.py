@@ -30,7 +30,11 @@ from robosc.synthesis.encoding import Bits, Encoding, Inputs, offset_of
 from robosc.synthesis.vectors import Arithmetic, Vector
 
 MAXIMUM_PARTITION = 100_000
-"""Pairs of values beyond which an operation on doubles is refused."""
+"""Different values, or pairs of them, beyond which arithmetic with doubles is refused."""
+
+_COMPARISONS = frozenset({"=", "!=", "<", "<=", ">", ">="})
+_NEGATED = frozenset({"!=", "<=", ">="})
+"""Comparisons that are worked out as the negation of `=`, or of `<` one way or the other."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,13 +146,10 @@ class Symbols:
                 return self._logic(operator, left, right)
             case Number(), Number() if operator != "/":
                 return self._integers(operator, left, right)
-        pairs = self._pairs(operator, self._partition(left), self._partition(right))
-        if operator in ("=", "!=", "<", "<=", ">", ">="):
-            outcomes = [(BINARY[operator](a, b), predicate) for a, b, predicate in pairs]
-            return Truth(
-                self._encoding.any_of(predicate for outcome, predicate in outcomes if outcome is True),
-                self._encoding.any_of(predicate for outcome, predicate in outcomes if outcome is False),
-            )
+        first, second = self._partition(left), self._partition(right)
+        if operator in _COMPARISONS:
+            return self._compare(operator, first, second)
+        pairs = self._pairs(first, second)
         return self._collect((BINARY[operator](a, b), predicate) for a, b, predicate in pairs)
 
     def _logic(self, operator: str, a: Truth, b: Truth) -> Truth:
@@ -178,7 +179,7 @@ class Symbols:
                 outcome = arithmetic.less(first, second)
             case _:
                 outcome = arithmetic.less(second, first)
-        if operator in ("!=", ">=", "<="):
+        if operator in _NEGATED:
             outcome = ~outcome
         return Truth(known & outcome, known & ~outcome)
 
@@ -227,7 +228,43 @@ class Symbols:
                 raise self._too_large()
         return Partition(tuple(cases))
 
-    def _pairs(self, operator: str, a: Partition, b: Partition) -> list[tuple[Value, Value, Any]]:
+    def _compare(self, operator: str, a: Partition, b: Partition) -> Truth:
+        known = self._known(a) & self._known(b)
+        match operator:
+            case "=" | "!=":
+                outcome = self._equal(a, b)
+            case "<" | ">=":
+                outcome = self._less(a, b)
+            case _:
+                outcome = self._less(b, a)
+        true, false = outcome, known & ~outcome
+        return Truth(false, true) if operator in _NEGATED else Truth(true, false)
+
+    def _known(self, a: Partition) -> Any:
+        return self._encoding.any_of(predicate for _, predicate in a.cases)
+
+    def _equal(self, a: Partition, b: Partition) -> Any:
+        """Where both are known and equal, in time linear in their values: there are enums with many."""
+        false = self._manager.false
+        others: dict[Value, Any] = {}
+        for value, predicate in b.cases:
+            others[value] = others.get(value, false) | predicate
+        return self._encoding.any_of(predicate & others.get(value, false) for value, predicate in a.cases)
+
+    def _less(self, a: Partition, b: Partition) -> Any:
+        """Where both are known and a < b: for each value of b, from below, where a is smaller."""
+        cases = [(value, 0, predicate) for value, predicate in b.cases]
+        cases += [(value, 1, predicate) for value, predicate in a.cases]
+        # Of equal values those of b come first, so that only smaller ones of a have been met.
+        smaller = outcome = self._manager.false
+        for _, is_left, predicate in sorted(cases, key=lambda case: case[:2]):
+            if is_left:
+                smaller = smaller | predicate
+            else:
+                outcome = outcome | (predicate & smaller)
+        return outcome
+
+    def _pairs(self, a: Partition, b: Partition) -> list[tuple[Value, Value, Any]]:
         if len(a.cases) * len(b.cases) > MAXIMUM_PARTITION:
             raise self._too_large()
         pairs = ((first, second, p & q) for first, p in a.cases for second, q in b.cases)
@@ -262,7 +299,7 @@ class Symbols:
             case Number(vector=vector, known=known):
                 return self._written_integer(bits, vector, known)
             case Partition(cases=cases):
-                known = self._encoding.any_of(predicate for _, predicate in cases)
+                known = self._known(value)
                 indexed = [(bits.domain.index(case), predicate) for case, predicate in cases]
                 new: dict[str, Any] = {}
                 for place, name in enumerate(reversed(bits.names)):

@@ -2,11 +2,12 @@
 
 Source: L. Ouedraogo, R. Kumar, R. Malik and K. Akesson, "Nonblocking and safe control of discrete-event systems
 modeled as extended finite automata", IEEE T-ASE 8(3), 2011, pp. 560-569, Algorithm 1, on predicates instead of
-guards. Predecessors are found by substitution, forward images with a relation for each event; events are chained:
-each works on what the ones before it have found.
+guards. Predecessors are found by substitution, forward images with a relation for each event. Events are chained:
+each works on what the ones before it have found, backwards in the opposite order, since a system's events mostly
+follow each other in the order in which they are given.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +19,7 @@ from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager, resolve_engine
 from robosc.synthesis.nodes import count_models, node_count, restrict
 from robosc.synthesis.result import Progress, Statistics, SynthesisResult, SynthesisStatus
-from robosc.synthesis.transitions import Steps, transitions_of
+from robosc.synthesis.transitions import Steps, transition_of
 
 
 def _never() -> bool:
@@ -41,21 +42,25 @@ def synthesize(
     Args:
         system: Plants and event conditions.
         engine: Name of the engine for decision diagrams; `auto` is the fastest installed.
-        should_stop: Asked once for each event in each round; once true, the work ends.
-        on_progress: Told after each round.
+        should_stop: Asked before each step of the work with one event; once true, the work ends.
+        on_progress: Told after each event's encoding and after each round.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.
         UnknownEngineError: There is no such engine.
-        UnsupportedModelError: An expression computes with too many doubles.
+        UnsupportedModelError: An expression computes with too many doubles, or a condition would be too large.
     """
     name = resolve_engine(engine)
     return _Synthesis(system, name, should_stop, on_progress).result()
 
 
+Step = Callable[[Any], Any]
+"""What one event adds to a set of states."""
+
+
 @dataclass(slots=True)
-class _Round:
-    """Counts rounds and nodes."""
+class _Figures:
+    """Counts rounds of the fixed point, and nodes."""
 
     iterations: int = 0
     peak_nodes: int = 0
@@ -70,13 +75,14 @@ class _Synthesis:
         self._engine = engine
         self._should_stop = should_stop
         self._on_progress = on_progress
-        self._round = _Round()
+        self._figures = _Figures()
         self._manager = make_manager(engine)
         self._encoding = Encoding(system, self._manager)
         self._steps: list[Steps] = []
-        for transition in transitions_of(self._encoding):
+        for number, event in enumerate(system.events):
             self._check_stop()
-            self._steps.append(Steps(self._encoding, transition))
+            self._steps.append(Steps(self._encoding, transition_of(self._encoding, event)))
+            self._progress("encoding", number + 1, self._steps[-1].plant)
         self._initial = self._encoding.initial_states()
         self._marked = self._encoding.marked_states()
 
@@ -89,14 +95,14 @@ class _Synthesis:
         states = count_models(self._manager, reachable, self._encoding.state_names)
         added = tuple(
             AddedCondition(steps.event.name, extract(self._encoding, condition))
-            for steps in self._steps
+            for steps in self._each()
             if (condition := self._added(steps, good, reachable)) is not None
         )
         return SynthesisResult(SynthesisStatus.SUPERVISOR, added, self._statistics(states))
 
     def _statistics(self, states: int) -> Statistics:
         bits = len(self._encoding.state_names)
-        return Statistics(self._engine, bits, self._round.iterations, self._round.peak_nodes, states)
+        return Statistics(self._engine, bits, self._figures.iterations, self._figures.peak_nodes, states)
 
     # The fixed point
 
@@ -115,8 +121,8 @@ class _Synthesis:
             good = self._controllable(good)
             if self._is_lost(good):
                 return good, "uncontrollable events can lead from the initial state into states to be avoided"
-            self._round.iterations += 1
-            self._progress("fixed point", self._round.iterations)
+            self._figures.iterations += 1
+            self._progress("fixed point", self._figures.iterations, good)
             if good == before:
                 return good, ""
 
@@ -125,52 +131,45 @@ class _Synthesis:
 
     def _nonblocking(self, good: Any) -> Any:
         """The states of `good` that reach a marked state through transitions that stay in `good`."""
-        allowed = [
-            steps.plant & steps.condition & steps.only(good) if steps.event.is_controllable else self._manager.true
-            for steps in self._steps
-        ]
-        found = good & self._marked
-        while True:
-            before = found
-            for steps, allows in zip(self._steps, allowed, strict=True):
-                self._check_stop()
-                found = found | (good & allows & steps.some(found))
-            if found == before:
-                return found
+        steps = [self._towards(steps, self._from(steps, good)) for steps in self._each()]
+        return self._closure(good & self._marked, steps[::-1], "coreachability")
+
+    def _from(self, steps: Steps, good: Any) -> Any:
+        """The states of `good` in which an event may happen as far as the supervisor goes."""
+        return good & steps.condition & steps.only(good) & steps.plant if steps.event.is_controllable else good
+
+    def _towards(self, steps: Steps, source: Any) -> Step:
+        return lambda states: source & steps.some(states)
 
     def _controllable(self, good: Any) -> Any:
         """The states of `good` that no run of uncontrollable events leaves."""
-        while True:
-            before = good
-            for steps in self._steps:
-                if not steps.event.is_controllable:
-                    self._check_stop()
-                    good = good & ~steps.some(~good)
-            if good == before:
-                return good
+        steps = [steps.some for steps in self._each() if not steps.event.is_controllable]
+        return ~self._closure(~good, steps[::-1], "controllability")
+
+    def _closure(self, states: Any, steps: Sequence[Step], phase: str) -> Any:
+        """`states` and all that steps from them add, one step after the other until none adds anything."""
+        rounds = unchanged = 0
+        while unchanged < len(steps):
+            for step in steps:
+                self._check_stop()
+                grown = states | step(states)
+                unchanged = unchanged + 1 if grown == states else 0
+                states = grown
+                if unchanged == len(steps):
+                    break
+            rounds += 1
+            self._progress(phase, rounds, states)
+        return states
 
     # The controlled system
 
-    def _allowed(self, steps: Steps, good: Any) -> Any:
-        """Where the controlled system lets an event happen."""
-        if not steps.event.is_controllable:
-            return steps.plant
-        return steps.plant & steps.condition & steps.only(good)
-
     def _reachable_states(self, good: Any) -> Any:
         """Every state of the controlled system."""
-        allowed = [self._allowed(steps, good) for steps in self._steps]
-        found = self._initial
-        rounds = 0
-        while True:
-            before = found
-            for steps, allows in zip(self._steps, allowed, strict=True):
-                self._check_stop()
-                found = found | steps.image(found & allows)
-            rounds += 1
-            self._progress("reachability", rounds)
-            if found == before:
-                return found
+        steps = [self._onwards(steps, self._from(steps, good)) for steps in self._each()]
+        return self._closure(self._initial, steps, "reachability")
+
+    def _onwards(self, steps: Steps, source: Any) -> Step:
+        return lambda states: steps.image(states & source)
 
     def _added(self, steps: Steps, good: Any, reachable: Any) -> Any | None:
         """The condition to add to an event, simplified where it does not matter; None if there is nothing to add."""
@@ -186,11 +185,16 @@ class _Synthesis:
         plain = wanted & self._encoding.valid_states()
         return simplified if node_count(self._manager, simplified) <= node_count(self._manager, plain) else plain
 
+    def _each(self) -> Iterator[Steps]:
+        for steps in self._steps:
+            self._check_stop()
+            yield steps
+
     def _check_stop(self) -> None:
         if self._should_stop():
             raise SynthesisCancelled("synthesis was stopped")
 
-    def _progress(self, phase: str, rounds: int) -> None:
-        nodes = len(self._manager)
-        self._round.peak_nodes = max(self._round.peak_nodes, nodes)
+    def _progress(self, phase: str, rounds: int, states: Any) -> None:
+        nodes = states.dag_size
+        self._figures.peak_nodes = max(self._figures.peak_nodes, nodes)
         self._on_progress(Progress(phase, rounds, nodes))

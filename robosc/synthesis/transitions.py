@@ -1,11 +1,11 @@
 """Events as predicates and next-state functions, without the product of the automata's edges.
 
-For each bit that an event may change there is one function of the state before it (and of received data): an
-if-then-else over the edges of the automaton it belongs to. The predecessors of a predicate are then found by
+For each bit that an event may change there is one function of the state before it (and of received data), right
+wherever the event is possible: an if-then-else over the edges of the automaton it belongs to. The predecessors of a predicate are then found by
 substitution, and no next-state variable is needed backwards.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,7 +24,7 @@ class Transition:
         possible: Where every automaton takes an edge, for data that can come.
         out_of_range: Where, taking it, an update leaves its variable's range.
         condition: Where its event conditions are true (current-state variables only).
-        functions: Value of each changed bit after it.
+        functions: Value of each changed bit after it, right where the event is possible.
         hidden: Variables of received data and of choices between edges.
     """
 
@@ -45,12 +45,8 @@ class _Arc:
     out_of_range: Any
 
 
-def transitions_of(encoding: Encoding) -> tuple[Transition, ...]:
-    """Every event of a system, in its order."""
-    return tuple(_transition(encoding, event) for event in encoding.system.events)
-
-
-def _transition(encoding: Encoding, event: Event) -> Transition:
+def transition_of(encoding: Encoding, event: Event) -> Transition:
+    """What an event of the encoded system does."""
     manager, system = encoding.manager, encoding.system
     symbols = Symbols(encoding, encoding.inputs_of(event.name))
     participants = [automaton for automaton in system.automata if event.name in automaton.alphabet]
@@ -134,19 +130,35 @@ def _arc(encoding: Encoding, symbols: Symbols, automaton: Automaton, edge: Edge,
     return _Arc(taken, written, out_of_range)
 
 
-def _functions(encoding: Encoding, arcs: Iterable[_Arc]) -> dict[str, Any]:
-    """The next value of every bit that one of the edges writes."""
-    manager = encoding.manager
-    arcs = list(arcs)
+def _functions(encoding: Encoding, arcs: Sequence[_Arc]) -> dict[str, Any]:
+    """The next value of every bit that one of the edges changes, where one of them is taken."""
     result: dict[str, Any] = {}
     for name in dict.fromkeys(name for arc in arcs for name in arc.written):
-        current = manager.var(name)
-        value = current
-        for arc in arcs:
-            if name in arc.written:
-                value = manager.ite(arc.taken, arc.written[name], value)
-        if value != current:
+        value = _next_value(encoding, arcs, name)
+        if value != encoding.manager.var(name):
             result[name] = value
+    return result
+
+
+def _next_value(encoding: Encoding, arcs: Sequence[_Arc], name: str) -> Any:
+    """The next value of a bit, where one of the edges is taken.
+
+    Elsewhere it does not matter, so what most edges write needs no test: often it is a constant, and no guard gets
+    into what is substituted.
+    """
+    current = encoding.manager.var(name)
+    cases: list[tuple[Any, list[Any]]] = []
+    for arc in arcs:
+        value = arc.written.get(name, current)
+        same = next((taken for other, taken in cases if other == value), None)
+        if same is None:
+            cases.append((value, [arc.taken]))
+        else:
+            same.append(arc.taken)
+    result, most = max(cases, key=lambda case: len(case[1]))
+    for value, taken in cases:
+        if taken is not most:
+            result = encoding.manager.ite(encoding.any_of(taken), value, result)
     return result
 
 

@@ -105,8 +105,8 @@ def test_numbers(valuations: Valuations, number: Expression) -> None:
 
 
 def test_too_many_doubles_are_refused(valuations: Valuations, monkeypatch: pytest.MonkeyPatch) -> None:
-    half = Binary("/", VariableRead("A", "wide"), Constant(2))
-    condition = Binary("<", half, Binary("/", VariableRead("A", "small"), Constant(3)))
+    half, third = (Binary("/", VariableRead("A", name), Constant(n)) for name, n in (("wide", 2), ("small", 3)))
+    condition = Binary("<", Binary("+", half, third), Constant(1.5))
     valuations.symbols.holds(condition)
     monkeypatch.setattr("robosc.synthesis.symbolic.MAXIMUM_PARTITION", 10)
     with pytest.raises(UnsupportedModelError, match="more than 10 combinations"):

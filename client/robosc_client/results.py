@@ -59,7 +59,7 @@ class Statistics:
         engine: Engine for decision diagrams that was used.
         state_bits: Boolean variables that encode a state.
         iterations: Rounds of the fixed point.
-        peak_nodes: Most nodes in the store of diagrams at the end of a round.
+        peak_nodes: Most nodes that a set of states took at the end of a round.
     """
 
     engine: str

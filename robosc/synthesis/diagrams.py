@@ -8,7 +8,7 @@ from robosc.supervisor.structure import DecisionDiagram, DecisionNode
 from robosc.synthesis.encoding import Bits, Encoding
 from robosc.synthesis.nodes import cofactors, is_constant
 
-MAXIMUM_BRANCHES = 1_000_000
+MAXIMUM_BRANCHES = 100_000
 """Ranges of one variable's values beyond which a diagram is refused."""
 
 _Run = tuple[int, Any]
@@ -46,8 +46,11 @@ class _Extractor:
         starts: list[int] = []
         children: list[int] = []
         for start, below in self._runs(bits, predicate, 0):
+            if start >= len(bits.domain):
+                # Codes that stand for no value: what a predicate says of them is nobody's business.
+                break
             child = self._number(below)
-            if start < len(bits.domain) and (not children or children[-1] != child):
+            if not children or children[-1] != child:
                 starts.append(start)
                 children.append(child)
         if len(children) == 1:
@@ -66,9 +69,14 @@ class _Extractor:
         if is_constant(self._manager, predicate) or predicate.var not in bits.names[place:]:
             return [(0, predicate)]
         half = 1 << (len(bits.names) - place - 1)
-        low, high = cofactors(predicate) if predicate.var == bits.names[place] else (predicate, predicate)
-        runs = self._runs(bits, low, place + 1)
-        for start, below in self._runs(bits, high, place + 1):
+        if predicate.var == bits.names[place]:
+            low, high = cofactors(predicate)
+            runs, upper = self._runs(bits, low, place + 1), self._runs(bits, high, place + 1)
+        else:
+            # The bit does not matter: both halves look alike.
+            upper = self._runs(bits, predicate, place + 1)
+            runs = list(upper)
+        for start, below in upper:
             if start or runs[-1][1] != below:
                 runs.append((half + start, below))
         if len(runs) > MAXIMUM_BRANCHES:

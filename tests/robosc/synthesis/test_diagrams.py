@@ -1,0 +1,80 @@
+"""Predicates over bits as diagrams over values: reduced, and the same from every engine."""
+
+from itertools import pairwise
+
+import pytest
+from hypothesis import given, settings
+
+from robosc.automata import DiscreteVariable
+from robosc.automata.state import Subject
+from robosc.errors import UnsupportedModelError
+from robosc.expressions import Expression, IntegerType, Received, leaves
+from robosc.supervisor.diagram import diagram_domains, evaluate, validate
+from robosc.supervisor.structure import DecisionDiagram
+from robosc.synthesis.diagrams import extract
+from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.engines import make_manager
+from robosc.synthesis.symbolic import Symbols
+from support.random_expressions import SYSTEM, conditions
+from support.systems import automaton, system
+
+_without_data = conditions.filter(lambda condition: not any(isinstance(leaf, Received) for leaf in leaves(condition)))
+
+
+@pytest.fixture(scope="module", params=["cudd", "autoref"])
+def engine(request: pytest.FixtureRequest) -> str:
+    if request.param == "cudd":
+        pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+    return str(request.param)
+
+
+def diagram_of(condition: Expression, engine: str) -> DecisionDiagram:
+    encoding = Encoding(SYSTEM, make_manager(engine))
+    return extract(encoding, Symbols(encoding).holds(condition))
+
+
+@settings(max_examples=60, deadline=None)
+@given(condition=_without_data)
+def test_diagrams_are_reduced_and_independent_of_the_engine(condition: Expression) -> None:
+    pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+    diagram = diagram_of(condition, "cudd")
+    assert diagram == diagram_of(condition, "autoref")
+    validate(diagram, diagram_domains(SYSTEM))
+    assert len(set(diagram.nodes)) == len(diagram.nodes)
+    for node in diagram.nodes:
+        assert len(node.children) > 1
+        assert all(first != second for first, second in pairwise(node.children))
+    # Every node is part of it.
+    met = {diagram.root} | {child for node in diagram.nodes for child in node.children}
+    assert met >= set(range(2, len(diagram.nodes) + 2))
+
+
+def counter(bits: int) -> Encoding:
+    variable = DiscreteVariable("x", IntegerType(0, 2**bits - 1), 0)
+    return Encoding(system(automaton("A", ["l -e-> l"], variables=[variable])), make_manager("autoref"))
+
+
+def test_every_other_value(engine: str) -> None:
+    variable = DiscreteVariable("x", IntegerType(0, 9), 0)
+    encoding = Encoding(system(automaton("A", ["l -e-> l"], variables=[variable])), make_manager(engine))
+    odd = encoding.manager.var(encoding.subjects[Subject("A", "x")].names[-1])
+    diagram = extract(encoding, odd)
+    assert [node.starts for node in diagram.nodes] == [tuple(range(10))]
+    assert [evaluate(diagram, lambda *_, index=index: index) for index in range(10)] == [False, True] * 5
+
+
+def test_codes_beyond_the_last_value_leave_no_branch(engine: str) -> None:
+    """5 of 8 codes are values: a predicate that differs only among the others is constant."""
+    variable = DiscreteVariable("x", IntegerType(0, 4), 0)
+    encoding = Encoding(system(automaton("A", ["l -e-> l"], variables=[variable])), make_manager(engine))
+    bits = encoding.subjects[Subject("A", "x")]
+    assert extract(encoding, encoding.code(bits, 6)) == DecisionDiagram((), 0)
+    assert extract(encoding, ~encoding.code(bits, 7)) == DecisionDiagram((), 1)
+
+
+def test_too_many_ranges_are_refused_at_once() -> None:
+    """A condition on the last of 31 bits has 2^31 ranges: no list of these is ever begun."""
+    encoding = counter(31)
+    odd = encoding.manager.var(encoding.subjects[Subject("A", "x")].names[-1])
+    with pytest.raises(UnsupportedModelError, match=r"more than 100000 ranges of the values of 'A\.x'"):
+        extract(encoding, odd)

@@ -1,0 +1,70 @@
+"""Engines are found by name and imported on use."""
+
+import subprocess
+import sys
+from importlib.metadata import EntryPoint
+
+import pytest
+
+from robosc.automata import System
+from robosc.synthesis import SynthesisStatus, UnknownEngineError, engine_names, register, resolve_engine, synthesize
+from robosc.synthesis import engines as module
+
+EMPTY = System("Empty", (), ())
+
+
+def test_nothing_is_imported_before_it_is_needed() -> None:
+    code = "import sys, robosc.synthesis; print(sorted(name for name in sys.modules if name.partition('.')[0] == 'dd'))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+def test_auto_is_cudd_where_it_is_installed() -> None:
+    pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+    assert resolve_engine("auto") == "cudd"
+    assert synthesize(EMPTY).statistics.engine == "cudd"
+
+
+def test_without_the_extension_auto_is_plain_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "dd.cudd", None)  # importing it now fails
+    assert resolve_engine("auto") == "autoref"
+    assert synthesize(EMPTY).statistics.engine == "autoref"
+    with pytest.raises(UnknownEngineError, match="which is not installed; use 'autoref'"):
+        synthesize(EMPTY, engine="cudd")
+
+
+def test_an_engine_can_be_registered(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_FACTORIES", dict(module._FACTORIES))
+    made: list[str] = []
+
+    def factory() -> module.Manager:
+        made.append("mine")
+        return module.make_manager("autoref")
+
+    register("mine", factory)
+    assert engine_names() == ("autoref", "cudd", "mine")
+    result = synthesize(EMPTY, engine="mine")
+    assert (result.status, result.statistics.engine, made) == (SynthesisStatus.SUPERVISOR, "mine", ["mine"])
+
+
+def offer(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
+    """Let another package offer the engine `foreign`."""
+    point = EntryPoint("foreign", value, module.ENTRY_POINTS)
+
+    def found(*, group: str, name: str | None = None) -> list[EntryPoint]:
+        return [point] if group == module.ENTRY_POINTS and name in (None, "foreign") else []
+
+    monkeypatch.setattr(module, "entry_points", found)
+
+
+def test_an_engine_of_another_package_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    offer(monkeypatch, "dd.autoref:BDD")
+    assert engine_names() == ("autoref", "cudd", "foreign")
+    assert synthesize(EMPTY, engine="foreign").statistics.engine == "foreign"
+
+
+@pytest.mark.parametrize("value", ["no_such_package:BDD", "dd.autoref:NoSuchName"])
+def test_an_engine_of_another_package_that_cannot_be_loaded(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
+    offer(monkeypatch, value)
+    with pytest.raises(UnknownEngineError, match=f"'foreign' cannot be loaded from {value}"):
+        synthesize(EMPTY, engine="foreign")

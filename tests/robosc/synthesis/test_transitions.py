@@ -1,0 +1,107 @@
+"""Steps of events forwards and backwards, against the explicit semantics."""
+
+from collections.abc import Iterable
+from itertools import islice, product
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robosc.automata import DiscreteVariable, Semantics, System
+from robosc.automata.compile import State
+from robosc.automata.state import subject_domain, subjects
+from robosc.expressions import IntegerType
+from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.engines import make_manager
+from robosc.synthesis.transitions import Steps, transition_of
+from support.random_systems import random_system
+from support.systems import automaton, edge, operation, read, system
+
+
+@pytest.fixture(scope="module", params=["cudd", "autoref"])
+def engine(request: pytest.FixtureRequest) -> str:
+    if request.param == "cudd":
+        pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+    return str(request.param)
+
+
+def states_of(encoding: Encoding, states: Iterable[State]) -> Any:
+    """The predicate of some states."""
+    places = [encoding.subjects[subject] for subject in subjects(encoding.system)]
+    return encoding.any_of(
+        encoding.all_of(encoding.equals(bits, value) for bits, value in zip(places, state, strict=True))
+        for state in states
+    )
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_steps_of_random_systems(engine: str, seed: int) -> None:
+    """From single states and into single states, reachable or not."""
+    source = random_system(seed)
+    semantics = Semantics(source)
+    encoding = Encoding(source, make_manager(engine))
+    false = encoding.manager.false
+    every = product(*(subject_domain(source, subject) for subject in subjects(source)))
+    sample = [*islice(every, 0, 2000, 97), semantics.initial]
+    for event in source.events:
+        steps = Steps(encoding, transition_of(encoding, event))
+        for state in sample:
+            here = states_of(encoding, [state])
+            targets = semantics.targets(state, event.name)
+            where = f"{event.name} in {state}"
+            assert (steps.plant & here != false) == semantics.enabled(state, event.name), where
+            assert (steps.condition & here != false) == semantics.condition(state, event.name), where
+            if targets or not event.is_controllable:
+                assert steps.image(here) == states_of(encoding, targets), where
+                assert (steps.only(states_of(encoding, targets)) & here) == here, where
+            for target in sorted(targets, key=str):
+                into = states_of(encoding, [target])
+                assert steps.some(into) & here == here, where
+                assert (steps.only(into) & here == here) == (len(targets) == 1), where
+            assert steps.some(encoding.valid_states() & ~states_of(encoding, targets)) & here == false or (
+                event.is_controllable and not targets
+            ), where
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_bad_states_of_random_systems(engine: str, seed: int) -> None:
+    source = random_system(seed)
+    semantics = Semantics(source)
+    encoding = Encoding(source, make_manager(engine))
+    bad = encoding.any_of(Steps(encoding, transition_of(encoding, event)).bad for event in source.events)
+    every = product(*(subject_domain(source, subject) for subject in subjects(source)))
+    for state in islice(every, 0, 3000, 53):
+        assert (bad & states_of(encoding, [state]) != encoding.manager.false) == semantics.bad(state), state
+
+
+def one(*arcs: Any) -> System:
+    return system(automaton("A", arcs, variables=[DiscreteVariable("x", IntegerType(0, 3), 0)]))
+
+
+def functions_of(engine: str, source: System, event: str) -> tuple[Encoding, dict[str, Any]]:
+    encoding = Encoding(source, make_manager(engine))
+    return encoding, transition_of(encoding, source.event(event)).functions
+
+
+def test_where_all_edges_lead_to_one_place_the_functions_are_constants(engine: str) -> None:
+    """So that predecessors need a cofactor only, and no guard is substituted."""
+    guard = operation(read("A.x"), "<", 2)
+    arcs = [edge("a -go-> c", guard, x=read("A.x")), edge("b -go-> c"), "c -back-> b", "c -home-> a"]
+    encoding, functions = functions_of(engine, one(*arcs), "go")
+    assert functions
+    assert all(function in (encoding.manager.true, encoding.manager.false) for function in functions.values())
+
+
+def test_an_event_that_changes_nothing_has_no_functions(engine: str) -> None:
+    arcs = [edge("a -stay-> a", x=read("A.x")), "a -go-> b", "b -stay-> b", "b -back-> a"]
+    assert functions_of(engine, one(*arcs), "stay")[1] == {}
+
+
+def test_edges_that_differ_are_told_apart(engine: str) -> None:
+    source = one("a -turn-> b", "b -turn-> a", edge("a -low-> a", operation(read("A.x"), "<", 2)))
+    encoding, functions = functions_of(engine, source, "turn")
+    ((name, function),) = functions.items()
+    assert function == ~encoding.manager.var(name)

@@ -1,7 +1,9 @@
 """Source texts and places in them: what every diagnostic points at."""
 
 import hashlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+
+import msgspec
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,8 +29,7 @@ class SourceFile:
         return lines[number - 1].rstrip("\r") if 0 < number <= len(lines) else ""
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Location:
+class Location(msgspec.Struct, frozen=True, order=True):
     """A stretch of text on one line of one file.
 
     Attributes:
@@ -41,7 +42,7 @@ class Location:
     file: str
     line: int
     column: int
-    length: int = field(default=1)
+    length: int = 1
 
     def __str__(self) -> str:
         return f"{self.file}:{self.line}:{self.column}"

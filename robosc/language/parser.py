@@ -1,21 +1,24 @@
-"""Text to syntax tree.
+"""Text to syntax tree: a recursive-descent parser of the language's definitions, which goes on behind errors.
 
-textX reads the text with the grammar `robosc.tx`; `Converter` turns what it found into our own tree. What
-could hurt a recursive-descent parser (deep nesting, unclosed comments, NUL) is found by a scan before it.
+It is written by hand because it must do what no general parser does at once: tell errors in the language's
+words, read on behind them, keep contextual words free as names, and be fast and linear on any text. The grammar
+in `tests/support/robosc.tx`, read by textX, is its opponent in the tests.
 """
 
-import re
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
-from typing import Any
 
 from robosc.errors import Diagnostic, Severity, sorted_diagnostics
 from robosc.language import syntax
-from robosc.language.converter import Converter, Places
-from robosc.language.scan import scan
-from robosc.language.words import RESERVED_WORDS, expected_words, mend_syntax
-from robosc.source import Location, SourceFile
+from robosc.language.cursor import Fault, TooManyFaults
+from robosc.language.expressions import ExpressionParser
+from robosc.language.limits import MAXIMUM_NESTING
+from robosc.language.tokens import Kind, Places, Tokens, obstacle, tokenize
+from robosc.source import SourceFile
+
+_NAME, _NUMBER, _END = int(Kind.NAME), int(Kind.NUMBER), int(Kind.END)
+_RESULT_KINDS = ("request", "response", "feedback", "error", "cancel")
+_QUALITIES = ("reliable", "best_effort", "sensor", "latched")
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,53 +36,350 @@ class Parsed:
 
 def parse(file: SourceFile) -> Parsed:
     """The syntax tree of a file; never raises, whatever the text."""
-    scanned = scan(file)
-    if scanned.obstacle is not None:
-        return Parsed(None, (scanned.obstacle,))
-    from textx.exceptions import TextXSyntaxError
-
+    tokens, places = tokenize(file.text), Places(file)
+    hidden = obstacle(file, tokens, places)
+    if hidden is not None:
+        return Parsed(None, (hidden,))
+    parser = _Parser(file, tokens, places)
+    tree = None
     try:
-        # In a text without any line end, Arpeggio looks for the first one again at every token, which is quadratic.
-        root = _metamodel().model_from_str(file.text if "\n" in file.text else f"{file.text}\n")
-        converter = Converter(Places(file))
-        tree = converter.file(root.content)
-    except TextXSyntaxError as error:
-        return Parsed(None, (_syntax_error(file, error),))
+        tree = parser.file()
+    except (Fault, TooManyFaults):
+        pass
     except RecursionError:
-        # Values of objects are the one thing that still nests in the grammar.
-        message, mend = "this is nested too deeply", "Nest the objects less deeply."
-        return Parsed(None, (Diagnostic(Severity.ERROR, "nesting-too-deep", message, scanned.deepest, mend),))
-    diagnostics = sorted_diagnostics(converter.diagnostics)
+        # The limits are far below what the interpreter stands, unless its caller has used up most of that.
+        message = f"this is nested too deeply (at most {MAXIMUM_NESTING} levels)"
+        mend = "Nest the expressions and objects less deeply."
+        parser.diagnostics.append(
+            Diagnostic(Severity.ERROR, "nesting-too-deep", message, parser.at(parser.place), mend)
+        )
+    diagnostics = sorted_diagnostics(parser.diagnostics)
     return Parsed(None if diagnostics else tree, diagnostics)
 
 
-@cache
-def _metamodel() -> Any:
-    """The grammar's metamodel, built on first use."""
-    from textx import metamodel_from_str
+class _Parser(ExpressionParser):
+    """Reads definitions."""
 
-    grammar = Path(__file__).with_name("robosc.tx").read_text(encoding="utf-8")
-    grammar = grammar.replace("RESERVED", "|".join(sorted(RESERVED_WORDS, reverse=True)))
-    return metamodel_from_str(grammar, autokwd=True, use_regexp_group=False)
+    def __init__(self, file: SourceFile, tokens: Tokens, places: Places) -> None:
+        super().__init__(file, tokens, places)
+        self._library_items: Mapping[str, Callable[[], syntax.Item]] = {
+            "component": self._component,
+            "datatype": self._data_type,
+            "interface": self._interface,
+            "constant": self._constant,
+            "requirement": self._requirement,
+            "provide": self._provide,
+        }
+        self._component_items: Mapping[str, Callable[[], syntax.Communication | syntax.Behaviour]] = {
+            "incoming": self._message,
+            "outgoing": self._message,
+            "service": self._service,
+            "action": self._action,
+            "behaviour": self._behaviour,
+        }
+        transitions: dict[str, Callable[[], syntax.Transition]] = {"on": self._on, "transition": self._tau}
+        self._transitions = transitions
+        self._behaviour_items: Mapping[str, Callable[[], syntax.Variable | syntax.State | syntax.Transition]] = {
+            "variable": self._variable,
+            "initial": self._state,
+            "marked": self._state,
+            "state": self._state,
+            **transitions,
+        }
+
+    def file(self) -> syntax.File:
+        """A robot or a library."""
+        index = self.place
+        if self.texts[index] not in ("robot", "library"):
+            raise self.fault("'robot'", "'library'")
+        self.place += 1
+        name = self.name()
+        words = (f"'{word}'" for word in self._library_items)
+        items = self.items(self._library_items, *words)
+        if self.kinds[self.place] != _END and not self.diagnostics:
+            raise self.fault("the end of the file")
+        return syntax.File(self.texts[index] == "library", name, items)
+
+    # Definitions
+
+    def _interface(self) -> syntax.Interface:
+        self.take("interface")
+        name = self.name()
+        self.take("use")
+        type_ = self.name()
+        self.take("from")
+        return syntax.Interface(name, type_, self.name())
+
+    def _constant(self) -> syntax.Constant:
+        self.take("constant")
+        name = self.name()
+        self.take(":")
+        type_ = self.type()
+        self.take("=")
+        return syntax.Constant(name, type_, self.expression())
+
+    def _data_type(self) -> syntax.ObjectDefinition | syntax.EnumDefinition:
+        self.take("datatype")
+        if self.takes("object"):
+            name = self.name()
+            return syntax.ObjectDefinition(name, self.entries(self._property, self._begins_name, "a name"))
+        if not self.takes("enum"):
+            raise self.fault()
+        name = self.name()
+        self.take("from")
+        source = self.type()
+        self.take("to")
+        rules = self.entries(self._rule, self._begins_rule, "an expression", "'default'")
+        return syntax.EnumDefinition(name, source, rules)
+
+    def _begins_name(self) -> bool:
+        return self.kinds[self.place] == _NAME
+
+    def _begins_rule(self) -> bool:
+        return self.texts[self.place] == "default" or self.begins_expression()
+
+    def _property(self) -> syntax.Property:
+        name = self.name()
+        self.take(":")
+        return syntax.Property(name, self.type())
+
+    def _rule(self) -> syntax.EnumRule:
+        condition = None if self.texts[self.place] == "default" else self.expression()
+        if condition is None:
+            self.place += 1
+        self.take("->")
+        return syntax.EnumRule(condition, self.name())
+
+    # Components
+
+    def _component(self) -> syntax.Component:
+        self.take("component")
+        name = self.name()
+        if self.takes("from"):
+            library = self.name()
+            self.take("import")
+            return syntax.Component(name, (), syntax.Import(library, self.name()))
+        words = (f"'{word}'" for word in self._component_items)
+        return syntax.Component(name, self.items(self._component_items, *words), None)
+
+    def _message(self) -> syntax.Message:
+        direction = syntax.Direction(self.texts[self.place])
+        self.place += 1
+        self.take("message")
+        name = self.name()
+        given = self._with("type")
+        return syntax.Message(direction, name, given.identifier, given.types["type"], given.link, given.options)
+
+    def _service(self) -> syntax.Service:
+        self.take("service")
+        name = self.name()
+        given = self._with("request", "response")
+        types = given.types
+        return syntax.Service(name, given.identifier, types["request"], types["response"], given.link, given.options)
+
+    def _action(self) -> syntax.Action:
+        self.take("action")
+        name = self.name()
+        given = self._with("request", "response", "feedback")
+        request, response, feedback = (given.types[key] for key in ("request", "response", "feedback"))
+        return syntax.Action(name, given.identifier, request, response, feedback, given.link, given.options)
+
+    def _with(self, *keys: str) -> "_Given":
+        """A `with` list: an identifier, the types that `keys` names in their order, options anywhere among them."""
+        self.take("with")
+        identifier: syntax.Text | None = None
+        types: dict[str, syntax.Type] = {}
+        options: list[syntax.Option] = []
+        while True:
+            index = self.place
+            key = self.texts[index]
+            missing = keys[len(types)] if len(types) < len(keys) else None
+            option = self._options.get(key)
+            if key == missing:
+                self.place += 1
+                self.take(":")
+                types[key] = self.type()
+            elif key == "identifier" and identifier is None and not types:
+                self.place += 1
+                self.take(":")
+                identifier = self.string()
+            elif option is not None and all(item.key != key for item in options):
+                self.place += 1
+                self.take(":")
+                options.append(syntax.Option(key, option(self), self.at(index)))  # type: ignore[arg-type]
+            else:
+                expected = ["'identifier'"] if identifier is None and not types else []
+                expected += [f"'{missing}'"] if missing else []
+                expected += [f"'{word}'" for word in self._options if all(item.key != word for item in options)]
+                raise self.fault(*expected)
+            if not self.takes(","):
+                break
+        if len(types) < len(keys):
+            raise self.fault()
+        link = self.name() if self.takes("links") else None
+        return _Given(identifier, types, tuple(options), link)
+
+    def _quality(self) -> syntax.Name:
+        if self.texts[self.place] not in _QUALITIES:
+            raise self.fault(*(f"'{word}'" for word in _QUALITIES))
+        return self.name()
+
+    def _number_option(self) -> syntax.Literal:
+        index = self.place
+        if self.kinds[index] == _NUMBER and "." in self.texts[index]:
+            self.place += 1
+            return syntax.Literal(float(self.texts[index]), self.at(index))
+        return syntax.Literal(self.integer(), self.since(index))
+
+    _options: Mapping[str, Callable[["_Parser"], syntax.Name | syntax.Text | syntax.Expression]] = {
+        "qos": _quality,
+        "depth": _number_option,
+        "max_age": _number_option,
+        "stamped": ExpressionParser.string,
+        "when": ExpressionParser.expression,
+    }
+
+    # Behaviours
+
+    def _behaviour(self) -> syntax.Behaviour:
+        place = self.at(self.take("behaviour"))
+        words = (f"'{word}'" for word in self._behaviour_items)
+        return syntax.Behaviour(self.items(self._behaviour_items, *words), place)
+
+    def _variable(self) -> syntax.Variable:
+        self.take("variable")
+        name = self.name()
+        self.take(":")
+        type_ = self.type()
+        return syntax.Variable(name, type_, self.initial_value() if self.takes("=") else None)
+
+    def _state(self) -> syntax.State:
+        is_initial = self.takes("initial")
+        is_marked = self.takes("marked")
+        self.take("state")
+        name = self.name()
+        transitions = self.items(self._transitions, "'on'", "'transition'")
+        return syntax.State(name, is_initial, is_marked, transitions)
+
+    def _on(self) -> syntax.CommunicationTransition:
+        begin = self.take("on")
+        kind = self.texts[self.place]
+        if kind not in _RESULT_KINDS:
+            raise self.fault(*(f"'{word}'" for word in _RESULT_KINDS))
+        self.place += 1
+        index = self.place
+        preposition = self.texts[index]
+        if preposition not in ("from", "to"):
+            raise self.fault("'from'", "'to'")
+        self.place += 1
+        communication = self.name()
+        updates: list[syntax.Update] = []
+        if self.takes("do"):
+            updates.append(self._update())
+            while self.takes(","):
+                updates.append(self._update())
+        target = self.name() if self.takes("goto") else None
+        name = syntax.Name(preposition, self.at(index))
+        return syntax.CommunicationTransition(kind, name, communication, tuple(updates), target, self.since(begin))
+
+    def _update(self) -> syntax.Update:
+        target = self.access()
+        self.take(":=")
+        return syntax.Update(target, self.expression())
+
+    def _tau(self) -> syntax.TauTransition:
+        place = self.at(self.take("transition"))
+        guard = self.expression() if self.takes("if") else None
+        target = self.name() if self.takes("goto") else None
+        return syntax.TauTransition(guard, target, place)
+
+    # Requirements and data
+
+    def _requirement(self) -> syntax.Requirement | syntax.Invariant:
+        begin = self.take("requirement")
+        place = self.at(begin)
+        word = self.texts[self.place]
+        if word in ("always", "never") and self._is_invariant():
+            self.place += 1
+            return syntax.Invariant(word == "never", self.expression(), place)
+        if self.texts[self.place] == "{" or self.texts[self.place + 1] == "needs":
+            names = self._communications()
+            self.take("needs")
+            return syntax.Requirement(names, False, self.expression(), place)
+        expression = self.expression()
+        self.take("disables")
+        return syntax.Requirement(self._communications(), True, expression, place)
+
+    def _is_invariant(self) -> bool:
+        """Whether the next word is not the name of a communication, variable, state or component."""
+        following = self.texts[self.place + 1]
+        if following == "-":
+            # `always - 1 > x disables m` and `always -x < 1` begin alike: what ends the expression decides.
+            return not self._disables_follows()
+        return following not in _AFTER_NAME
+
+    def _disables_follows(self) -> bool:
+        """Whether the word is the begin of an expression with `disables` behind it; reads nothing."""
+        begin, found, possible = self.place, len(self.diagnostics), self._possible
+        try:
+            self.expression()
+            return self.texts[self.place] == "disables"
+        except (Fault, TooManyFaults):
+            return False
+        finally:
+            self.place, self._possible, self._depth = begin, possible, len(self._lists)
+            del self.diagnostics[found:]
+
+    def _communications(self) -> tuple[syntax.Name, ...]:
+        if not self.takes("{"):
+            return (self.name(),)
+        names: list[syntax.Name] = []
+        if self.texts[self.place] != "}":
+            names.append(self.name())
+            while self.takes(","):
+                names.append(self.name())
+        self.take("}")
+        return tuple(names)
+
+    def _provide(self) -> syntax.Provide:
+        place = self.at(self.take("provide"))
+        communication = self.name()
+        self.take("with")
+        value = self._provided()
+        condition = self.expression() if self.takes("if") else None
+        return syntax.Provide(communication, value, condition, place)
+
+    def _provided(self) -> syntax.ObjectValue | syntax.Expression:
+        begin = self.place
+        if self.texts[begin] != "{":
+            return self.expression()
+        self.place += 1
+        self.deeper(begin)
+        properties: list[tuple[syntax.Name, syntax.ObjectValue | syntax.Expression]] = []
+        if self.texts[self.place] != "}":
+            properties.append((self.name(), self._property_value()))
+            while self.takes(","):
+                properties.append((self.name(), self._property_value()))
+        self.take("}")
+        self.shallower()
+        return syntax.ObjectValue(tuple(properties), self.since(begin))
+
+    def _property_value(self) -> syntax.ObjectValue | syntax.Expression:
+        self.take(":")
+        return self._provided()
 
 
-_TOKEN = re.compile(r"[A-Za-z_][A-Za-z_0-9]*|[0-9]+(?:\.[0-9]+)?|->|\.\.|:=|=>|!=|<=|>=|\S")
-_MAXIMUM_SHOWN = 40
+@dataclass(frozen=True, slots=True)
+class _Given:
+    """What a `with` list says."""
+
+    identifier: syntax.Text | None
+    types: dict[str, syntax.Type]
+    options: tuple[syntax.Option, ...]
+    link: syntax.Name | None
 
 
-def _syntax_error(file: SourceFile, error: Any) -> Diagnostic:
-    """What the parser met, and what would have fitted there."""
-    line, column = int(error.line), int(error.col)
-    if "\n" not in file.text and line > 1:
-        line, column = 1, len(file.text) + 1
-    text = file.line(line)
-    token = _TOKEN.match(text, column - 1)
-    found = token.group() if token else ""
-    shown = found if len(found) <= _MAXIMUM_SHOWN else f"{found[:_MAXIMUM_SHOWN]}..."
-    is_last = line >= file.text.count("\n") + 1
-    met = f"'{shown}'" if found else "the end of the file" if is_last else "the end of the line"
-    expected = expected_words(error.expected_rules or ())
-    message = f"{met} does not fit here" + (f"; expected {expected}" if expected else "")
-    mend = mend_syntax(text[: column - 1], shown, expected)
-    location = Location(file.name, line, column, max(1, len(found)))
-    return Diagnostic(Severity.ERROR, "syntax-error", message, location, mend)
+_AFTER_NAME = frozenset(
+    {"needs", "disables", ".", "[", "or", "and", "=", "!=", ">", ">=", "<", "<=", "+", "*", "/", "=>", ""}
+)
+"""What can follow a name that begins a requirement of part A (`-` is looked at more closely)."""

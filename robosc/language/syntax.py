@@ -1,16 +1,17 @@
 """The syntax tree of RoboSC: what was written, with places, before any name is bound.
 
-Frozen values with tuples inside; textX objects end where these begin.
+Frozen values with tuples inside; msgspec makes them, as a large text has a hundred thousand of them.
 """
 
-from dataclasses import dataclass
 from enum import StrEnum
+from typing import Literal as Word
+
+import msgspec
 
 from robosc.source import Location
 
 
-@dataclass(frozen=True, slots=True)
-class Name:
+class Name(msgspec.Struct, frozen=True):
     """A name where it is defined or used; a leading `^` is taken off."""
 
     text: str
@@ -20,24 +21,29 @@ class Name:
 # Expressions
 
 
-@dataclass(frozen=True, slots=True)
-class Literal:
+class Literal(msgspec.Struct, frozen=True):
     """A number, text, true or false. An integer beyond 32 bits keeps its value."""
 
     value: bool | int | float | str
     location: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Index:
-    """`[INT]` of an access."""
+class Index(msgspec.Struct, frozen=True):
+    """`[i]` of an access; what stands in the brackets must be constant."""
 
-    value: int
+    value: "Expression"
     location: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Access:
+class Slice(msgspec.Struct, frozen=True):
+    """`[i..j]` of an access: both ends belong to it, and with i > j it goes on at the array's beginning."""
+
+    low: "Expression"
+    high: "Expression"
+    location: Location
+
+
+class Access(msgspec.Struct, frozen=True):
     """`value` or a name, followed by properties, states, variables and indices.
 
     Attributes:
@@ -47,12 +53,11 @@ class Access:
     """
 
     root: Name | None
-    steps: tuple[Name | Index, ...]
+    steps: tuple[Name | Index | Slice, ...]
     location: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Unary:
+class Unary(msgspec.Struct, frozen=True):
     """`!` or `-` before an operand."""
 
     operator: str
@@ -60,8 +65,7 @@ class Unary:
     location: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Binary:
+class Binary(msgspec.Struct, frozen=True):
     """An operator between operands; `location` is the operator's."""
 
     operator: str
@@ -70,7 +74,42 @@ class Binary:
     location: Location
 
 
-Expression = Literal | Access | Unary | Binary
+class Conditional(msgspec.Struct, frozen=True):
+    """`if condition then one else other`; `location` is the word `if`."""
+
+    condition: "Expression"
+    then: "Expression"
+    otherwise: "Expression"
+    location: Location
+
+
+class Call(msgspec.Struct, frozen=True):
+    """`function(arguments)`; which functions there are is not the grammar's business."""
+
+    function: Name
+    arguments: tuple["Expression", ...]
+
+    @property
+    def location(self) -> Location:
+        """Where the function is named."""
+        return self.function.location
+
+
+class Quantifier(msgspec.Struct, frozen=True):
+    """`any(x in array: condition)` or `all(...)`."""
+
+    word: Name
+    variable: Name
+    array: Access
+    condition: "Expression"
+
+    @property
+    def location(self) -> Location:
+        """Where the word stands."""
+        return self.word.location
+
+
+Expression = Literal | Access | Unary | Binary | Conditional | Call | Quantifier
 
 
 # Types
@@ -86,8 +125,7 @@ class BasicTypeName(StrEnum):
     INTEGER = "integer"
 
 
-@dataclass(frozen=True, slots=True)
-class BasicType:
+class BasicType(msgspec.Struct, frozen=True):
     """A basic type, an integer perhaps with bounds."""
 
     name: BasicTypeName
@@ -96,16 +134,14 @@ class BasicType:
     location: Location
 
 
-@dataclass(frozen=True, slots=True)
-class ArrayType:
+class ArrayType(msgspec.Struct, frozen=True):
     """`array(T)`."""
 
     element: "Type"
     location: Location
 
 
-@dataclass(frozen=True, slots=True)
-class NamedType:
+class NamedType(msgspec.Struct, frozen=True):
     """A use of a data type."""
 
     name: Name
@@ -119,32 +155,28 @@ class NamedType:
 Type = BasicType | ArrayType | NamedType
 
 
-@dataclass(frozen=True, slots=True)
-class Property:
+class Property(msgspec.Struct, frozen=True):
     """A property of an object type."""
 
     name: Name
     type: Type
 
 
-@dataclass(frozen=True, slots=True)
-class ObjectDefinition:
+class ObjectDefinition(msgspec.Struct, frozen=True):
     """`datatype object`."""
 
     name: Name
     properties: tuple[Property, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class EnumRule:
+class EnumRule(msgspec.Struct, frozen=True):
     """`condition -> value`; without a condition, the default."""
 
     condition: Expression | None
     value: Name
 
 
-@dataclass(frozen=True, slots=True)
-class EnumDefinition:
+class EnumDefinition(msgspec.Struct, frozen=True):
     """`datatype enum`."""
 
     name: Name
@@ -152,8 +184,7 @@ class EnumDefinition:
     rules: tuple[EnumRule, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Interface:
+class Interface(msgspec.Struct, frozen=True):
     """`interface name use type from package`."""
 
     name: Name
@@ -171,16 +202,30 @@ class Direction(StrEnum):
     OUTGOING = "outgoing"
 
 
-@dataclass(frozen=True, slots=True)
-class Text:
+class Text(msgspec.Struct, frozen=True):
     """A string where it is written."""
 
     value: str
     location: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Message:
+OptionKey = Word["qos", "depth", "max_age", "stamped", "when"]
+
+
+class Option(msgspec.Struct, frozen=True):
+    """`key: value` of a `with` list, other than name and types.
+
+    Attributes:
+        key: What it says; `location` is the key's.
+        value: A Name for `qos`, a Text for `stamped`, a number for `depth` and `max_age`, a condition for `when`.
+    """
+
+    key: OptionKey
+    value: Name | Text | Expression
+    location: Location
+
+
+class Message(msgspec.Struct, frozen=True):
     """A message."""
 
     direction: Direction
@@ -188,10 +233,10 @@ class Message:
     identifier: Text | None
     type: Type
     link: Name | None
+    options: tuple[Option, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Service:
+class Service(msgspec.Struct, frozen=True):
     """A service."""
 
     name: Name
@@ -199,10 +244,10 @@ class Service:
     request: Type
     response: Type
     link: Name | None
+    options: tuple[Option, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Action:
+class Action(msgspec.Struct, frozen=True):
     """An action."""
 
     name: Name
@@ -211,30 +256,28 @@ class Action:
     response: Type
     feedback: Type
     link: Name | None
+    options: tuple[Option, ...] = ()
 
 
 Communication = Message | Service | Action
 
 
-@dataclass(frozen=True, slots=True)
-class Variable:
+class Variable(msgspec.Struct, frozen=True):
     """A variable with its written initial value, if any."""
 
     name: Name
     type: Type
-    initial: Literal | Access | None
+    initial: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
-class Update:
+class Update(msgspec.Struct, frozen=True):
     """`target := value`."""
 
     target: Access
     value: Expression
 
 
-@dataclass(frozen=True, slots=True)
-class CommunicationTransition:
+class CommunicationTransition(msgspec.Struct, frozen=True):
     """`on kind from|to communication ...`."""
 
     kind: str
@@ -245,8 +288,7 @@ class CommunicationTransition:
     location: Location
 
 
-@dataclass(frozen=True, slots=True)
-class TauTransition:
+class TauTransition(msgspec.Struct, frozen=True):
     """`transition ...`."""
 
     guard: Expression | None
@@ -257,8 +299,7 @@ class TauTransition:
 Transition = CommunicationTransition | TauTransition
 
 
-@dataclass(frozen=True, slots=True)
-class State:
+class State(msgspec.Struct, frozen=True):
     """A state with the transitions written in it."""
 
     name: Name
@@ -267,24 +308,21 @@ class State:
     transitions: tuple[Transition, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Behaviour:
+class Behaviour(msgspec.Struct, frozen=True):
     """A behaviour: its parts in the order of the text."""
 
     items: tuple[Variable | State | Transition, ...]
     location: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Import:
+class Import(msgspec.Struct, frozen=True):
     """`from library import component`."""
 
     library: Name
     component: Name
 
 
-@dataclass(frozen=True, slots=True)
-class Component:
+class Component(msgspec.Struct, frozen=True):
     """A component with its parts, or imported."""
 
     name: Name
@@ -295,8 +333,7 @@ class Component:
 # Requirements and data
 
 
-@dataclass(frozen=True, slots=True)
-class Requirement:
+class Requirement(msgspec.Struct, frozen=True):
     """`R needs E` (`disables` false) or `E disables R`."""
 
     communications: tuple[Name, ...]
@@ -305,16 +342,30 @@ class Requirement:
     location: Location
 
 
-@dataclass(frozen=True, slots=True)
-class ObjectValue:
+class Invariant(msgspec.Struct, frozen=True):
+    """`requirement always E`, or `requirement never E` (`is_never`)."""
+
+    is_never: bool
+    expression: Expression
+    location: Location
+
+
+class Constant(msgspec.Struct, frozen=True):
+    """`constant name: type = value`."""
+
+    name: Name
+    type: Type
+    value: Expression
+
+
+class ObjectValue(msgspec.Struct, frozen=True):
     """`{ property: value, ... }`."""
 
     properties: tuple[tuple[Name, "ObjectValue | Expression"], ...]
     location: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Provide:
+class Provide(msgspec.Struct, frozen=True):
     """`provide communication with value if condition`."""
 
     communication: Name
@@ -323,11 +374,10 @@ class Provide:
     location: Location
 
 
-Item = Component | ObjectDefinition | EnumDefinition | Interface | Requirement | Provide
+Item = Component | ObjectDefinition | EnumDefinition | Interface | Constant | Requirement | Invariant | Provide
 
 
-@dataclass(frozen=True, slots=True)
-class File:
+class File(msgspec.Struct, frozen=True):
     """A robot or a library.
 
     Attributes:

@@ -2,8 +2,8 @@
 
 import difflib
 import re
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Literal
 
 RESERVED_WORDS = frozenset(
     """
@@ -15,30 +15,40 @@ RESERVED_WORDS = frozenset(
 )
 """The quoted words of A.2 and A.3; every other word is a free name."""
 
-_RULES = {
-    "NameToken": "a name",
-    "RootToken": "a name",
-    "LiteralToken": "a number",
-    "Integer": "a whole number",
-    "StringToken": "a text in quotes",
-    "Operator": "an operator",
-    "PrefixSign": "'('",
-    "ClosingSign": "",
-    "PropertyColon": "':'",
-    "Arrow": "'->'",
-    "EOF": "the end of the file",
-    "Comment": "",
+STARTS: dict[str, Literal[True, "a name"] | frozenset[str]] = {
+    "component": "a name",
+    "constant": "a name",
+    "datatype": frozenset({"object", "enum"}),
+    "interface": "a name",
+    "requirement": True,
+    "provide": "a name",
+    "incoming": frozenset({"message"}),
+    "outgoing": frozenset({"message"}),
+    "service": "a name",
+    "action": "a name",
+    "behaviour": frozenset({"{"}),
+    "variable": "a name",
+    "initial": frozenset({"marked", "state"}),
+    "marked": frozenset({"state"}),
+    "state": "a name",
+    "on": frozenset({"request", "response", "feedback", "error", "cancel"}),
+    "transition": True,
 }
+"""What follows a word that begins an item: an error inside one item ends where the next one seems to begin."""
 
 _GROUPS: tuple[tuple[str, frozenset[str]], ...] = (
-    ("an expression", frozenset({"a name", "a number", "'('"})),
-    ("a value", frozenset({"a name", "a number"})),
-    ("a definition", frozenset({"'component'", "'datatype'", "'interface'", "'requirement'", "'provide'"})),
-    ("a type", frozenset({"a name", "'array'", "'integer'", "'string'", "'boolean'", "'double'", "'none'"})),
+    (
+        "a definition",
+        frozenset({"'component'", "'constant'", "'datatype'", "'interface'", "'requirement'", "'provide'"}),
+    ),
+    ("a communication", frozenset({"'incoming'", "'outgoing'", "'service'", "'action'"})),
 )
 """Words that are told in one, the larger groups before the smaller ones that they contain."""
 
 _MAXIMUM_WORDS = 8
+
+_MAXIMUM_MEANT = 40
+"""Characters of a token that are compared with what it may have been meant to be."""
 
 _FOREIGN = {
     "&": "Write 'and' for '&&'.",
@@ -48,10 +58,9 @@ _FOREIGN = {
 """What other languages write."""
 
 
-def expected_words(rules: Iterable[Any]) -> str:
-    """What a parser's expected rules are called, at most eight of them, as one phrase."""
-    words = dict.fromkeys(_word(rule) for rule in rules)
-    words.pop("", None)
+def expected_words(expected: Iterable[str]) -> str:
+    """What was expected, at most eight of it, as one phrase."""
+    words = dict.fromkeys(expected)
     for name, group in _GROUPS:
         if group <= words.keys():
             words = {name: None} | {word: None for word in words if word not in group}
@@ -61,33 +70,38 @@ def expected_words(rules: Iterable[Any]) -> str:
     return " or ".join([", ".join(shown[:-1]), shown[-1]]) if len(shown) > 1 else "".join(shown)
 
 
-def mend_syntax(before: str, token: str, expected: str) -> str:
+def unescape(token: str) -> str:
+    """The text of a quoted token; a backslash takes the next character, n and t mean newline and tab."""
+    if "\\" not in token:
+        return token[1:-1]
+    special = {"n": "\n", "t": "\t"}
+    return re.sub(r"\\([\s\S])", lambda match: special.get(match.group(1), match.group(1)), token[1:-1])
+
+
+def mend_syntax(before: str, token: str, expected: Sequence[str]) -> str:
     """How to mend a syntax error.
 
     Args:
-        before: The line up to the token that does not fit.
-        token: That token; empty at the end of a line.
-        expected: What `expected_words` said.
+        before: The token before the one that does not fit.
+        token: That token; empty at the end of the text.
+        expected: What would have fitted.
     """
     if token in _FOREIGN:
         return _FOREIGN[token]
-    if before.split()[-1:] == ["not"] and "an operator" in expected:
+    if before == "not" and ("an operator" in expected or "an expression" in expected):
         return "Write '!' for 'not'."
-    if token == "=" and before.endswith("="):
+    if token == "=" and before == "=":
         return "Write '=' once: it compares."
     if not token.isascii():
         return "Names are made of the letters A to Z, digits and '_' only."
-    if token in RESERVED_WORDS and any(word in expected for word in ("a name", "an expression", "a value", "a type")):
+    if token == "message" and "'incoming'" in expected:
+        return "Write 'incoming message' or 'outgoing message'."
+    if token == ")":
+        return "Remove it, or open it with '('."
+    if token in RESERVED_WORDS and any(word in expected for word in ("a name", "an expression", "a type")):
         return f"If '{token}' is meant as a name, write '^{token}'."
-    near = difflib.get_close_matches(token, re.findall(r"'([a-z]+)'", expected), n=1, cutoff=0.75)
+    words = [word.strip("'") for word in expected if word[0] == "'"]
+    near = difflib.get_close_matches(token[:_MAXIMUM_MEANT], words, n=1, cutoff=0.75)
     if near:
         return f"Did you mean '{near[0]}'?"
     return "Write one of the expected words here, or look for a bracket or comma missing before."
-
-
-def _word(rule: Any) -> str:
-    name = rule.rule_name
-    if name in _RULES:
-        return _RULES[name]
-    text = getattr(rule, "to_match", None)
-    return f"'{text}'" if isinstance(text, str) and text.isprintable() and len(text) < 20 else name

@@ -38,12 +38,24 @@ def shape(tree: syntax.Expression) -> str:
         case syntax.Literal(value=value):
             return repr(value)
         case syntax.Access(root=root, steps=steps):
-            parts = [f".{s.text}" if isinstance(s, syntax.Name) else f"[{s.value}]" for s in steps]
+            parts = [f".{s.text}" if isinstance(s, syntax.Name) else f"[{_inside(s)}]" for s in steps]
             return ("value" if root is None else root.text) + "".join(parts)
         case syntax.Unary(operator=operator, operand=operand):
             return f"{operator}{shape(operand)}"
         case syntax.Binary(operator=operator, left=left, right=right):
             return f"({shape(left)} {operator} {shape(right)})"
+        case syntax.Conditional(condition=condition, then=then, otherwise=otherwise):
+            return f"(if {shape(condition)} then {shape(then)} else {shape(otherwise)})"
+        case syntax.Call(function=function, arguments=arguments):
+            return f"{function.text}({', '.join(map(shape, arguments))})"
+        case syntax.Quantifier(word=word, variable=variable, array=array, condition=condition):
+            return f"{word.text}({variable.text} in {shape(array)}: {shape(condition)})"
+
+
+def _inside(step: syntax.Index | syntax.Slice) -> str:
+    if isinstance(step, syntax.Slice):
+        return f"{shape(step.low)}..{shape(step.high)}"
+    return shape(step.value)
 
 
 @pytest.mark.parametrize(
@@ -82,6 +94,18 @@ def shape(tree: syntax.Expression) -> str:
         ("type and identifier", "(type and identifier)"),
         ("a // or b\n and c", "(a and c)"),
         ("a /* or b */ and c", "(a and c)"),
+        ("if a then b else c or d", "(if a then b else (c or d))"),
+        ("1 + if a then b else c * 2", "(1 + (if a then b else (c * 2)))"),
+        ("if then then then else else", "(if then then then else else)"),
+        ("if a then if b then c else d else e", "(if a then (if b then c else d) else e)"),
+        ("min(a, max(b, -1)) + abs(c)", "(min(a, max(b, -1)) + abs(c))"),
+        ("min(value.r[350..10]) < LIMIT", "(min(value.r[350..10]) < LIMIT)"),
+        ("any(x in value.r[A..B + 1]: x > 1 or y)", "any(x in value.r[A..(B + 1)]: ((x > 1) or y))"),
+        ("any(x, y)", "any(x, y)"),
+        ("double(a) / integer(b)", "(double(a) / integer(b))"),
+        ("f()", "f()"),
+        ("any", "any"),
+        ("min.max = clamp", "(min.max = clamp)"),
     ],
 )
 def test_expressions(text: str, expected: str) -> None:
@@ -259,14 +283,14 @@ def test_places_count_characters_and_cover_names() -> None:
             62,
             "NUL",
         ),
-        ("robot R { provide m with " + "{a:" * 100, "nesting-too-deep", 1, 143, "braces"),
+        ("robot R { provide m with " + "{a:" * 300, "nesting-too-deep", 1, 623, "200"),
         ("robot R { " + "x" * 100000, "syntax-error", 1, 11, "x..."),
-        ("robot R { " + "(" * 300, "nesting-too-deep", 1, 210, "200"),
+        ("robot R { requirement r needs " + "(" * 300, "nesting-too-deep", 1, 230, "200"),
         ("robot R { requirement r needs " + "!" * 300 + "a }", "nesting-too-deep", 1, 31, "200"),
         ("robot R { requirement r needs " + "-" * 100000 + "a }", "nesting-too-deep", 1, 31, "200"),
         ("robot R { requirement r needs a" + "+a" * 300 + " }", "nesting-too-deep", 1, 31, "200"),
-        ("robot R { component C { message m with type: none } }", "syntax-error", 1, 25, "'incoming'"),
-        ("library L { requirement r needs a }", "syntax-error", 1, 13, "'component'"),
+        ("robot R { component C { message m with type: none } }", "syntax-error", 1, 25, "a communication"),
+        ("library L { requirements r needs a }", "syntax-error", 1, 13, "a definition"),
         ("robot R { } robot S { }", "syntax-error", 1, 13, "end of the file"),
         ("robot R { component state { } }", "syntax-error", 1, 21, "a name"),
     ],

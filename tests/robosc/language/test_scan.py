@@ -2,8 +2,7 @@
 
 import pytest
 
-from robosc.language.scan import declared_libraries, imported_libraries, scan
-from robosc.source import SourceFile
+from robosc.language.scan import declared_libraries, imported_libraries
 
 
 @pytest.mark.parametrize(
@@ -34,9 +33,3 @@ def test_imported_libraries_come_in_the_order_of_the_text() -> None:
 def test_hidden_text_is_looked_at_once(piece: str) -> None:
     assert imported_libraries(piece * 300_000) == ()
     assert len(declared_libraries(piece * 300_000)) <= 1
-
-
-def test_the_deepest_place_is_known() -> None:
-    scanned = scan(SourceFile("model.rscd", "robot R {\n ( [ ] ( { // ((((\n } ) )\n ( ( ) )\n}"))
-    assert scanned.obstacle is None
-    assert str(scanned.deepest) == "model.rscd:2:10"

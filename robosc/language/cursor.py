@@ -1,0 +1,276 @@
+"""A place among the tokens of a text, and what a recursive-descent parser does there.
+
+It knows what words were expected, reports syntax errors, and goes on behind them.
+
+After an error the parser goes on in panic mode (A. V. Aho, M. S. Lam, R. Sethi, J. D. Ullman, Compilers, 2nd ed., 2006,
+sec. 4.8): it skips to a word that can begin an item of one of the lists that are open, or to the brace that closes
+the innermost one.
+"""
+
+from collections.abc import Callable, Mapping
+
+from robosc.errors import Diagnostic, RelatedPlace, Severity
+from robosc.language import syntax
+from robosc.language.limits import MAXIMUM_NAME, MAXIMUM_NESTING, MAXIMUM_SYNTAX_ERRORS
+from robosc.language.tokens import Kind, Places, Tokens
+from robosc.language.words import STARTS, expected_words, mend_syntax, unescape
+from robosc.source import Location, SourceFile
+
+_NAME, _WORD, _NUMBER, _STRING, _END = (
+    int(kind) for kind in (Kind.NAME, Kind.WORD, Kind.NUMBER, Kind.STRING, Kind.END)
+)
+_MAXIMUM_SHOWN = 40
+
+
+class Fault(Exception):
+    """A syntax error, already reported; the innermost open list catches it and goes on."""
+
+
+class TooManyFaults(Exception):
+    """There are so many syntax errors that the rest of the text is left unread."""
+
+
+class Cursor:
+    """Reads tokens one after the other.
+
+    Attributes:
+        texts: The tokens, as written.
+        kinds: Their kinds.
+        place: Index of the next token.
+        diagnostics: What was found so far.
+    """
+
+    def __init__(self, file: SourceFile, tokens: Tokens, places: Places) -> None:
+        self.texts, self.kinds, self._starts = tokens
+        self.place = 0
+        self.diagnostics: list[Diagnostic] = []
+        self._file = file
+        self._places = places
+        self._lists: list[Mapping[str, object]] = []
+        self._braces: list[int] = []
+        self._possible: tuple[int, tuple[str, ...]] = (-1, ())
+        self._resumed = -1
+        self._depth = 0
+
+    # Places
+
+    def at(self, index: int) -> Location:
+        """The place of one token."""
+        start = self._starts[index]
+        return self._places.location(start, start + len(self.texts[index]))
+
+    def since(self, index: int) -> Location:
+        """The place from a token to the last one that was read."""
+        last = self.place - 1
+        return self._places.location(self._starts[index], self._starts[last] + len(self.texts[last]))
+
+    # Faults
+
+    def report(self, code: str, message: str, location: Location, mend: str, *related: RelatedPlace) -> None:
+        """An error that does not keep the parser from reading on."""
+        self.diagnostics.append(Diagnostic(Severity.ERROR, code, message, location, mend, related))
+
+    def possible(self, *words: str) -> None:
+        """Remember what could have stood here too, for the error that the next token may become."""
+        if self._possible[0] == self.place:
+            words = (*self._possible[1], *words)
+        self._possible = (self.place, words)
+
+    def fault(self, *expected: str, related: tuple[RelatedPlace, ...] = ()) -> Fault:
+        """The error that the next token is not what was expected; raise it.
+
+        Args:
+            expected: What would have fitted, such as `a name` or `'{'`.
+            related: Other places that explain it.
+        """
+        index = self.place
+        token = self.texts[index]
+        if self._possible[0] == index:
+            expected = (*self._possible[1], *expected)
+        shown = token if len(token) <= _MAXIMUM_SHOWN else f"{token[:_MAXIMUM_SHOWN]}..."
+        met = f"'{shown}'" if token else "the end of the file"
+        message = f"{met} does not fit here; expected {expected_words(expected)}"
+        if token == ")":
+            message = "this ')' closes nothing"
+        mend = mend_syntax(self.texts[index - 1] if index else "", token, expected)
+        self.report("syntax-error", message, self.at(index), mend, *related)
+        return self.told()
+
+    def told(self) -> Fault:
+        """What to raise behind an error that has been reported with `report`."""
+        if len(self.diagnostics) >= MAXIMUM_SYNTAX_ERRORS:
+            raise TooManyFaults
+        return Fault()
+
+    def deeper(self, opening: int, levels: int = 1) -> None:
+        """Count brackets that are opened; the innermost construct calls `shallower` behind their end."""
+        self._depth += levels
+        if self._depth > MAXIMUM_NESTING:
+            message = f"brackets are nested deeper than {MAXIMUM_NESTING}"
+            self.report("nesting-too-deep", message, self.at(opening), "Split the expression or definition.")
+            raise self.told()
+
+    def shallower(self, levels: int = 1) -> None:
+        """Count brackets that are closed."""
+        self._depth -= levels
+
+    # Single tokens
+
+    def take(self, text: str) -> int:
+        """Read the sign or word `text`; its index."""
+        index = self.place
+        if self.texts[index] != text:
+            raise self.fault(f"'{text}'")
+        self.place = index + 1
+        return index
+
+    def takes(self, text: str) -> bool:
+        """Read `text` if it comes next."""
+        if self.texts[self.place] == text:
+            self.place += 1
+            return True
+        self.possible(f"'{text}'")
+        return False
+
+    def name(self) -> syntax.Name:
+        """Read a name."""
+        index = self.place
+        if self.kinds[index] != _NAME:
+            raise self.fault("a name")
+        self.place = index + 1
+        text, location = self.texts[index], self.at(index)
+        if text[0] == "^":
+            text = text[1:]
+        if len(text) > MAXIMUM_NAME:
+            message = f"the name has more than {MAXIMUM_NAME} characters"
+            self.report("name-too-long", message, location, "Shorten the name.")
+        return syntax.Name(text, location)
+
+    def string(self) -> syntax.Text:
+        """Read a text in quotes."""
+        index = self.place
+        if self.kinds[index] != _STRING:
+            raise self.fault("a text in quotes")
+        self.place = index + 1
+        return syntax.Text(unescape(self.texts[index]), self.at(index))
+
+    def integer(self) -> int:
+        """Read a whole number, perhaps behind a `-`."""
+        begin = self.place
+        is_negative = self.takes("-")
+        index = self.place
+        if self.kinds[index] != _NUMBER or "." in self.texts[index]:
+            raise self.fault("a whole number")
+        self.place = index + 1
+        value = self.whole(index, is_negative=is_negative, begin=begin)
+        return -value if is_negative else value
+
+    def whole(self, index: int, *, is_negative: bool, begin: int) -> int:
+        """The value of a token of digits; 0 after reporting that it is too large."""
+        digits = self.texts[index].lstrip("0") or "0"
+        # Compared by length first: turning a million digits into a number would take minutes.
+        if len(digits) > 10 or int(digits) > 2**31 - 1 + is_negative:
+            message = "the number does not fit into 32 bits"
+            self.report("integer-too-large", message, self.since(begin), "Use a number from -2147483648 to 2147483647.")
+            return 0
+        return int(digits)
+
+    # Lists in braces
+
+    def items[Item](self, parsers: Mapping[str, Callable[[], Item]], *expected: str) -> tuple[Item, ...]:
+        """Read items in braces, each known by its first word, and go on behind those that are broken."""
+        found: list[Item] = []
+        self._enter(parsers)
+        while True:
+            begin = self.place
+            parser = parsers.get(self.texts[begin])
+            if parser is None:
+                if self._ends(expected):
+                    break
+                continue
+            try:
+                found.append(parser())
+            except Fault:
+                self._recover(begin)
+        self._leave()
+        return tuple(found)
+
+    def entries[Item](self, parser: Callable[[], Item], begins: Callable[[], bool], *expected: str) -> tuple[Item, ...]:
+        """Read items in braces that begin with anything for which `begins` is true."""
+        found: list[Item] = []
+        self._enter({})
+        while True:
+            begin = self.place
+            if not begins():
+                if self._ends(expected):
+                    break
+                continue
+            try:
+                found.append(parser())
+            except Fault:
+                self._recover(begin)
+        self._leave()
+        return tuple(found)
+
+    def _enter(self, parsers: Mapping[str, object]) -> None:
+        self._braces.append(self.take("{"))
+        self._lists.append(parsers)
+        self._depth += 1
+
+    def _leave(self) -> None:
+        self._braces.pop()
+        self._lists.pop()
+        self._depth -= 1
+
+    def _ends(self, expected: tuple[str, ...]) -> bool:
+        """Whether the list ends at a token that begins none of its items; reports one that should not be there."""
+        index = self.place
+        if self.texts[index] == "}":
+            self.place += 1
+            return True
+        if index != self._resumed:
+            related: tuple[RelatedPlace, ...] = ()
+            if self.kinds[index] == _END or self._begins_item(index):
+                related = (RelatedPlace("this '{' is not closed", self.at(self._braces[-1])),)
+            self.fault(*expected, "'}'", related=related)
+            self._recover(index)
+        # What an outer list can go on with ends this one.
+        index = self.place
+        if self.kinds[index] == _END:
+            return True
+        return self.texts[index] not in self._lists[-1] and self._begins_item(index)
+
+    def _begins_item(self, index: int) -> bool:
+        """Whether a token looks like the first word of an item of an open list."""
+        word = self.texts[index]
+        follow = STARTS.get(word)
+        if follow is None or not any(word in parsers for parsers in self._lists):
+            return False
+        return (
+            self.kinds[index + 1] == _NAME if follow == "a name" else follow is True or self.texts[index + 1] in follow
+        )
+
+    def _recover(self, begin: int) -> None:
+        """Skip to where an open list can go on, knowing that the item at token `begin` is broken."""
+        index = self.place
+        self._depth = len(self._lists)
+        depth = 0
+        for token in self.texts[begin:index]:
+            depth += (token == "{") - (token == "}")
+        while self.kinds[index] != _END:
+            token = self.texts[index]
+            if token == "{":
+                depth += 1
+            elif token == "}":
+                if depth <= 0:
+                    break
+                depth -= 1
+            elif (index > begin and self._begins_item(index)) or (
+                index == begin and token not in self._lists[-1] and self._begins_item(index)
+            ):
+                break
+            index += 1
+        self.place = self._resumed = index
+
+
+__all__ = ["Cursor", "Fault", "TooManyFaults"]

@@ -1,0 +1,257 @@
+"""Expressions and types (language A.3, B.1 to B.6), read from tokens."""
+
+from itertools import pairwise
+from typing import NamedTuple
+
+from robosc.language import precedence, syntax
+from robosc.language.cursor import Cursor, Fault
+from robosc.language.limits import MAXIMUM_NESTING
+from robosc.language.tokens import Kind
+from robosc.language.words import unescape
+
+_OPERATORS = frozenset().union(*precedence.LEVELS) | {"=>"}
+_BASIC_TYPES = {str(name): name for name in syntax.BasicTypeName}
+_CONVERSIONS = ("integer", "double")
+_QUANTIFIERS = ("any", "all")
+_NAME, _NUMBER, _STRING = int(Kind.NAME), int(Kind.NUMBER), int(Kind.STRING)
+
+
+class _Group(NamedTuple):
+    """What stands inside one pair of parentheses, as far as it has been read."""
+
+    opening: int
+    operands: list[syntax.Expression]
+    operators: list[precedence.Operator]
+    signs: list[precedence.Operator]
+
+
+class ExpressionParser(Cursor):
+    """Reads expressions and types."""
+
+    def expression(self) -> syntax.Expression:
+        """An expression, the whole of it."""
+        begin = self.place
+        tree = self._run()
+        # Fewer tokens than levels that are allowed cannot nest too deeply.
+        if self.place - begin > MAXIMUM_NESTING and precedence.depth_of(tree) > MAXIMUM_NESTING:
+            message = f"the expression has more than {MAXIMUM_NESTING} levels"
+            self.report("nesting-too-deep", message, self.since(begin), "Split the expression.")
+            return syntax.Literal(False, self.at(begin))
+        return tree
+
+    def begins_expression(self) -> bool:
+        """Whether the next token can begin an expression."""
+        index = self.place
+        kind, token = self.kinds[index], self.texts[index]
+        return kind in (_NAME, _NUMBER, _STRING) or token in _OPERAND_SIGNS
+
+    def _run(self) -> syntax.Expression:
+        """Operands and operators in turns; parentheses are matched with a stack, so their depth costs no recursion."""
+        texts = self.texts
+        outer: list[_Group] = []
+        group = _Group(-1, [], [], [])
+        while True:
+            index = self.place
+            token = texts[index]
+            if token in ("!", "-"):
+                group.signs.append((token, self.at(index)))
+                self.place = index + 1
+                continue
+            if token == "(":
+                self.deeper(index)
+                outer.append(group)
+                group = _Group(index, [], [], [])
+                self.place = index + 1
+                continue
+            tree = self._primary(is_negative=bool(group.signs) and group.signs[-1][0] == "-")
+            group.operands.append(self._signed(group, tree) if group.signs else tree)
+            while outer and texts[self.place] == ")":
+                self.place += 1
+                self.shallower()
+                tree = precedence.build(group.operands, group.operators, self.report)
+                group = outer.pop()
+                group.operands.append(self._signed(group, tree))
+            token = texts[self.place]
+            if token in _OPERATORS:
+                group.operators.append((token, self.at(self.place)))
+                self.place += 1
+                continue
+            self.possible("an operator")
+            if outer:
+                self.possible("')'")
+                raise self._unclosed(group.opening)
+            return precedence.build(group.operands, group.operators, self.report)
+
+    def _signed(self, group: "_Group", tree: syntax.Expression) -> syntax.Expression:
+        """An operand behind the signs that stand before it."""
+        signs = group.signs
+        if len(signs) > MAXIMUM_NESTING:
+            what = f"more than {MAXIMUM_NESTING} signs stand before one operand"
+            self.report("nesting-too-deep", what, signs[0][1], "Remove signs that cancel each other.")
+            del signs[1:]
+        for (sign, _), (following, place) in pairwise(signs):
+            if sign == "-" and following == "!":
+                message = "'-' cannot stand before '!'; expected a number"
+                self.report("syntax-error", message, place, "Remove the '-'.")
+        for sign, location in reversed(signs):
+            tree = syntax.Unary(sign, tree, location)
+        signs.clear()
+        return tree
+
+    def _unclosed(self, opening: int) -> Fault:
+        self.report("syntax-error", "this '(' is never closed", self.at(opening), "Close it with ')'.")
+        return self.told()
+
+    def _primary(self, *, is_negative: bool = False) -> syntax.Expression:
+        index = self.place
+        kind, token = self.kinds[index], self.texts[index]
+        if kind == _NAME:
+            return self._call(index) if self.texts[index + 1] == "(" and token[0] != "^" else self.access()
+        if kind == _NUMBER:
+            self.place = index + 1
+            return self._number(index, is_negative=is_negative)
+        if kind == _STRING:
+            self.place = index + 1
+            return syntax.Literal(unescape(token), self.at(index))
+        if token in ("true", "false"):
+            self.place = index + 1
+            return syntax.Literal(token == "true", self.at(index))
+        if token == "value":
+            return self.access()
+        if token == "if":
+            return self._conditional()
+        if token in _CONVERSIONS and self.texts[index + 1] == "(":
+            return self._call(index)
+        raise self.fault("an expression")
+
+    def _conditional(self) -> syntax.Conditional:
+        index = self.take("if")
+        self.deeper(index)
+        condition = self._run()
+        self.take("then")
+        then = self._run()
+        self.take("else")
+        otherwise = self._run()
+        self.shallower()
+        return syntax.Conditional(condition, then, otherwise, self.at(index))
+
+    def _call(self, index: int) -> syntax.Expression:
+        name = syntax.Name(self.texts[index], self.at(index))
+        self.place = index + 1
+        opening = self.take("(")
+        self.deeper(opening)
+        tree: syntax.Expression
+        if name.text in _QUANTIFIERS and self.texts[self.place + 1] == "in":
+            variable = self.name()
+            self.take("in")
+            array = self.access()
+            self.take(":")
+            tree = syntax.Quantifier(name, variable, array, self._run())
+        else:
+            arguments = [] if self.texts[self.place] == ")" else [self._run()]
+            while arguments and self.takes(","):
+                arguments.append(self._run())
+            tree = syntax.Call(name, tuple(arguments))
+        self.shallower()
+        if self.texts[self.place] != ")":
+            raise self._unclosed(opening)
+        self.place += 1
+        return tree
+
+    def _number(self, index: int, *, is_negative: bool) -> syntax.Literal:
+        token, location = self.texts[index], self.at(index)
+        if "." not in token:
+            return syntax.Literal(self.whole(index, is_negative=is_negative, begin=index), location)
+        value = float(token)
+        if value == float("inf"):
+            message = "the number does not fit into a double"
+            self.report("number-too-large", message, location, "Use a smaller number.")
+            value = 0.0
+        return syntax.Literal(value, location)
+
+    def access(self) -> syntax.Access:
+        """`value` or a name, with what follows it."""
+        begin = self.place
+        if self.texts[begin] == "value":
+            root = None
+            self.place += 1
+        else:
+            root = self.name()
+        token = self.texts[self.place]
+        if token not in (".", "["):
+            return syntax.Access(root, (), self.at(begin) if root is None else root.location)
+        steps: list[syntax.Name | syntax.Index | syntax.Slice] = []
+        while token in (".", "["):
+            if token == ".":
+                self.place += 1
+                steps.append(self.name())
+            else:
+                steps.append(self._brackets())
+            token = self.texts[self.place]
+        return syntax.Access(root, tuple(steps), self.since(begin))
+
+    def _brackets(self) -> syntax.Index | syntax.Slice:
+        opening = self.take("[")
+        self.deeper(opening)
+        low = self._run()
+        high = self._run() if self.takes("..") else None
+        self.shallower()
+        self.take("]")
+        location = self.since(opening)
+        return syntax.Index(low, location) if high is None else syntax.Slice(low, high, location)
+
+    def initial_value(self) -> syntax.Expression:
+        """A literal, perhaps negative, or an access."""
+        index = self.place
+        if self.texts[index] != "-":
+            if self.kinds[index] not in (_NAME, _NUMBER, _STRING) and self.texts[index] not in (
+                "true",
+                "false",
+                "value",
+            ):
+                raise self.fault("a name", "a number", "'true'", "'false'")
+            return self._primary() if self.kinds[index] != _NAME else self.access()
+        sign = self.at(self.take("-"))
+        if self.kinds[self.place] != _NUMBER:
+            raise self.fault("a number")
+        return syntax.Unary("-", self._primary(is_negative=True), sign)
+
+    # Types
+
+    def type(self) -> syntax.Type:
+        """A type."""
+        openings: list[int] = []
+        while self.texts[self.place] == "array":
+            openings.append(self.place)
+            self.place += 1
+            self.take("(")
+        self.deeper(openings[0] if openings else self.place, len(openings))
+        tree: syntax.Type = self._plain_type()
+        for opening in reversed(openings):
+            if self.texts[self.place] != ")":
+                message = "the '(' of this array is never closed"
+                self.report("syntax-error", message, self.at(opening), "Close it with ')'.")
+                raise self.told()
+            self.place += 1
+            tree = syntax.ArrayType(tree, self.since(opening))
+        self.shallower(len(openings))
+        return tree
+
+    def _plain_type(self) -> syntax.BasicType | syntax.NamedType:
+        index = self.place
+        if self.kinds[index] == _NAME:
+            return syntax.NamedType(self.name())
+        basic = _BASIC_TYPES.get(self.texts[index])
+        if basic is None:
+            raise self.fault("a type")
+        self.place = index + 1
+        if basic is not syntax.BasicTypeName.INTEGER or not self.takes("("):
+            return syntax.BasicType(basic, None, None, self.at(index))
+        low = self.integer()
+        self.take("..")
+        high = self.integer()
+        self.take(")")
+        return syntax.BasicType(basic, low, high, self.since(index))
+
+
+_OPERAND_SIGNS = frozenset({"(", "!", "-", "true", "false", "value", "if", *_CONVERSIONS})

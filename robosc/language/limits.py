@@ -1,0 +1,10 @@
+"""How much of a text the language takes."""
+
+MAXIMUM_NESTING = 200
+"""Brackets in brackets, and levels of an expression, beyond which a text is refused."""
+
+MAXIMUM_NAME = 255
+"""Characters that a name may have."""
+
+MAXIMUM_SYNTAX_ERRORS = 100
+"""Syntax errors of one text that are told; what follows them is left unread."""

@@ -1,0 +1,72 @@
+"""`robosc explain`: what a diagnostic code means, with an example of it and how to mend it."""
+
+import argparse
+import sys
+
+from robosc.cli.output import ExitCode, UsageError, print_json
+
+
+def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "explain",
+        help="explain a diagnostic code",
+        description="Explain a code such as unknown-name, which 'robosc check' prints in brackets: what is wrong, "
+        "why it matters for the robot, an example, and how to mend it.",
+    )
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("code", nargs="?", metavar="CODE", help="the code to explain, e.g. unknown-name")
+    what.add_argument("--list", action="store_true", help="print every code with its severity and one line")
+    what.add_argument("--all", action="store_true", help="print everything about every code as one Markdown document")
+    parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print what was asked for.
+
+    Raises:
+        UsageError: There is no such code.
+    """
+    from robosc.explain import document, pages
+
+    if arguments.list:
+        if arguments.json:
+            print_json({"codes": [item.head_json() for item in pages()]})
+        else:
+            sys.stdout.write(_table())
+    elif arguments.all:
+        if arguments.json:
+            print_json({"codes": [item.to_json() for item in pages()]})
+        else:
+            sys.stdout.write(document())
+    else:
+        _explain(arguments.code, as_json=arguments.json)
+    return ExitCode.OK
+
+
+def _explain(code: str, *, as_json: bool) -> None:
+    from robosc.explain import codes, page
+
+    # As `check` prints it, a code stands in brackets.
+    wanted = code.strip("[]").lower()
+    if wanted not in codes():
+        from robosc.model.findings import did_you_mean
+
+        near = did_you_mean(wanted, codes())
+        hint = f"did you mean '{near}'?" if near else "'robosc explain --list' lists them"
+        raise UsageError(f"there is no diagnostic code '{code}'; {hint}")
+    found = page(wanted)
+    if as_json:
+        print_json(found.to_json())
+    else:
+        sys.stdout.write(found.markdown)
+
+
+def _table() -> str:
+    from robosc.explain import pages
+
+    found = pages()
+    width = max(len(item.code) for item in found)
+    rows = (f"{item.code:<{width}}  {item.severity:<7}  {item.summary}" for item in found)
+    return "".join(f"{row}\n" for row in rows)

@@ -1,0 +1,5 @@
+"""What every diagnostic code means, with an example of it and how to mend it."""
+
+from robosc.explain.pages import MARK, Block, Page, Stage, codes, document, page, pages, parse_page
+
+__all__ = ["MARK", "Block", "Page", "Stage", "codes", "document", "page", "pages", "parse_page"]

@@ -1,0 +1,64 @@
+"""The diagnostic codes that the source code can report, read from its syntax trees."""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+SOURCE = Path(__file__).parents[2] / "robosc"
+
+_LOOKS_LIKE_A_CODE = re.compile(r"[a-z0-9]+(-[a-z0-9]+)+")
+
+NO_CODES = frozenset({"utf-8", "utf-8-sig", "robosc-supervisor"})
+"""Texts of the source that look like codes and are none."""
+
+# The pages themselves, and the models that a new robot begins with.
+_ELSEWHERE = ("explain", "starter")
+
+REPORTERS = {"error": 0, "warning": 0, "note": 0, "_warning": 0, "Diagnostic": 1}
+"""Functions that take a code, and at which position."""
+
+
+def trees() -> Iterator[tuple[str, ast.Module]]:
+    """Every module that may report something, with its name."""
+    for path in sorted(SOURCE.rglob("*.py")):
+        place = path.relative_to(SOURCE)
+        if place.parts[0] not in _ELSEWHERE:
+            yield place.as_posix(), ast.parse(path.read_text(encoding="utf-8"))
+
+
+def reportable_codes() -> frozenset[str]:
+    """Every code that stands in the source.
+
+    A code may reach its finding by ways that no syntax tree shows (a variable, a table, a parameter), so every text
+    that looks like one counts: words of lower case with hyphens between them are nothing else in this source.
+    """
+    found = {
+        node.value
+        for _, tree in trees()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and _LOOKS_LIKE_A_CODE.fullmatch(node.value)
+    }
+    return frozenset(found - NO_CODES)
+
+
+def assembled_codes() -> tuple[str, ...]:
+    """Places where a code is put together from pieces, so that `reportable_codes` cannot see it."""
+    return tuple(
+        f"{name}:{node.lineno}"
+        for name, tree in trees()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call) and isinstance(_code_argument(node), ast.JoinedStr | ast.BinOp)
+    )
+
+
+def _code_argument(call: ast.Call) -> ast.expr | None:
+    match call.func:
+        case ast.Name(id=name) | ast.Attribute(attr=name):
+            position = REPORTERS.get(name)
+        case _:
+            return None
+    keyword = next((item.value for item in call.keywords if item.arg == "code"), None)
+    if position is None or keyword is not None:
+        return keyword
+    return call.args[position] if len(call.args) > position else None

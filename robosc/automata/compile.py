@@ -6,20 +6,28 @@ Means the same as `robosc.expressions.evaluate`, for many states of one system.
 from collections.abc import Callable, Mapping
 
 from robosc.automata.state import Subject
+from robosc.errors import InternalError
 from robosc.expressions import (
     Binary,
+    Call,
+    Conditional,
     Constant,
+    Element,
     EnumValue,
     Expression,
     PathStep,
+    Quantifier,
     Received,
+    Reduction,
     StateTest,
     Unary,
     Value,
     VariableRead,
     leaves,
 )
-from robosc.expressions.evaluate import BINARY, UNARY
+from robosc.expressions.evaluate import BINARY, CALL, UNARY
+from robosc.expressions.text import expression_text
+from robosc.expressions.values import conditional
 
 State = tuple[Value, ...]
 """A global state, in the order of `subjects`."""
@@ -94,5 +102,14 @@ def _compile_operand(expression: Expression, places: Mapping[Subject, int]) -> F
         case Unary(operator=operator, operand=operand):
             function, inner = UNARY[operator], compile_expression(operand, places)
             return lambda state, data: function(inner(state, data))
+        case Conditional(condition=condition, then=then, otherwise=otherwise):
+            test, yes, no = (compile_expression(item, places) for item in (condition, then, otherwise))
+            return lambda state, data: conditional(test(state, data), yes(state, data), no(state, data))
+        case Call(function=name, arguments=arguments):
+            apply, inners = CALL[name], [compile_expression(item, places) for item in arguments]
+            return lambda state, data: apply(*(inner(state, data) for inner in inners))
         case Binary():
             return compile_expression(expression, places)
+        case Element() | Reduction() | Quantifier():
+            # Arrays have infinitely many values, so no synthesis variable is fed by one.
+            raise InternalError(f"an array in a synthesis problem: {expression_text(expression)}")

@@ -52,6 +52,7 @@ def to_automata(model: Model, deployment: Deployment) -> System:
         automata=tuple(_automata(model)),
         inputs=tuple(_inputs(model)),
         conditions=(*_request_conditions(model), *_cancel_conditions(model, deployment)),
+        invariants=tuple(item.condition for item in model.invariants),
     )
 
 

@@ -19,6 +19,7 @@ from robosc.automata.inputs import connected_inputs, valuations
 from robosc.automata.state import Subject, initial_state, subject_type, subjects
 from robosc.automata.structure import Assignment, Automaton, Edge, Event, InputVariable, System
 from robosc.expressions import TRUE, IntegerType, Type, Value
+from robosc.expressions.text import expression_text
 
 _Writes = tuple[tuple[int, Value], ...]
 """What a step puts where in a state tuple."""
@@ -166,6 +167,7 @@ class Semantics:
         self._places = {subject: place for place, subject in enumerate(subjects(system))}
         self._marked = tuple((self._places[Subject(item.name)], item.marked) for item in system.automata)
         self._rules = {event.name: self._rule(event) for event in system.events}
+        self._invariants = tuple(compile_expression(item, self._places) for item in system.invariants)
         self._uncontrollable = tuple(rule for rule in self._rules.values() if not rule.event.is_controllable)
 
     def enabled(self, state: State, event: str) -> bool:
@@ -197,11 +199,14 @@ class Semantics:
         return frozenset(results)
 
     def bad(self, state: State) -> bool:
-        """Whether an uncontrollable event that the plant enables is against a condition or may leave a range."""
+        """Whether a state is against an invariant, or an uncontrollable event of it against a condition or range."""
         return bool(self.trouble(state))
 
     def trouble(self, state: State) -> str | None:
         """Why a state is bad, in words, or None if it is not."""
+        for number, invariant in enumerate(self._invariants):
+            if invariant(state, NO_DATA) is not True:
+                return f"'{expression_text(self.system.invariants[number])}' is not true"
         for rule in self._uncontrollable:
             outcome = rule.outcome(state)
             if outcome.is_possible and not outcome.meets_condition:

@@ -115,6 +115,7 @@ class System:
         automata: The plants; their synchronous composition is the uncontrolled system.
         inputs: Received data that updates read.
         conditions: Requirements on events; several on one event must all be true.
+        invariants: Conditions that must be true in every state.
     """
 
     name: str
@@ -122,6 +123,7 @@ class System:
     automata: tuple[Automaton, ...]
     inputs: tuple[InputVariable, ...] = ()
     conditions: tuple[EventCondition, ...] = ()
+    invariants: tuple[Expression, ...] = ()
 
     def automaton(self, name: str) -> Automaton:
         """The automaton called `name` (KeyError if there is none)."""

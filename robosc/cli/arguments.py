@@ -29,7 +29,7 @@ def add_deployment_argument(parser: argparse.ArgumentParser) -> None:
         "--deployment",
         choices=[str(deployment) for deployment in Deployment],
         default=str(Deployment.CONTROLLER),
-        help="controller: it decides itself; layer: it filters an existing controller (default: %(default)s)",
+        help="controller: it decides itself; layer: it filters an existing controller (default: controller)",
     )
 
 

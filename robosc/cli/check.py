@@ -2,10 +2,23 @@
 
 import argparse
 import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
 
-from robosc.cli.arguments import add_model_arguments, read_bundle
-from robosc.cli.output import ExitCode, counts_text, diagnostics_json, has_errors, print_diagnostics, print_json
-from robosc.errors import Diagnostic, LanguageError
+from robosc.cli import synth
+from robosc.cli.arguments import add_deployment_argument, add_engine_argument, add_model_arguments, read_bundle
+from robosc.cli.output import (
+    ExitCode,
+    UsageError,
+    counts_text,
+    diagnostics_json,
+    has_errors,
+    print_diagnostics,
+    print_json,
+)
+from robosc.errors import Diagnostic, LanguageError, UnsupportedModelError
+from robosc.model.structure import Deployment
 from robosc.source import Bundle
 
 
@@ -18,26 +31,84 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     )
     add_model_arguments(parser)
     parser.add_argument("--strict", action="store_true", help="exit with 1 for warnings too")
-    parser.set_defaults(run=run)
+    parser.add_argument(
+        "--synthesize",
+        action="store_true",
+        help="also synthesize, to find what only that can tell: no supervisor at all, events that can never happen, "
+        "requirements that never restrict, requests that compete",
+    )
+    add_deployment_argument(parser)
+    add_engine_argument(parser)
+    # Not given, they are told from given without a synthesis, where they would mean nothing.
+    parser.set_defaults(run=run, deployment=None, engine=None)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Check the model; 0 without errors, else 1."""
-    from robosc.model import check
-
-    bundle = None
+    """Check the model; 0 without errors (and, where it was asked for, with a supervisor), else 1."""
+    if not arguments.synthesize and (arguments.deployment or arguments.engine):
+        raise UsageError("--deployment and --engine say how to synthesize: they need --synthesize")
     try:
         bundle = read_bundle(arguments)
-        diagnostics = check(bundle).diagnostics
     except LanguageError as error:
-        diagnostics = error.diagnostics
-    return report_check(arguments, diagnostics, bundle)
+        return report_check(arguments, error.diagnostics, None)
+    if arguments.synthesize:
+        return _report_synthesized(arguments, _synthesized(arguments, bundle), bundle)
+    return report_check(arguments, _checked(bundle), bundle)
 
 
-def report_check(arguments: argparse.Namespace, diagnostics: tuple[Diagnostic, ...], bundle: Bundle | None) -> ExitCode:
-    """Print the findings as asked and return the exit status."""
+def _checked(bundle: Bundle) -> tuple[Diagnostic, ...]:
+    from robosc.model import check
+
+    return check(bundle).diagnostics
+
+
+@dataclass(frozen=True, slots=True)
+class _Synthesized:
+    """What checking and synthesis found.
+
+    Attributes:
+        diagnostics: Every finding.
+        status: What became of the synthesis.
+        reason: Why there is no supervisor; empty where there is one.
+        has_failed: Whether a robot without errors has no supervisor.
+    """
+
+    diagnostics: tuple[Diagnostic, ...]
+    status: str
+    reason: str
+    has_failed: bool
+
+
+def _synthesized(arguments: argparse.Namespace, bundle: Bundle) -> _Synthesized:
+    from robosc.supervisor import MadeStatus
+
+    arguments.deployment = arguments.deployment or str(Deployment.CONTROLLER)
+    arguments.engine = arguments.engine or "auto"
+    try:
+        made = synth.make(arguments, bundle)
+    except UnsupportedModelError as error:
+        return _Synthesized(_checked(bundle), "unsupported model", str(error), has_failed=True)
+    return _Synthesized(made.diagnostics, str(made.status), made.reason, has_failed=made.status is MadeStatus.EMPTY)
+
+
+def _report_synthesized(arguments: argparse.Namespace, found: _Synthesized, bundle: Bundle) -> ExitCode:
+    """Print the findings and what became of the synthesis as asked, and return the exit status."""
+    told = {"status": found.status, "reason": found.reason}
+    status = report_check(arguments, found.diagnostics, bundle, told)
+    if found.reason and not arguments.json:
+        sys.stderr.write(f"{bundle.main.name}: {found.reason}\n")
+    return ExitCode.FAILED if found.has_failed else status
+
+
+def report_check(
+    arguments: argparse.Namespace,
+    diagnostics: tuple[Diagnostic, ...],
+    bundle: Bundle | None,
+    told: Mapping[str, object] = MappingProxyType({}),
+) -> ExitCode:
+    """Print the findings, in JSON with what else is told, and return the exit status."""
     if arguments.json:
-        print_json({"file": str(arguments.model), **diagnostics_json(diagnostics)})
+        print_json({"file": str(arguments.model), **told, **diagnostics_json(diagnostics)})
     elif diagnostics:
         print_diagnostics(diagnostics, bundle)
     else:

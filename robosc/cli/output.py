@@ -40,11 +40,15 @@ def print_json(document: Mapping[str, object]) -> None:
 
 
 def print_diagnostics(diagnostics: Sequence[Diagnostic], bundle: Bundle | None) -> None:
-    """Findings with source line and caret on standard error, and a closing line that counts them."""
+    """Findings with source line and caret on standard error, and a closing line that counts them.
+
+    On a terminal that line also tells where to read more; what a program reads stays bare.
+    """
     for diagnostic in diagnostics:
         sys.stderr.write(diagnostic.render(bundle) + "\n")
     if diagnostics:
-        sys.stderr.write(counts_text(diagnostics) + "\n")
+        hint = " (more about a code: robosc explain CODE)" if sys.stderr.isatty() else ""
+        sys.stderr.write(f"{counts_text(diagnostics)}{hint}\n")
 
 
 def counts(diagnostics: Sequence[Diagnostic]) -> dict[str, int]:

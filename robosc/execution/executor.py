@@ -102,7 +102,8 @@ class Executor:
         calls = Calls(self.settings.service_timeout_s)
         goals = Goals(system, [info.name for info in infos if info.kind == "action"], self.settings.action_timeout_s)
         self._sensors = Sensors(
-            [(info.name, info.identifier) for info in infos if info.kind == "outgoing message"], self.settings.max_age_s
+            [(info.name, info.identifier, info.max_age_s) for info in infos if info.kind == "outgoing message"],
+            self.settings.max_age_s,
         )
         self._rest = Rest(middleware, releases, goals)
         self._steps = Steps(system, middleware, self._recorder, releases, goals, self.settings.on_unknown)

@@ -26,6 +26,7 @@ class CommunicationInfo(NamedTuple):
         interface: Type name of its interface, or None.
         requirement_count: Number of requirements on its request.
         conjunct_count: Number of top-level conjuncts of those requirements, all counted on.
+        max_age_s: Seconds after which an outgoing message is stale, if the model says so.
     """
 
     name: str
@@ -36,6 +37,7 @@ class CommunicationInfo(NamedTuple):
     interface: Optional[str]
     requirement_count: int
     conjunct_count: int
+    max_age_s: Optional[float] = None
 
 
 class Description(NamedTuple):

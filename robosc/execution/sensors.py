@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Dict, List, Mapping, Sequence, Tuple
+from typing import Dict, List, Mapping, Optional, Sequence, Tuple
 
 from robosc.execution.calls import FOREVER
 
@@ -31,17 +31,17 @@ class Sensors:
     """Tells which sensors are stale. Several messages of the model may come on one identifier.
 
     Args:
-        messages: Name and identifier of every outgoing message, in source order.
-        max_age_s: Maximum age by identifier.
+        messages: Name and identifier of every outgoing message, in source order, and its maximum age in seconds as
+            the model has it, or None.
+        max_age_s: Maximum age by identifier, as the deployment has it: it stands above the model.
     """
 
     __slots__ = ("_sensors",)
 
-    def __init__(self, messages: Sequence[Tuple[str, str]], max_age_s: Mapping[str, float]) -> None:
+    def __init__(self, messages: Sequence[Tuple[str, str, Optional[float]]], max_age_s: Mapping[str, float]) -> None:
+        ages = [(name, identifier, max_age_s.get(identifier, age)) for name, identifier, age in messages]
         self._sensors: Dict[str, _Sensor] = {
-            name: _Sensor(name, identifier, max_age_s[identifier])
-            for name, identifier in messages
-            if identifier in max_age_s
+            name: _Sensor(name, identifier, age) for name, identifier, age in ages if age is not None
         }
 
     def start(self, now_s: float) -> None:

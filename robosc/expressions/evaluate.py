@@ -6,11 +6,16 @@ from typing import Any, assert_never
 from robosc.expressions import values
 from robosc.expressions.tree import (
     Binary,
+    Call,
+    Conditional,
     Constant,
+    Element,
     EnumValue,
     Expression,
     PathStep,
+    Quantifier,
     Received,
+    Reduction,
     StateTest,
     Unary,
     VariableRead,
@@ -42,20 +47,51 @@ UNARY: Mapping[str, Callable[[Any], Any]] = {
 """The function of each unary operator."""
 
 
+CALL: Mapping[str, Callable[..., Any]] = {
+    "abs": values.absolute,
+    "min": values.minimum,
+    "max": values.maximum,
+    "clamp": values.clamp,
+    "integer": values.to_integer,
+    "double": values.to_double,
+}
+"""The meaning of each function of numbers."""
+
+REDUCTION: Mapping[str, Callable[[Any], Any]] = {
+    "length": values.array_length,
+    "min": values.least,
+    "max": values.greatest,
+}
+"""The meaning of each reduction of an array's elements."""
+
+QUANTIFIER: Mapping[str, Callable[[Any, Any], Any]] = {"any": values.any_of, "all": values.all_of}
+"""The meaning of each quantifier."""
+
+Elements = tuple[Any, ...]
+"""What the quantifiers around an expression look at, the innermost first."""
+
+
 def evaluate(
     expression: Expression,
     read_variable: Callable[[str, str], Value],
     read_location: Callable[[str], str],
-    read_received: Callable[[tuple[PathStep, ...]], Value | None] = lambda path: None,
-) -> Value | None:
+    read_received: Callable[[tuple[PathStep, ...]], Any] = lambda path: None,
+    elements: Elements = (),
+) -> Any:
     """The value of an expression, or None where it is unknown.
 
     Args:
         expression: A resolved expression.
         read_variable: Value of a variable, given automaton and variable.
         read_location: Current location of an automaton.
-        read_received: Received data of a path, or None where it is unknown.
+        read_received: Received data of a path, or None where it is unknown; an array is a sequence of values,
+            a property of an object a mapping's item.
+        elements: What the quantifiers around it look at.
     """
+
+    def part(node: Expression, inner: Elements = elements) -> Any:
+        return evaluate(node, read_variable, read_location, read_received, inner)
+
     match expression:
         case Constant(value=value) | EnumValue(value=value):
             return value
@@ -65,11 +101,19 @@ def evaluate(
             return read_location(component) == state
         case Received(path=path):
             return read_received(path)
+        case Element(level=level, path=path):
+            return values.part_at(elements[level], path)
         case Unary(operator=operator, operand=operand):
-            inner = evaluate(operand, read_variable, read_location, read_received)
-            return UNARY[operator](inner)  # type: ignore[no-any-return]  # the table is typed loosely on purpose
+            return UNARY[operator](part(operand))
         case Binary(operator=operator, left=left, right=right):
-            first = evaluate(left, read_variable, read_location, read_received)
-            second = evaluate(right, read_variable, read_location, read_received)
-            return BINARY[operator](first, second)  # type: ignore[no-any-return]
+            return BINARY[operator](part(left), part(right))
+        case Conditional(condition=condition, then=then, otherwise=otherwise):
+            return values.conditional(part(condition), part(then), part(otherwise))
+        case Call(function=function, arguments=arguments):
+            return CALL[function](*map(part, arguments))
+        case Reduction(function=function, part=where):
+            return REDUCTION[function](values.array_part(part(where.array), where.low, where.high))
+        case Quantifier(word=word, part=where, condition=condition):
+            looked_at = values.array_part(part(where.array), where.low, where.high)
+            return QUANTIFIER[word](looked_at, lambda element: part(condition, (element, *elements)))
     assert_never(expression)

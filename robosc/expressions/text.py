@@ -1,11 +1,18 @@
 """Expressions in the language's own words and syntax, with as few parentheses as A.3 allows."""
 
 from robosc.expressions.tree import (
+    ArrayPart,
     Binary,
+    Call,
+    Conditional,
     Constant,
+    Element,
     EnumValue,
     Expression,
+    PathStep,
+    Quantifier,
     Received,
+    Reduction,
     StateTest,
     Unary,
     VariableRead,
@@ -14,19 +21,21 @@ from robosc.expressions.tree import (
 _LEVELS = {"or": 1, "and": 2, "=": 3, "!=": 4, ">": 5, ">=": 5, "<": 5, "<=": 5, "+": 6, "-": 6, "*": 7, "/": 7}
 _NOT, _NEGATIVE, _OPERAND = 8, 9, 10
 _IMPLIES = 0
+_CONDITIONAL = -1
 
 
 def expression_text(expression: Expression) -> str:
     """The expression as a user would write it.
 
     The operator `holds` has no syntax, since an author never needs it; it is printed as `holds(...)`.
-    A communication's location is printed as `name.location`.
+    A communication's location is printed as `name.location`. The elements that quantifiers look at are called
+    `x1` (of the outermost), `x2` and so on.
     """
-    return _print(expression)[0]
+    return _print(expression, 0)[0]
 
 
-def _print(expression: Expression) -> tuple[str, int]:
-    """The text and how tightly its outermost operator binds."""
+def _print(expression: Expression, depth: int) -> tuple[str, int]:
+    """The text and how tightly its outermost operator binds, inside `depth` quantifiers."""
     match expression:
         case Constant(value=bool(value)):
             return ("true" if value else "false"), _OPERAND
@@ -42,26 +51,47 @@ def _print(expression: Expression) -> tuple[str, int]:
         case StateTest(component=component, state=state):
             return f"{component.rpartition(' ')[2]}.{state}", _OPERAND
         case Received(path=path):
-            steps = (f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
-            return "value" + "".join(steps), _OPERAND
+            return f"value{_steps(path)}", _OPERAND
+        case Element(level=level, path=path):
+            return f"x{depth - level}{_steps(path)}", _OPERAND
+        case Call(function=function, arguments=arguments):
+            return f"{function}({', '.join(_print(item, depth)[0] for item in arguments)})", _OPERAND
+        case Reduction(function=function, part=part):
+            return f"{function}({_part(part, depth)})", _OPERAND
+        case Quantifier(word=word, part=part, condition=condition):
+            inside = _print(condition, depth + 1)[0]
+            return f"{word}(x{depth + 1} in {_part(part, depth)}: {inside})", _OPERAND
+        case Conditional(condition=condition, then=then, otherwise=otherwise):
+            parts = (_print(item, depth)[0] for item in (condition, then, otherwise))
+            return "if {} then {} else {}".format(*parts), _CONDITIONAL
         case Unary(operator="holds", operand=operand):
-            return f"holds({_print(operand)[0]})", _OPERAND
+            return f"holds({_print(operand, depth)[0]})", _OPERAND
         case Unary(operator="not", operand=operand):
-            return f"!{_within(operand, _NOT)}", _NOT
+            return f"!{_within(operand, _NOT, depth)}", _NOT
         case Unary(operand=operand):
-            return f"-{_within(operand, _NEGATIVE)}", _NEGATIVE
+            return f"-{_within(operand, _NEGATIVE, depth)}", _NEGATIVE
         case Binary(operator="implies", left=left, right=right):
             # Its operands are literals, negations or parentheses, and it stands alone.
-            return f"{_within(left, _NOT)} => {_within(right, _NOT)}", _IMPLIES
+            return f"{_within(left, _NOT, depth)} => {_within(right, _NOT, depth)}", _IMPLIES
         case Binary(operator=operator, left=left, right=right):
             level = _LEVELS[operator]
-            return f"{_within(left, level)} {operator} {_within(right, level + 1)}", level
+            return f"{_within(left, level, depth)} {operator} {_within(right, level + 1, depth)}", level
     raise TypeError(f"no expression: {expression!r}")
 
 
-def _within(expression: Expression, level: int) -> str:
+def _steps(path: tuple[PathStep, ...]) -> str:
+    return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
+
+
+def _part(part: ArrayPart, depth: int) -> str:
+    """An array or a slice of it."""
+    text = _print(part.array, depth)[0]
+    return text if part.low is None else f"{text}[{part.low}..{part.high}]"
+
+
+def _within(expression: Expression, level: int, depth: int) -> str:
     """An operand, in parentheses where it binds less tightly than its place asks."""
-    text, binds = _print(expression)
+    text, binds = _print(expression, depth)
     return text if binds >= level else f"({text})"
 
 

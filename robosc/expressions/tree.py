@@ -66,7 +66,83 @@ class Binary(msgspec.Struct, frozen=True, tag_field="node", tag="binary"):
     right: "Expression"
 
 
-Expression = Constant | EnumValue | VariableRead | StateTest | Received | Unary | Binary
+class Conditional(msgspec.Struct, frozen=True, tag_field="node", tag="if"):
+    """`then` where the condition is true, `otherwise` where it is false; unknown where that is unknown."""
+
+    condition: "Expression"
+    then: "Expression"
+    otherwise: "Expression"
+
+
+Function = Literal["abs", "min", "max", "clamp", "integer", "double"]
+
+ARGUMENTS: dict[str, int] = {"abs": 1, "min": 2, "max": 2, "clamp": 3, "integer": 1, "double": 1}
+"""How many arguments each function takes."""
+
+
+class Call(msgspec.Struct, frozen=True, tag_field="node", tag="call"):
+    """A function of numbers: clamp takes value, least, greatest; the other names speak for themselves."""
+
+    function: Function
+    arguments: Annotated[tuple["Expression", ...], msgspec.Meta(max_length=3)]
+
+
+class Element(msgspec.Struct, frozen=True, tag_field="node", tag="element"):
+    """The element that a quantifier looks at, or a part of it.
+
+    Attributes:
+        level: How many quantifiers stand between: 0 is the innermost one around it.
+        path: Property names and array indices, outermost first.
+    """
+
+    level: Annotated[int, msgspec.Meta(ge=0, le=255)]
+    path: tuple[PathStep, ...] = ()
+
+
+class ArrayPart(msgspec.Struct, frozen=True):
+    """The elements of an array that something looks at.
+
+    Attributes:
+        array: Received data, or a part of an element, that is an array.
+        low: Index of the first element, or None for all of the array.
+        high: Index of the last one; with low > high they go on at the array's beginning. Indices outside the
+            array have no element.
+    """
+
+    array: "Received | Element"
+    low: Annotated[int, msgspec.Meta(ge=0, le=2**31 - 1)] | None = None
+    high: Annotated[int, msgspec.Meta(ge=0, le=2**31 - 1)] | None = None
+
+
+class Reduction(msgspec.Struct, frozen=True, tag_field="node", tag="reduction"):
+    """Number of elements, or the least or greatest of them; NaN entries do not count for the latter two."""
+
+    function: Literal["length", "min", "max"]
+    part: ArrayPart
+
+
+class Quantifier(msgspec.Struct, frozen=True, tag_field="node", tag="quantifier"):
+    """Whether a condition over `Element` is true for any, or for all, elements; unknown if there are none."""
+
+    word: Literal["any", "all"]
+    part: ArrayPart
+    condition: "Expression"
+
+
+Expression = (
+    Constant
+    | EnumValue
+    | VariableRead
+    | StateTest
+    | Received
+    | Unary
+    | Binary
+    | Conditional
+    | Call
+    | Element
+    | Reduction
+    | Quantifier
+)
 
 TRUE = Constant(True)
 FALSE = Constant(False)
@@ -106,12 +182,20 @@ def children(expression: Expression) -> tuple[Expression, ...]:
             return (operand,)
         case Binary(left=left, right=right):
             return (left, right)
+        case Conditional(condition=condition, then=then, otherwise=otherwise):
+            return (condition, then, otherwise)
+        case Call(arguments=arguments):
+            return arguments
+        case Reduction(part=part):
+            return (part.array,)
+        case Quantifier(part=part, condition=condition):
+            return (part.array, condition)
         case _:
             return ()
 
 
 def leaves(expression: Expression) -> tuple[Expression, ...]:
-    """Every leaf, left to right."""
+    """Every leaf, left to right; the array that a reduction or quantifier looks at is one."""
     stack, result = [expression], []
     while stack:
         node = stack.pop()

@@ -107,6 +107,121 @@ def negate(a: Any) -> Any:
     return None if a is None else _number(-a)
 
 
+def conditional(condition: Any, then: Any, otherwise: Any) -> Any:
+    """The value of `if condition then ... else ...`: unknown if the condition is."""
+    if condition is None:
+        return None
+    return then if condition else otherwise
+
+
+def absolute(a: Any) -> Any:
+    """The value of abs(a)."""
+    return None if a is None else _number(abs(a))
+
+
+def minimum(a: Any, b: Any) -> Any:
+    """The value of min(a, b); an infinity is an ordinary number."""
+    if _incomparable(a, b):
+        return None
+    return a if a <= b else b
+
+
+def maximum(a: Any, b: Any) -> Any:
+    """The value of max(a, b); an infinity is an ordinary number."""
+    if _incomparable(a, b):
+        return None
+    return a if a >= b else b
+
+
+def clamp(a: Any, low: Any, high: Any) -> Any:
+    """A number moved to the nearer of two bounds; where they are the wrong way round, the upper one."""
+    return minimum(maximum(a, low), high)
+
+
+def to_integer(a: Any) -> Any:
+    """The value of integer(a): towards zero, and the nearest 32-bit integer for what is beyond."""
+    if a is None or a != a:
+        return None
+    if a >= 2147483647:
+        return 2147483647
+    return -2147483648 if a <= -2147483648 else int(a)
+
+
+def to_double(a: Any) -> Any:
+    """The value of double(a)."""
+    return None if a is None or a != a else float(a)
+
+
+def array_part(value: Any, low: Any = None, high: Any = None) -> Any:
+    """The elements of a received array from `low` to `high`, both included; None where it is no array.
+
+    Args:
+        value: What was received.
+        low: Index of the first element; None for the whole array.
+        high: Index of the last element; if it is less than `low`, the array's end is followed by its beginning.
+    """
+    if isinstance(value, (str, dict)):
+        return None
+    try:
+        if low is None:
+            return list(value[:])
+        if low <= high:
+            return list(value[low : high + 1])
+        return list(value[low:]) + list(value[: high + 1])
+    except (TypeError, LookupError):
+        return None
+
+
+def array_length(elements: Any) -> Any:
+    """How many elements there are."""
+    return None if elements is None else len(elements)
+
+
+def least(elements: Any) -> Any:
+    """The least of numbers, NaN aside; unknown if one of them is, or if none is left."""
+    return _extreme(elements, min)
+
+
+def greatest(elements: Any) -> Any:
+    """The greatest of numbers, NaN aside; unknown if one of them is, or if none is left."""
+    return _extreme(elements, max)
+
+
+def _extreme(elements: Any, choose: Any) -> Any:
+    if elements is None:
+        return None
+    numbers = [element for element in elements if element is None or element == element]
+    return None if not numbers or None in numbers else choose(numbers)
+
+
+def any_of(elements: Any, condition: Any) -> Any:
+    """Kleene disjunction of a condition over elements, up to the first that is true; unknown if there are none."""
+    if not elements:
+        return None
+    result: Any = False
+    for element in elements:
+        outcome = condition(element)
+        if outcome is True:
+            return True
+        if outcome is None:
+            result = None
+    return result
+
+
+def all_of(elements: Any, condition: Any) -> Any:
+    """Kleene conjunction of a condition over elements, up to the first that is false; unknown if there are none."""
+    if not elements:
+        return None
+    result: Any = True
+    for element in elements:
+        outcome = condition(element)
+        if outcome is False:
+            return False
+        if outcome is None:
+            result = None
+    return result
+
+
 def read_boolean(value: Any) -> Any:
     """A received boolean; None where something else came."""
     return value if value is True or value is False else None
@@ -163,6 +278,13 @@ def read_property(value: Any, name: str) -> Any:
     if isinstance(value, dict):
         return value.get(name)
     return getattr(value, name, None)
+
+
+def part_at(value: Any, path: Any) -> Any:
+    """A part of an array's element: property names and indices, outermost first."""
+    for step in path:
+        value = read_element(value, step) if isinstance(step, int) else read_property(value, step)
+    return value
 
 
 def assignable_integer(value: Any, low: int, high: int) -> Any:

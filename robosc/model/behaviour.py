@@ -225,8 +225,9 @@ class BehaviourBuilder:
         default = default_value(type_, self._defaults.get(type_.name) if isinstance(type_, EnumType) else None)
         if tree.initial is None:
             return default
-        # Only literals and enum values can stand here, so no component or variable is in sight.
-        checker = ExpressionChecker(Scope(self._scope.types, {}, self._scope.enums), self._findings)
+        # Only literals, constants and enum values can stand here, so no component or variable is in sight.
+        scope = Scope(self._scope.types, {}, self._scope.enums, constants=self._scope.constants)
+        checker = ExpressionChecker(scope, self._findings)
         typed = checker.fitting(tree.initial, type_)
         if typed is None or not isinstance(typed.expression, Constant | EnumValue):
             return default

@@ -18,11 +18,13 @@ from robosc.model.communications import (
     build_communication,
     check_topics,
     communication_trees,
+    with_conditions,
 )
+from robosc.model.constants import Constants
 from robosc.model.expressions import ExpressionChecker
 from robosc.model.findings import Findings
 from robosc.model.places import Places
-from robosc.model.requirements import ProvideBuilder, build_requirement
+from robosc.model.restrictions import Restrictions
 from robosc.model.scope import Scopes
 from robosc.model.structure import (
     Behaviour,
@@ -32,7 +34,6 @@ from robosc.model.structure import (
     EnumDefinition,
     EnumRule,
     Model,
-    Provide,
     Requirement,
 )
 from robosc.model.synthesis_variables import check_synthesis_variables, mark_synthesis_variables
@@ -114,12 +115,17 @@ class _RobotChecker:
             part.name: component_names(part, behaviour_trees[part.name], self._types, self._findings)
             for part in self._parts
         }
-        scopes = Scopes(self._unit, self._types, self._parts, self._libraries, names)
+        constants = Constants(self._types, self._findings)
+        scopes = Scopes(self._unit, self._types, self._parts, self._libraries, names, constants)
+        scopes.of(self._unit)  # Also a file whose constants nothing uses has them checked.
         enums = self._enums(scopes)
         behaviours = self._behaviours(behaviour_trees, scopes, communications)
-        checker = ExpressionChecker(scopes.of(self._unit), self._findings)
-        requirements, provides = self._restrictions(checker, communications)
-        marked = mark_synthesis_variables(behaviours, requirements, provides)
+        restrictions = Restrictions(self._unit, self._parts, self._libraries, scopes, self._types, self._findings)
+        restrictions.build(communications, self.places)
+        requirements, provides = tuple(restrictions.requirements), tuple(restrictions.provides)
+        invariants = tuple(restrictions.invariants)
+        communications = with_conditions(trees, communications, scopes, self._findings)
+        marked = mark_synthesis_variables(behaviours, requirements, provides, invariants)
         for name, behaviour in marked.items():
             tree = behaviour_trees[name]
             if tree is not None:
@@ -138,6 +144,7 @@ class _RobotChecker:
             objects=tuple(self._types.objects.values()),
             requirements=requirements,
             provides=provides,
+            invariants=invariants,
         )
 
     def _resolve_own_types(self) -> None:
@@ -153,6 +160,7 @@ class _RobotChecker:
             if communication is not None and communication.name not in found:
                 found[communication.name] = communication
                 self.places.communications[communication.name] = item.location
+                self.places.identifiers[communication.name] = item.identifier_location
         self._broken = {item.tree.name.text for item in trees} - found.keys()
         check_topics(found.values(), self.places.communications, self._types, self._findings)
         return found
@@ -207,27 +215,6 @@ class _RobotChecker:
 
     def _unknown_communication(self, part: Part, communications: Mapping[str, Communication]) -> "_Unknown":
         return _Unknown(part, self._unit, communications, self._broken, self._findings)
-
-    # Requirements and data
-
-    def _restrictions(
-        self, checker: ExpressionChecker, communications: Mapping[str, Communication]
-    ) -> tuple[tuple[Requirement, ...], tuple[Provide, ...]]:
-        requirements: list[Requirement] = []
-        provides: list[Provide] = []
-        builder = ProvideBuilder(checker, self._types, self._findings)
-        for item in self._tree.items:
-            if isinstance(item, syntax.Requirement):
-                requirement = build_requirement(item, checker, communications, self._findings)
-                if requirement is not None:
-                    requirements.append(requirement)
-                    self.places.requirements.append(item.location)
-            elif isinstance(item, syntax.Provide):
-                provide = builder.build(item, communications)
-                if provide is not None:
-                    provides.append(provide)
-                    self.places.provides.append(item.location)
-        return tuple(requirements), tuple(provides)
 
     def _check_requests(
         self,

@@ -1,12 +1,18 @@
 """Builds and checks the communications of a robot, and what crosses the middleware (language A.5)."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import msgspec
 
 from robosc.errors import RelatedPlace
 from robosc.expressions import BooleanType, DoubleType, EnumType, IntegerType, NoneType, ObjectType, StringType, Type
 from robosc.language import syntax
+from robosc.model.expressions import ExpressionChecker
 from robosc.model.findings import Findings
+from robosc.model.identifiers import identifier_fault
+from robosc.model.options import build_options
+from robosc.model.scope import Scopes
 from robosc.model.structure import Communication, CommunicationKind, Interface
 from robosc.model.types import Types
 from robosc.model.units import Part, unique
@@ -20,6 +26,8 @@ STANDARD_INTERFACES: dict[type, str] = {
     DoubleType: "Float32",
 }
 """Types of std_msgs that basic types become without `links`."""
+
+_INCOMING = CommunicationKind.INCOMING_MESSAGE
 
 _DIRECTIONS = {
     syntax.Direction.INCOMING: CommunicationKind.INCOMING_MESSAGE,
@@ -38,6 +46,11 @@ class CommunicationTree:
     def location(self) -> Location:
         """Where the robot's text speaks of it: its own name, or the import that brings it."""
         return self.part.place if self.part.is_imported else self.tree.name.location
+
+    @property
+    def identifier_location(self) -> Location:
+        """Where the name of its topic, service or action is written."""
+        return self.tree.identifier.location if self.tree.identifier else self.tree.name.location
 
 
 def communication_trees(parts: Sequence[Part], findings: Findings) -> tuple[CommunicationTree, ...]:
@@ -82,6 +95,8 @@ def build_communication(item: CommunicationTree, types: Types, findings: Finding
             "Write the name of the topic, service or action.",
         )
         return None
+    options = build_options(tree, kind, findings)
+    _check_identifier(identifier, item.identifier_location, findings)
     return Communication(
         name=tree.name.text,
         component=part.name,
@@ -91,7 +106,39 @@ def build_communication(item: CommunicationTree, types: Types, findings: Finding
         response=resolved.get("response"),
         feedback=resolved.get("feedback"),
         interface=link,
+        **options,  # type: ignore[arg-type]  # each of its own type
     )
+
+
+def with_conditions(
+    trees: Iterable[CommunicationTree],
+    communications: Mapping[str, Communication],
+    scopes: Scopes,
+    findings: Findings,
+) -> dict[str, Communication]:
+    """The communications with the conditions (`when`) that tell those on one identifier apart."""
+    found = dict(communications)
+    for item in trees:
+        communication = found.get(item.tree.name.text)
+        for option in item.tree.options:
+            if option.key != "when" or communication is None or communication.kind is not _INCOMING:
+                continue
+            scope = replace(scopes.of(item.part.unit), components={}, received=communication.request)
+            condition = ExpressionChecker(scope, findings).condition(option.value)  # type: ignore[arg-type]  # as parsed
+            if condition is not None:
+                found[communication.name] = msgspec.structs.replace(communication, when=condition)
+    return found
+
+
+def _check_identifier(identifier: str, location: Location, findings: Findings) -> None:
+    fault = identifier_fault(identifier)
+    if fault is not None:
+        findings.warning(
+            "invalid-identifier",
+            f"ROS cannot use the name '{identifier}': {fault}",
+            location,
+            "Use letters, digits, '_' and '/', such as '/robot/scan'; nothing can be generated for ROS otherwise.",
+        )
 
 
 def _interface(link: syntax.Name | None, part: Part, findings: Findings) -> Interface | None:
@@ -133,6 +180,14 @@ def middleware_type(communication: Communication, types: Types) -> str:
     return f"std_msgs/{STANDARD_INTERFACES.get(type(crossing), 'Empty')}"
 
 
+def _transport(communication: Communication) -> tuple[str, int]:
+    return communication.effective_quality, communication.effective_depth
+
+
+def _quality_text(communication: Communication) -> str:
+    return f"qos: {communication.effective_quality}, depth: {communication.effective_depth}"
+
+
 def check_topics(
     communications: Iterable[Communication], places: dict[str, Location], types: Types, findings: Findings
 ) -> None:
@@ -151,6 +206,14 @@ def check_topics(
                 places[item.name],
                 "Use one middleware type on one identifier; nothing can be generated otherwise.",
                 RelatedPlace("the other type is used here", places[other.name]),
+            )
+        elif other is not item and is_topic and _transport(other) != _transport(item):
+            findings.warning(
+                "conflicting-topic",
+                f"'{item.identifier}' is '{_quality_text(other)}' for '{other.name}' and '{_quality_text(item)}' here",
+                places[item.name],
+                "Give both the same 'qos' and 'depth'; nothing can be generated otherwise.",
+                RelatedPlace(f"'{other.name}' is here", places[other.name]),
             )
         if item.kind is CommunicationKind.OUTGOING_MESSAGE:
             speaker = first.setdefault(("speaker", item.identifier), item)

@@ -1,16 +1,24 @@
 """Resolves and types expressions (language A.3 to A.5)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 from itertools import chain
 
+from robosc.errors import InternalError
 from robosc.expressions import (
+    ARGUMENTS,
     MAXIMUM_INTEGER,
     MINIMUM_INTEGER,
+    ArrayPart,
     ArrayType,
     Binary,
     BooleanType,
+    Call,
+    Conditional,
     Constant,
     DoubleType,
+    Element,
     EnumType,
     EnumValue,
     Expression,
@@ -18,15 +26,21 @@ from robosc.expressions import (
     NoneType,
     ObjectType,
     PathStep,
+    Quantifier,
     Received,
+    Reduction,
     StateTest,
     StringType,
     Type,
     Unary,
+    Value,
     VariableRead,
     is_numeric,
+    leaves,
     type_text,
 )
+from robosc.expressions.bounds import call_bounds
+from robosc.expressions.evaluate import evaluate
 from robosc.language import syntax
 from robosc.model.findings import Findings
 from robosc.model.scope import ComponentNames, Scope
@@ -34,6 +48,17 @@ from robosc.model.scope import ComponentNames, Scope
 _BOOLEAN = BooleanType()
 _LOGIC = {"or": "or", "and": "and", "=>": "implies"}
 _ORDER = frozenset({"<", "<=", ">", ">="})
+_FUNCTIONS = (*ARGUMENTS, "length", "any", "all")
+_USES = {
+    "abs": "'abs(x)'",
+    "min": "'min(x, y)' or 'min(array[i..j])'",
+    "max": "'max(x, y)' or 'max(array[i..j])'",
+    "clamp": "'clamp(x, least, greatest)'",
+    "integer": "'integer(x)'",
+    "double": "'double(x)'",
+    "length": "'length(array)'",
+}
+_Step = syntax.Name | syntax.Index | syntax.Slice
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +85,7 @@ class ExpressionChecker:
     def __init__(self, scope: Scope, findings: Findings) -> None:
         self._scope = scope
         self._findings = findings
+        self._elements: list[tuple[str, Type]] = []
 
     def condition(self, tree: syntax.Expression) -> Expression | None:
         """A boolean expression, or None after reporting what is wrong."""
@@ -89,6 +115,12 @@ class ExpressionChecker:
                 return self._unary(tree)
             case syntax.Binary():
                 return self._binary(tree)
+            case syntax.Conditional():
+                return self._conditional(tree, wanted)
+            case syntax.Call():
+                return self._call(tree)
+            case syntax.Quantifier():
+                return self._quantifier(tree)
 
     def _mismatch(self, tree: syntax.Expression, found: Type, needed: str) -> None:
         self._findings.error(
@@ -101,6 +133,8 @@ class ExpressionChecker:
     # Operators
 
     def _unary(self, tree: syntax.Unary) -> Typed | None:
+        if tree.operator == "-" and isinstance(tree.operand, syntax.Literal) and type(tree.operand.value) is int:
+            return Typed(Constant(-tree.operand.value), IntegerType(-tree.operand.value, -tree.operand.value))
         operand = self.infer(tree.operand)
         if operand is None:
             return None
@@ -164,7 +198,142 @@ class ExpressionChecker:
         """Whether a tree is a single name that can only be an enum value."""
         if not isinstance(tree, syntax.Access) or tree.root is None or tree.steps:
             return False
-        return not (self._scope.own and tree.root.text in self._scope.own.variables)
+        name = tree.root.text
+        if any(variable == name for variable, _ in self._elements) or name in self._scope.constants:
+            return False
+        return not (self._scope.own and name in self._scope.own.variables)
+
+    def _conditional(self, tree: syntax.Conditional, wanted: Type | None) -> Typed | None:
+        condition = self.condition(tree.condition)
+        if self._is_bare_value(tree.then):
+            otherwise = self.infer(tree.otherwise, wanted)
+            then = self.infer(tree.then, wanted or (otherwise.type if otherwise else None))
+        else:
+            then = self.infer(tree.then, wanted)
+            otherwise = self.infer(tree.otherwise, wanted or (then.type if then else None))
+        if condition is None or then is None or otherwise is None:
+            return None
+        common = _common_type(then.type, otherwise.type)
+        if common is None:
+            self._mismatch(tree.otherwise, otherwise.type, f"'then' has {_article(type_text(then.type))}")
+            return None
+        return Typed(Conditional(condition, _as_type(then, common), _as_type(otherwise, common)), common)
+
+    # Functions and arrays
+
+    def _call(self, tree: syntax.Call) -> Typed | None:
+        name = tree.function.text
+        count = len(tree.arguments)
+        if name in ("length", "min", "max") and count == 1:
+            return self._reduction(tree)
+        if name in ("any", "all"):
+            self._findings.error(
+                "type-mismatch",
+                f"'{name}' needs a variable, an array and a condition",
+                tree.location,
+                f"Write '{name}(x in array: condition)'.",
+            )
+            return None
+        if name == "length" or name not in ARGUMENTS:
+            if name in ARGUMENTS or name == "length":
+                self._wrong_count(tree, 1)
+            else:
+                self._findings.unknown("function", name, tree.location, _FUNCTIONS)
+            return None
+        if count < ARGUMENTS[name] or (count > ARGUMENTS[name] and name not in ("min", "max")):
+            self._wrong_count(tree, ARGUMENTS[name])
+            return None
+        found = [self._numeric_argument(name, argument) for argument in tree.arguments]
+        arguments = [item for item in found if item is not None]
+        if len(arguments) < count:
+            return None
+        if name in ("min", "max"):
+            return reduce(lambda left, right: _applied(name, (left, right)), arguments)
+        return _applied(name, tuple(arguments))
+
+    def _wrong_count(self, tree: syntax.Call, wanted: int) -> None:
+        name = tree.function.text
+        self._findings.error(
+            "type-mismatch",
+            f"'{name}' takes {wanted} argument{'s' if wanted > 1 else ''}, not {len(tree.arguments)}",
+            tree.location,
+            f"Write {_USES[name]}.",
+        )
+
+    def _numeric_argument(self, name: str, tree: syntax.Expression) -> Typed | None:
+        found = self.infer(tree)
+        if found is not None and not is_numeric(found.type):
+            self._mismatch(tree, found.type, f"'{name}' takes numbers")
+            return None
+        return found
+
+    def _reduction(self, tree: syntax.Call) -> Typed | None:
+        name, argument = tree.function.text, tree.arguments[0]
+        found = self._array(argument, name)
+        if found is None:
+            return None
+        part, element = found
+        if name == "length":
+            if part.low is not None:
+                self._findings.error(
+                    "type-mismatch", "'length' takes a whole array", argument.location, "Remove the slice."
+                )
+                return None
+            return Typed(Reduction("length", part), IntegerType(0, MAXIMUM_INTEGER))
+        if not is_numeric(element):
+            needed = f"'{name}' takes an array of numbers"
+            self._mismatch(argument, ArrayType(element), needed)
+            return None
+        return Typed(Reduction(name, part), element)  # type: ignore[arg-type]  # 'min' or 'max'
+
+    def _array(self, tree: syntax.Expression, what: str) -> tuple[ArrayPart, Type] | None:
+        """A whole array or a slice of one, and the type of its elements."""
+        part: syntax.Slice | None = None
+        if isinstance(tree, syntax.Access) and tree.steps and isinstance(tree.steps[-1], syntax.Slice):
+            part = tree.steps[-1]
+            tree = syntax.Access(tree.root, tree.steps[:-1], tree.location)
+        found = self.infer(tree)
+        if found is None:
+            return None
+        if not isinstance(found.type, ArrayType) or not isinstance(found.expression, Received | Element):
+            self._mismatch(tree, found.type, f"'{what}' looks at an array")
+            return None
+        if part is None:
+            return ArrayPart(found.expression), found.type.element
+        low, high = self._index(part.low), self._index(part.high)
+        if low is None or high is None:
+            return None
+        return ArrayPart(found.expression, low, high), found.type.element
+
+    def _quantifier(self, tree: syntax.Quantifier) -> Typed | None:
+        found = self._array(tree.array, tree.word.text)
+        if found is None:
+            return None
+        part, element = found
+        self._elements.append((tree.variable.text, element))
+        condition = self.condition(tree.condition)
+        self._elements.pop()
+        if condition is None:
+            return None
+        return Typed(Quantifier(tree.word.text, part, condition), _BOOLEAN)  # type: ignore[arg-type]  # as parsed
+
+    def _index(self, tree: syntax.Expression) -> int | None:
+        """The value of a constant index."""
+        if isinstance(tree, syntax.Literal) and type(tree.value) is int:
+            return tree.value
+        found = self.infer(tree)
+        if found is None:
+            return None
+        value = constant_value(found)
+        if isinstance(found.type, IntegerType) and type(value) is int and value >= 0:
+            return value
+        self._findings.error(
+            "type-mismatch",
+            "an index is a whole number that is known in advance and not negative",
+            tree.location,
+            "Write a number or a constant.",
+        )
+        return None
 
     # Accesses
 
@@ -172,10 +341,18 @@ class ExpressionChecker:
         if tree.root is None:
             return self._received(tree)
         name, own = tree.root.text, self._scope.own
+        for level, (variable, element) in enumerate(reversed(self._elements)):
+            if variable == name:
+                walked = self._walk(element, tree.steps)
+                return None if walked is None else Typed(Element(level, walked[0]), walked[1])
         if tree.steps and name in self._scope.components:
             return self._component_part(tree, self._scope.components[name])
         if own and name in own.variables:
             return self._variable(tree, own, tree.root, tree.steps)
+        if not tree.steps and name in self._scope.constants:
+            is_wanted_value = isinstance(wanted, EnumType) and wanted in self._scope.enums_with(name)
+            if not is_wanted_value:
+                return self._scope.constants[name]  # None for a broken one, which has been reported.
         if not tree.steps and self._scope.enums_with(name):
             return self._enum_value(tree, name, wanted)
         if tree.steps and name in self._scope.enums:
@@ -221,7 +398,7 @@ class ExpressionChecker:
         tree: syntax.Access,
         component: ComponentNames,
         name: syntax.Name,
-        rest: tuple[syntax.Name | syntax.Index, ...],
+        rest: Sequence[_Step],
     ) -> Typed | None:
         found = component.variables[name.text]
         if rest:
@@ -229,7 +406,7 @@ class ExpressionChecker:
             return None
         return None if found is None else Typed(VariableRead(component.name, name.text), found)
 
-    def _no_parts(self, step: syntax.Name | syntax.Index, what: str) -> None:
+    def _no_parts(self, step: _Step, what: str) -> None:
         self._findings.error("type-mismatch", f"{what} has no parts", step.location, "Remove what follows the name.")
 
     def _enum_value(self, tree: syntax.Access, name: str, wanted: Type | None) -> Typed | None:
@@ -269,19 +446,36 @@ class ExpressionChecker:
                 "Use it in enum rules and in updates on response and feedback only.",
             )
             return None
-        path: list[PathStep] = []
-        for step in tree.steps:
-            inner = self._part(found, step)
-            if inner is None:
-                return None
-            found = inner
-            path.append(step.text if isinstance(step, syntax.Name) else step.value)
+        walked = self._walk(found, tree.steps)
+        if walked is None:
+            return None
+        path, found = walked
         if isinstance(found, NoneType):
             self._findings.error(
                 "no-value-here", "there is no data: the type is none", tree.location, "Give the communication a type."
             )
             return None
-        return Typed(Received(tuple(path)), found)
+        return Typed(Received(path), found)
+
+    def _walk(self, whole: Type, steps: Sequence[_Step]) -> tuple[tuple[PathStep, ...], Type] | None:
+        """Property by property, element by element: the path and the type at its end."""
+        path: list[PathStep] = []
+        for step in steps:
+            if isinstance(step, syntax.Slice):
+                self._findings.error(
+                    "type-mismatch",
+                    "a slice can only be looked at with 'min', 'max', 'any' or 'all'",
+                    step.location,
+                    "Write one index, or one of these around it.",
+                )
+                return None
+            inner = self._part(whole, step)
+            key = self._index(step.value) if isinstance(step, syntax.Index) else step.text
+            if inner is None or key is None:
+                return None
+            whole = inner
+            path.append(key)
+        return tuple(path), whole
 
     def _part(self, whole: Type, step: syntax.Name | syntax.Index) -> Type | None:
         if isinstance(step, syntax.Index):
@@ -359,6 +553,51 @@ def _arithmetic(operator: str, left: IntegerType, right: IntegerType) -> Integer
         case _:
             corners = (a * c, a * d, b * c, b * d)
             return _integer(min(corners), max(corners))
+
+
+def _common_type(first: Type, second: Type) -> Type | None:
+    """The type of a value that is one of two, or None where they do not go together."""
+    if isinstance(first, IntegerType) and isinstance(second, IntegerType):
+        (a, b), (c, d) = _bounds(first), _bounds(second)
+        return IntegerType(min(a, c), max(b, d))
+    if is_numeric(first) and is_numeric(second):
+        return DoubleType()
+    return first if first == second and not isinstance(first, ObjectType | ArrayType | NoneType) else None
+
+
+def _as_type(typed: Typed, common: Type) -> Expression:
+    """An expression of a common type: an integer beside doubles becomes one, or it would overflow like an integer."""
+    if isinstance(typed.type, IntegerType) and isinstance(common, DoubleType):
+        return Call("double", (typed.expression,))
+    return typed.expression
+
+
+def _applied(name: str, arguments: tuple[Typed, ...]) -> Typed:
+    """A function of numbers, with the bounds that an integer result can have (interval arithmetic)."""
+    types = [item.type for item in arguments]
+    common = types[0] if all(isinstance(type_, IntegerType) for type_ in types) else DoubleType()
+    parts = tuple(item.expression if len(types) == 1 else _as_type(item, common) for item in arguments)
+    call = Call(name, parts)  # type: ignore[arg-type]  # one of `ARGUMENTS`
+    if name == "double":
+        return Typed(call, DoubleType())
+    if name == "integer":
+        (type_,) = types
+        return Typed(call, type_ if isinstance(type_, IntegerType) else IntegerType(MINIMUM_INTEGER, MAXIMUM_INTEGER))
+    if not all(isinstance(type_, IntegerType) for type_ in types):
+        return Typed(call, DoubleType())
+    bounds = [_bounds(type_) for type_ in types if isinstance(type_, IntegerType)]
+    return Typed(call, _integer(*call_bounds(name, bounds)))
+
+
+def constant_value(typed: Typed) -> Value | None:
+    """The value of an expression of constants; None for any other one, and for one that is unknown."""
+    if not all(isinstance(leaf, Constant | EnumValue) for leaf in leaves(typed.expression)):
+        return None
+    return evaluate(typed.expression, _not_constant, _not_constant)  # type: ignore[no-any-return]
+
+
+def _not_constant(*names: str) -> str:
+    raise InternalError(f"{names} was taken for a constant")
 
 
 def _article(text: str) -> str:

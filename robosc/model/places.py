@@ -20,6 +20,8 @@ class Places:
         transitions: By component, in the order of its behaviour's transitions.
         requirements: In the order of the model's requirements.
         provides: In the order of the model's provide statements.
+        invariants: In the order of the model's invariants.
+        identifiers: By communication; where its identifier is written, or its name.
     """
 
     robot: Location
@@ -32,3 +34,5 @@ class Places:
     transitions: dict[str, tuple[Location, ...]] = field(default_factory=dict)
     requirements: list[Location] = field(default_factory=list)
     provides: list[Location] = field(default_factory=list)
+    invariants: list[Location] = field(default_factory=list)
+    identifiers: dict[str, Location] = field(default_factory=dict)

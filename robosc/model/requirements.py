@@ -9,6 +9,7 @@ from robosc.model.findings import Findings
 from robosc.model.structure import (
     Communication,
     CommunicationKind,
+    Invariant,
     ObjectValue,
     Provide,
     ProvidedValue,
@@ -32,6 +33,12 @@ def build_requirement(
         return None
     form = RequirementForm.DISABLES if tree.disables else RequirementForm.NEEDS
     return Requirement(tuple(dict.fromkeys(names)), form, expression)
+
+
+def build_invariant(tree: syntax.Invariant, checker: ExpressionChecker) -> Invariant | None:
+    """A state invariant of the model, or None where it is broken."""
+    expression = checker.condition(tree.expression)
+    return None if expression is None else Invariant(tree.is_never, expression)
 
 
 def _restricted(

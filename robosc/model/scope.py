@@ -2,10 +2,15 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 from robosc.expressions import EnumType, Type
 from robosc.model.types import Types
 from robosc.model.units import Libraries, Part, Unit
+
+if TYPE_CHECKING:
+    from robosc.model.constants import Constants
+    from robosc.model.expressions import Typed
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +39,7 @@ class Scope:
         own: The component whose behaviour this is, if any.
         received: Type of `value`, or None where there is no received data.
         absent: Components whose import has failed, which has been reported.
+        constants: Constants by name; None for one that is broken, which has been reported.
     """
 
     types: Types
@@ -42,6 +48,7 @@ class Scope:
     own: ComponentNames | None = None
     received: Type | None = None
     absent: frozenset[str] = frozenset()
+    constants: Mapping[str, "Typed | None"] = field(default_factory=dict)
     _values: dict[str, tuple[EnumType, ...]] = field(default_factory=dict)
 
     def with_received(self, received: Type | None) -> "Scope":
@@ -61,6 +68,7 @@ class Scope:
     def known_names(self) -> Iterator[str]:
         """Every name that an expression may begin with."""
         yield from self.components
+        yield from self.constants
         yield from self.own.variables if self.own else ()
         for enum in self.enums.values():
             yield from enum.values
@@ -75,12 +83,20 @@ class Scopes:
         parts: The components of the robot.
         libraries: The libraries that they come from.
         names: What can be read of each component, by its name in the robot.
+        constants: Resolves constants.
     """
 
     def __init__(
-        self, main: Unit, types: Types, parts: Sequence[Part], libraries: Libraries, names: Mapping[str, ComponentNames]
+        self,
+        main: Unit,
+        types: Types,
+        parts: Sequence[Part],
+        libraries: Libraries,
+        names: Mapping[str, ComponentNames],
+        constants: "Constants",
     ) -> None:
         self._main = main
+        self._constants = constants
         self._types = types
         self._libraries = libraries
         self._names = names
@@ -92,8 +108,18 @@ class Scopes:
         if unit not in self._scopes:
             components = self._components(unit)
             absent = frozenset(unit.components.keys() - components) if unit is self._main else frozenset()
-            self._scopes[unit] = Scope(self._types, components, self._enums(unit), absent=absent)
+            scope = Scope(self._types, components, self._enums(unit), absent=absent)
+            self._scopes[unit] = replace(scope, constants=self._constants.visible_in(unit, self))
         return self._scopes[unit]
+
+    def of_constants(self, unit: Unit) -> Scope:
+        """The names in the constants of a file, other constants aside."""
+        return Scope(self._types, {}, self._enums(unit))
+
+    def units_of(self, unit: Unit) -> frozenset[Unit]:
+        """The files that the imported components of a file come from."""
+        origins = (self._libraries.origin(unit, name) for name in unit.components)
+        return frozenset(origin[0] for origin in origins if origin is not None) - {unit}
 
     def inside(self, part: Part) -> Scope:
         """The names in the behaviour of a component."""

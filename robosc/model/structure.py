@@ -6,7 +6,7 @@ component standing where it is imported.
 """
 
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 
@@ -14,6 +14,12 @@ from robosc.expressions import Expression, Name, ScopedName, Type, Unary, Value
 
 Identifier = Annotated[str, msgspec.Meta(min_length=1, max_length=255)]
 """The name of a topic, service or action; any text that fits, escaped wherever it is printed."""
+
+MAXIMUM_DEPTH = 100_000
+"""Messages that a queue may be asked to keep."""
+
+MAXIMUM_AGE = 86_400.0 * 365
+"""Seconds that a sensor may be asked to stay fresh: a year."""
 
 EventName = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z_][A-Za-z_0-9]*\.[A-Za-z_][A-Za-z_0-9]*\Z", max_length=511)]
 """`<communication>.<kind>` or `<Component>.tau_<n>`."""
@@ -103,7 +109,11 @@ class Interface(msgspec.Struct, frozen=True):
     package: Name
 
 
-class Communication(msgspec.Struct, frozen=True):
+Quality = Literal["reliable", "best_effort", "sensor", "latched"]
+"""How a message travels: delivery guaranteed; the newest only; as sensors do; also to who comes later."""
+
+
+class Communication(msgspec.Struct, frozen=True, omit_defaults=True):
     """A message, service or action.
 
     Attributes:
@@ -115,6 +125,11 @@ class Communication(msgspec.Struct, frozen=True):
         response: Type of what comes back (outgoing message, service, action).
         feedback: Type of an action's feedback.
         interface: The middleware type, if linked.
+        quality: How a message travels, if the model says so; `QUALITIES` and `effective_quality` have the rest.
+        depth: How many messages are kept for a slow receiver, if the model says so.
+        max_age: Seconds after which an outgoing message that was not seen again is stale.
+        frame: Frame with which the header of an incoming message, or an action's request, is stamped.
+        when: Which messages on a shared identifier are this one, in a supervision layer (language B.13).
     """
 
     name: Name
@@ -125,6 +140,26 @@ class Communication(msgspec.Struct, frozen=True):
     response: Type | None = None
     feedback: Type | None = None
     interface: Interface | None = None
+    quality: Quality | None = None
+    depth: Annotated[int, msgspec.Meta(ge=1, le=MAXIMUM_DEPTH)] | None = None
+    max_age: Annotated[float, msgspec.Meta(gt=0, le=MAXIMUM_AGE)] | None = None
+    frame: Annotated[str, msgspec.Meta(max_length=255)] | None = None
+    when: Expression | None = None
+
+    @property
+    def effective_quality(self) -> Quality:
+        """How it travels: as the model says, else like a sensor if sensor_msgs has its type, else reliably."""
+        if self.quality is not None:
+            return self.quality
+        is_sensor = self.interface is not None and self.interface.package == "sensor_msgs"
+        return "sensor" if is_sensor and self.kind is CommunicationKind.OUTGOING_MESSAGE else "reliable"
+
+    @property
+    def effective_depth(self) -> int:
+        """How many messages are kept: as the model says, else 5 for sensors and 10 for others, 1 if latched."""
+        if self.depth is not None:
+            return self.depth
+        return {"sensor": 5, "latched": 1}.get(self.effective_quality, 10)
 
     def event(self, kind: EventKind) -> str:
         """The event's name, e.g. `move.request`."""
@@ -229,6 +264,18 @@ class Requirement(msgspec.Struct, frozen=True):
         return self.expression if self.form is RequirementForm.NEEDS else Unary("not", self.expression)
 
 
+class Invariant(msgspec.Struct, frozen=True):
+    """A state invariant: `requirement always expression`, or `requirement never expression`."""
+
+    is_never: bool
+    expression: Expression
+
+    @property
+    def condition(self) -> Expression:
+        """What must be true in every state."""
+        return Unary("not", self.expression) if self.is_never else self.expression
+
+
 class ObjectValue(msgspec.Struct, frozen=True, tag_field="node", tag="object"):
     """Data given property by property; a missing property keeps the middleware's default."""
 
@@ -256,6 +303,7 @@ class Model(msgspec.Struct, frozen=True):
     objects: tuple[ObjectDefinition, ...]
     requirements: tuple[Requirement, ...]
     provides: tuple[Provide, ...]
+    invariants: tuple[Invariant, ...]
 
     def component(self, name: str) -> Component:
         """The component called `name` (KeyError if there is none)."""
@@ -319,6 +367,7 @@ __all__ = [
     "EnumRule",
     "EventKind",
     "Interface",
+    "Invariant",
     "Model",
     "ObjectDefinition",
     "ObjectValue",

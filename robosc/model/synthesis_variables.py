@@ -18,18 +18,22 @@ from robosc.expressions import (
 from robosc.language import syntax
 from robosc.model.behaviour import BehaviourTree
 from robosc.model.findings import Findings
-from robosc.model.structure import Behaviour, Communication, EventKind, Provide, Requirement, is_tau
+from robosc.model.structure import Behaviour, Communication, EventKind, Invariant, Provide, Requirement, is_tau
 from robosc.model.types import Types
 
 Key = tuple[str, str]
 
 
 def mark_synthesis_variables(
-    behaviours: Mapping[str, Behaviour], requirements: Iterable[Requirement], provides: Iterable[Provide]
+    behaviours: Mapping[str, Behaviour],
+    requirements: Iterable[Requirement],
+    provides: Iterable[Provide],
+    invariants: Iterable[Invariant],
 ) -> dict[str, Behaviour]:
     """The behaviours with every variable told apart: in synthesis, or code-only."""
     found = set[Key]()
     conditions = [item.expression for item in requirements]
+    conditions += [item.expression for item in invariants]
     conditions += [item.condition for item in provides if item.condition is not None]
     conditions += [item.guard for behaviour in behaviours.values() for item in behaviour.transitions if item.guard]
     frontier = [key for condition in conditions for key in _read(condition)]

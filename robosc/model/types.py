@@ -15,7 +15,7 @@ from robosc.expressions import (
     Type,
 )
 from robosc.language import syntax
-from robosc.language.scan import MAXIMUM_NESTING
+from robosc.language.limits import MAXIMUM_NESTING
 from robosc.model.findings import Findings
 from robosc.model.structure import ObjectDefinition, Property
 from robosc.model.units import Unit, unique

@@ -1,5 +1,6 @@
 """Files as units of definitions, and where each component of a robot comes from (language A.4)."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from robosc.errors import RelatedPlace
@@ -18,12 +19,14 @@ class Unit:
         components: Components by name.
         types: Data types by name.
         interfaces: Interfaces by name.
+        constants: Constants by name.
     """
 
     tree: syntax.File
     components: dict[str, syntax.Component]
     types: dict[str, syntax.ObjectDefinition | syntax.EnumDefinition]
     interfaces: dict[str, syntax.Interface]
+    constants: dict[str, syntax.Constant]
 
     def type_name(self, name: str) -> str:
         """A type's name in the model: a library's types carry its name before their own."""
@@ -59,12 +62,15 @@ def make_unit(tree: syntax.File, findings: Findings) -> Unit:
     interfaces = [item for item in tree.items if isinstance(item, syntax.Interface)]
     unique([item.name for item in components], "duplicate-component", "component", findings)
     unique([item.name for item in types], "duplicate-data-type", "data type", findings)
+    constants = [item for item in tree.items if isinstance(item, syntax.Constant)]
     unique([item.name for item in interfaces], "duplicate-interface", "interface", findings)
+    unique([item.name for item in constants], "duplicate-constant", "constant", findings)
     return Unit(
         tree=tree,
         components={item.name.text: item for item in reversed(components)},
         types={item.name.text: item for item in reversed(types)},
         interfaces={item.name.text: item for item in reversed(interfaces)},
+        constants={item.name.text: item for item in reversed(constants)},
     )
 
 
@@ -116,6 +122,19 @@ class Libraries:
                 return here, component
             here, component = self._units.get(source.library.text), source.component.text
         return None
+
+    def chain(self, component: syntax.Component) -> Iterator[tuple[Unit, str]]:
+        """The libraries on the way from an import to the definition, each with the component's name there."""
+        seen = set[tuple[Unit, str]]()
+        here = component
+        while here.imported is not None:
+            unit = self._units.get(here.imported.library.text)
+            name = here.imported.component.text
+            if unit is None or name not in unit.components or (unit, name) in seen:
+                return
+            seen.add((unit, name))
+            yield unit, name
+            here = unit.components[name]
 
     def _find(self, name: syntax.Name) -> Unit | None:
         found: dict[str, syntax.File] = {}

@@ -11,19 +11,27 @@ from typing import assert_never
 
 from robosc.errors import InvalidSupervisorError
 from robosc.expressions import (
+    ARGUMENTS,
     MAXIMUM_INTEGER,
     MINIMUM_INTEGER,
+    ArrayPart,
     ArrayType,
     Binary,
     BooleanType,
+    Call,
+    Conditional,
     Constant,
     DoubleType,
+    Element,
     EnumType,
     EnumValue,
     Expression,
     IntegerType,
     ObjectType,
+    PathStep,
+    Quantifier,
     Received,
+    Reduction,
     StateTest,
     StringType,
     Type,
@@ -57,12 +65,13 @@ class Scope:
     enum_values: Mapping[str, frozenset[str]]
     objects: Mapping[str, Mapping[str, Type]]
 
-    def infer(self, expression: Expression, received: Type | None = None) -> Type:
+    def infer(self, expression: Expression, received: Type | None = None, elements: tuple[Type, ...] = ()) -> Type:
         """The type of an expression.
 
         Args:
             expression: Any expression, at most some hundreds of operators deep.
             received: Type of the received data it may read; None where there is none.
+            elements: Types of what the quantifiers around it look at, the innermost first.
 
         Raises:
             InvalidSupervisorError: It names something that is not there, or its types do not fit.
@@ -83,10 +92,38 @@ class Scope:
             case Received():
                 return self.received_type(expression, received)
             case Unary(operator=operator, operand=operand):
-                return _unary_type(operator, self.infer(operand, received))
+                return _unary_type(operator, self.infer(operand, received, elements))
             case Binary(operator=operator, left=left, right=right):
-                return _binary_type(operator, self.infer(left, received), self.infer(right, received))
+                types = self.infer(left, received, elements), self.infer(right, received, elements)
+                return _binary_type(operator, *types)
+            case Conditional(condition=condition, then=then, otherwise=otherwise):
+                parts = (self.infer(part, received, elements) for part in (condition, then, otherwise))
+                return _conditional_type(*parts)
+            case Call(function=function, arguments=arguments):
+                return _call_type(function, [self.infer(item, received, elements) for item in arguments])
+            case Element(level=level, path=path):
+                if level >= len(elements):
+                    raise InvalidSupervisorError("an element is read outside the quantifier that looks at it")
+                return self._part_type(elements[level], path)
+            case Reduction(function=function, part=part):
+                element = self._element_type(part, received, elements)
+                if function != "length" and not is_numeric(element):
+                    raise _unfit(function, element)
+                return _INTEGER if function == "length" else element
+            case Quantifier(part=part, condition=condition):
+                element = self._element_type(part, received, elements)
+                if not isinstance(self.infer(condition, received, (element, *elements)), BooleanType):
+                    raise InvalidSupervisorError("a quantifier needs a condition")
+                return _BOOLEAN
         assert_never(expression)
+
+    def _element_type(self, part: ArrayPart, received: Type | None, elements: tuple[Type, ...]) -> Type:
+        if (part.low is None) is not (part.high is None):
+            raise InvalidSupervisorError("a slice has one end only")
+        type_ = self.infer(part.array, received, elements)
+        if not isinstance(type_, ArrayType):
+            raise InvalidSupervisorError(f"{type_text(type_)} has no elements")
+        return type_.element
 
     def received_type(self, read: Received, received: Type | None) -> Type:
         """The type of the part of `received` that a path reads.
@@ -96,8 +133,10 @@ class Scope:
         """
         if received is None:
             raise InvalidSupervisorError("received data is read where none is")
-        type_ = received
-        for step in read.path:
+        return self._part_type(received, read.path)
+
+    def _part_type(self, type_: Type, path: tuple[PathStep, ...]) -> Type:
+        for step in path:
             match type_, step:
                 case ObjectType(name=name), str() if step in self.objects.get(name, {}):
                     type_ = self.objects[name][step]
@@ -189,6 +228,24 @@ def _binary_type(operator: str, left: Type, right: Type) -> Type:
         return _BOOLEAN
     is_double = operator == "/" or isinstance(left, DoubleType) or isinstance(right, DoubleType)
     return _DOUBLE if is_double else _INTEGER
+
+
+def _conditional_type(condition: Type, then: Type, otherwise: Type) -> Type:
+    if not isinstance(condition, BooleanType):
+        raise _unfit("if", condition)
+    if is_assignable(otherwise, then):
+        return then
+    if not is_assignable(then, otherwise):
+        raise _unfit("if", then, otherwise)
+    return otherwise
+
+
+def _call_type(function: str, arguments: list[Type]) -> Type:
+    if len(arguments) != ARGUMENTS[function] or not all(map(is_numeric, arguments)):
+        raise _unfit(function, *arguments)
+    if function in ("integer", "double"):
+        return _INTEGER if function == "integer" else _DOUBLE
+    return _DOUBLE if any(isinstance(type_, DoubleType) for type_ in arguments) else _INTEGER
 
 
 def _unfit(operator: str, *operands: Type) -> InvalidSupervisorError:

@@ -10,14 +10,15 @@ from enum import StrEnum
 
 from robosc._version import __version__
 from robosc.automata import System, to_automata
-from robosc.errors import Diagnostic, InternalError
+from robosc.errors import Diagnostic, InternalError, sorted_diagnostics
 from robosc.model import check
+from robosc.model.layers import layer_findings
 from robosc.model.structure import Deployment
 from robosc.source import Bundle
 from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.structure import Certificate, CheckResult, Supervisor
 from robosc.synthesis import Progress as SynthesisProgress
-from robosc.synthesis import Statistics, SynthesisResult, SynthesisStatus, synthesize
+from robosc.synthesis import Statistics, SynthesisResult, SynthesisStatus, findings, questions_about, synthesize
 from robosc.verification import verify
 
 VERIFICATION_LIMIT = 50_000
@@ -56,7 +57,8 @@ class Made:
     Attributes:
         status: How it ended.
         supervisor: The supervisor, or None.
-        diagnostics: Every finding about the model, sorted by place.
+        diagnostics: Every finding about the model, sorted by place; with a supervisor, also what only synthesis
+            can tell.
         statistics: Figures of the synthesis, or None where there was none.
         reason: Why there is no supervisor, in one sentence; empty where there is one.
     """
@@ -92,22 +94,33 @@ def make_supervisor(
     """
     on_progress(Progress("check", bundle.main.name))
     checked = check(bundle)
-    if checked.model is None:
+    if checked.model is None or checked.places is None:
         reason = "" if checked.has_errors else "a library has no robot to make a supervisor for"
         return Made(MadeStatus.MODEL_ERRORS, None, checked.diagnostics, reason=reason)
+    if deployment is Deployment.LAYER:
+        ambiguous = layer_findings(checked.model, checked.places)
+        if ambiguous:
+            return Made(MadeStatus.MODEL_ERRORS, None, sorted_diagnostics((*checked.diagnostics, *ambiguous)))
     system = to_automata(checked.model, deployment)
 
     def report(progress: SynthesisProgress) -> None:
         on_progress(Progress("synthesis", str(progress)))
 
-    result = synthesize(system, engine=engine, should_stop=should_stop, on_progress=report)
+    result = synthesize(
+        system,
+        engine=engine,
+        questions=questions_about(checked.model, system, deployment),
+        should_stop=should_stop,
+        on_progress=report,
+    )
     if result.status is SynthesisStatus.EMPTY:
         reason = f"no supervisor exists: {result.reason}"
         return Made(MadeStatus.EMPTY, None, checked.diagnostics, result.statistics, reason)
     on_progress(Progress("verification", f"{result.statistics.states} states"))
     certificate = _certify(system, result, bundle, deployment, should_stop)
     supervisor = Supervisor(checked.model, deployment, result.added, certificate)
-    return Made(MadeStatus.SUPERVISOR, supervisor, checked.diagnostics, result.statistics)
+    diagnostics = sorted_diagnostics((*checked.diagnostics, *findings(checked.model, checked.places, result.answers)))
+    return Made(MadeStatus.SUPERVISOR, supervisor, diagnostics, result.statistics)
 
 
 def _certify(

@@ -8,7 +8,7 @@ model is the verifier's question, not this module's.
 import re
 from collections.abc import Iterable, Iterator, Mapping, Set
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from robosc.automata import to_automata
 from robosc.errors import InvalidSupervisorError
@@ -241,6 +241,29 @@ def _validate_communications(model: Model, names: _Names) -> None:
             if communication.component not in components:
                 raise InvalidSupervisorError(f"there is no component {communication.component}")
             _validate_data(communication, names)
+            _validate_options(communication, names)
+
+
+_OPTIONS: dict[str, tuple[CommunicationKind, ...]] = {
+    "quality": (CommunicationKind.INCOMING_MESSAGE, CommunicationKind.OUTGOING_MESSAGE),
+    "depth": (CommunicationKind.INCOMING_MESSAGE, CommunicationKind.OUTGOING_MESSAGE),
+    "max_age": (CommunicationKind.OUTGOING_MESSAGE,),
+    "frame": (CommunicationKind.INCOMING_MESSAGE, CommunicationKind.ACTION),
+    "when": (CommunicationKind.INCOMING_MESSAGE,),
+}
+"""The kinds of communication that each option suits."""
+
+
+def _validate_options(communication: Communication, names: _Names) -> None:
+    for option, kinds in _OPTIONS.items():
+        if getattr(communication, option) is not None and communication.kind not in kinds:
+            raise InvalidSupervisorError(f"{option} does not suit its kind")
+    if communication.frame is not None and communication.interface is None:
+        raise InvalidSupervisorError("what is stamped needs a middleware type")
+    if communication.when is not None:
+        without_state = replace(names.scope, variables={}, states=frozenset())
+        if not isinstance(without_state.infer(communication.when, communication.request), BooleanType):
+            raise InvalidSupervisorError("its condition is no condition")
 
 
 def _validate_data(communication: Communication, names: _Names) -> None:
@@ -366,6 +389,9 @@ def _validate_requirements(model: Model, names: _Names) -> None:
             for name in requirement.communications:
                 _request_type(name, names)
             _require_boolean(requirement.expression, names.scope)
+    for number, invariant in enumerate(model.invariants, start=1):
+        with _at(f"invariant {number}"):
+            _require_boolean(invariant.expression, names.scope)
 
 
 def _validate_provide(provide: Provide, names: _Names) -> None:
@@ -417,6 +443,8 @@ def _synthesis_expressions(
     """Every expression that synthesis works on, with the type of the received data it may read."""
     for requirement in model.requirements:
         yield requirement.expression, None
+    for invariant in model.invariants:
+        yield invariant.expression, None
     for provide in model.provides:
         if provide.condition is not None:
             yield provide.condition, None

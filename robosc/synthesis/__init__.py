@@ -1,16 +1,25 @@
 """Symbolic supervisor synthesis on extended finite automata."""
 
 from robosc.synthesis.engines import UnknownEngineError, engine_names, register, resolve_engine
+from robosc.synthesis.findings import findings, questions_about
+from robosc.synthesis.questions import Answers, Cause, Questions, Restriction, Together
 from robosc.synthesis.result import Progress, Statistics, SynthesisResult, SynthesisStatus
 from robosc.synthesis.synthesize import synthesize
 
 __all__ = [
+    "Answers",
+    "Cause",
     "Progress",
+    "Questions",
+    "Restriction",
     "Statistics",
     "SynthesisResult",
     "SynthesisStatus",
+    "Together",
     "UnknownEngineError",
     "engine_names",
+    "findings",
+    "questions_about",
     "register",
     "resolve_engine",
     "synthesize",

@@ -36,6 +36,8 @@ def hyperedges(system: System) -> tuple[frozenset[Subject], ...]:
         found[frozenset(touched)] = None
     for condition in system.conditions:
         found[frozenset(_read(condition.condition))] = None
+    for invariant in system.invariants:
+        found[frozenset(_read(invariant))] = None
     return tuple(edge for edge in found if len(edge) > 1)
 
 

@@ -1,9 +1,10 @@
 """What synthesis returns: outcomes are values."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 from robosc.supervisor.structure import AddedCondition
+from robosc.synthesis.questions import Answers
 
 
 class SynthesisStatus(StrEnum):
@@ -19,7 +20,8 @@ class Progress:
     """Where a synthesis is.
 
     Attributes:
-        phase: `encoding`; `coreachability`, `controllability` and, around these two, `fixed point`; `reachability`.
+        phase: `encoding`; `coreachability`, `controllability` and, around these two, `fixed point`; `reachability`;
+            where questions are asked that need it, again the fixed point, and `shortest runs`.
         iteration: Events encoded so far, or rounds of the phase.
         nodes: Nodes of what was found last: where an event is enabled, or a set of states.
     """
@@ -61,9 +63,11 @@ class SynthesisResult:
         added: What the supervisor adds, for events to which it adds something, in the system's order.
         statistics: Figures.
         reason: Why there is no supervisor, in words; empty where there is one.
+        answers: What else was asked about the controlled system; empty where there is none.
     """
 
     status: SynthesisStatus
     added: tuple[AddedCondition, ...]
     statistics: Statistics
     reason: str = ""
+    answers: Answers = field(default_factory=Answers)

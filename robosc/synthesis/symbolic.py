@@ -15,19 +15,25 @@ from robosc.expressions import (
     MINIMUM_INTEGER,
     Binary,
     BooleanType,
+    Call,
+    Conditional,
     Constant,
+    Element,
     EnumValue,
     Expression,
     IntegerType,
+    Quantifier,
     Received,
+    Reduction,
     StateTest,
     Unary,
     Value,
     VariableRead,
 )
-from robosc.expressions.evaluate import BINARY, UNARY
+from robosc.expressions.evaluate import BINARY, CALL, UNARY
+from robosc.expressions.text import expression_text
 from robosc.synthesis.encoding import Bits, Encoding, Inputs, offset_of
-from robosc.synthesis.vectors import Arithmetic, Vector
+from robosc.synthesis.vectors import Arithmetic, Vector, width_for
 
 MAXIMUM_PARTITION = 100_000
 """Different values, or pairs of them, beyond which arithmetic with doubles is refused."""
@@ -106,6 +112,14 @@ class Symbols:
                 return self._unary(operator, self.translate(operand))
             case Binary(operator=operator, left=left, right=right):
                 return self._binary(operator, self.translate(left), self.translate(right))
+            case Conditional(condition=condition, then=then, otherwise=otherwise):
+                test = self._truth(self.translate(condition))
+                return self._choose(test, self.translate(then), self.translate(otherwise))
+            case Call(function=function, arguments=arguments):
+                return self._call(function, [self.translate(item) for item in arguments])
+            case Element() | Reduction() | Quantifier():
+                # Arrays have infinitely many values, so no synthesis variable is fed by one.
+                raise InternalError(f"an array in a synthesis problem: {expression_text(expression)}")
 
     def _read(self, bits: Bits) -> Symbolic:
         known = self._manager.true if bits.known is None else self._manager.var(bits.known)
@@ -125,6 +139,64 @@ class Symbols:
             [self._manager.var(name) for name in reversed(bits.names)], len(bits.domain) - 1
         )
         return index if offset == 0 else self._arithmetic.add(index, self._arithmetic.constant(offset))
+
+    # Choices and functions
+
+    def _choose(self, test: Truth, then: Symbolic, otherwise: Symbolic) -> Symbolic:
+        """What a conditional expression is; unknown where its condition is."""
+        yes, no = test.true, test.false
+        match then, otherwise:
+            case Truth(), Truth():
+                return Truth((yes & then.true) | (no & otherwise.true), (yes & then.false) | (no & otherwise.false))
+            case Number(), Number():
+                vector = self._arithmetic.choose(yes, then.vector, otherwise.vector)
+                return Number(vector, (yes & then.known) | (no & otherwise.known))
+        first, second = self._partition(then), self._partition(otherwise)
+        cases = [(value, yes & predicate) for value, predicate in first.cases]
+        return self._collect([*cases, *((value, no & predicate) for value, predicate in second.cases)])
+
+    def _call(self, function: str, arguments: list[Symbolic]) -> Symbolic:
+        if function == "clamp":
+            value, low, high = arguments
+            return self._call("min", [self._call("max", [value, low]), high])
+        first = arguments[0]
+        if function == "integer" and isinstance(first, Number):
+            return first
+        if function == "abs" and isinstance(first, Number):
+            negative = self._arithmetic.less(first.vector, self._arithmetic.constant(0))
+            vector = self._arithmetic.choose(negative, self._arithmetic.negate(first.vector), first.vector)
+            most = max(abs(first.vector.low), abs(first.vector.high))
+            return self._within_32_bits(self._arithmetic.within(vector, 0, most), first.known)
+        if function in ("min", "max") and all(isinstance(item, Number) for item in arguments):
+            return self._extreme(function, *arguments)  # type: ignore[arg-type]  # two numbers
+        if function == "integer":
+            return self._rounded(self._partition(first))
+        if len(arguments) == 1:
+            cases = self._partition(first).cases
+            return self._collect((CALL[function](value), predicate) for value, predicate in cases)
+        pairs = self._pairs(self._partition(first), self._partition(arguments[1]))
+        return self._collect((CALL[function](a, b), predicate) for a, b, predicate in pairs)
+
+    def _rounded(self, partition: Partition) -> Number:
+        """The whole numbers that the values of a partition become."""
+        found = self._collect((CALL["integer"](value), predicate) for value, predicate in partition.cases)
+        if not found.cases:
+            return Number(self._arithmetic.constant(0), self._manager.false)
+        low, high = (choose(int(value) for value, _ in found.cases) for choose in (min, max))
+        bits = tuple(
+            self._encoding.any_of(predicate for value, predicate in found.cases if (int(value) >> place) & 1)
+            for place in range(width_for(low, high))
+        )
+        # Where it is unknown its bits are those of zero.
+        return Number(Vector(bits, min(low, 0), max(high, 0)), self._known(found))
+
+    def _extreme(self, function: str, a: Number, b: Number) -> Number:
+        """The lesser or greater of two integers."""
+        less = self._arithmetic.less(a.vector, b.vector)
+        chosen = self._arithmetic.choose(less if function == "min" else ~less, a.vector, b.vector)
+        choose = min if function == "min" else max
+        low, high = choose(a.vector.low, b.vector.low), choose(a.vector.high, b.vector.high)
+        return Number(self._arithmetic.within(chosen, low, high), a.known & b.known)
 
     # Operators
 

@@ -6,8 +6,9 @@ predicate are then found by substitution, and no next-state variable is needed b
 """
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 from robosc.automata.state import Subject
 from robosc.automata.structure import Automaton, Edge, Event, System
@@ -176,18 +177,29 @@ class Steps:
         true, false = self._manager.true, self._manager.false
         self._constants = {name: f == true for name, f in transition.functions.items() if f in (true, false)}
         self._composed = {name: f for name, f in transition.functions.items() if name not in self._constants}
-        leaving = self._without_hidden(transition.possible & transition.out_of_range)
+        self._leaving = self._without_hidden(transition.possible & transition.out_of_range)
         enabled = self._without_hidden(transition.possible)
         self.event = transition.event
-        self.plant = enabled & ~leaving if self.event.is_controllable else enabled
+        self.plant = enabled & ~self._leaving if self.event.is_controllable else enabled
         """Where the plant enables the event; a controllable one must stay in every range."""
         self.condition = transition.condition
         """Where its event conditions are true."""
-        self.bad = self._manager.false if self.event.is_controllable else leaving | (enabled & ~transition.condition)
-        """States in which the event, uncontrollable, can do harm at once."""
         self._in_range = transition.possible & ~transition.out_of_range
         self._changed = tuple(transition.functions)
         self._relation: Any = None
+
+    @property
+    def bad(self) -> Any:
+        """States in which the event, uncontrollable, can do harm at once."""
+        if self.event.is_controllable:
+            return self._manager.false
+        return self._leaving | (self.plant & ~self.condition)
+
+    def under(self, condition: Any) -> Self:
+        """The same event under another condition."""
+        other = copy(self)
+        other.condition = condition
+        return other
 
     def some(self, predicate: Any) -> Any:
         """Where the event can lead into a predicate."""

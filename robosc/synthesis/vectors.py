@@ -76,6 +76,17 @@ class Arithmetic:
             total = self._sum(total, tuple(bit & other for other in shifted), self._manager.false)
         return Vector(total, low, high)
 
+    def choose(self, condition: Any, a: Vector, b: Vector) -> Vector:
+        """`a` where the condition is true, else `b`."""
+        low, high = min(a.low, b.low), max(a.high, b.high)
+        width = width_for(low, high)
+        pairs = zip(self._extend(a, width), self._extend(b, width), strict=True)
+        return Vector(tuple(self._manager.ite(condition, first, second) for first, second in pairs), low, high)
+
+    def within(self, a: Vector, low: int, high: int) -> Vector:
+        """The same number with closer bounds, which it is known to keep where it matters."""
+        return Vector(self._extend(a, width_for(low, high)), low, high)
+
     def less(self, a: Vector, b: Vector) -> Any:
         """Where a < b."""
         if a.high < b.low:

@@ -9,10 +9,13 @@ import pytest
 
 from robosc.cli.main import main as robosc
 from robosc.language import load_bundle
+from robosc.model.structure import Deployment
 from robosc.supervisor import decode
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.main import main as robosc_client
 from robosc_server.settings import Settings
+from support.models import EXAMPLE_DEPLOYMENTS
+from support.models import EXAMPLES as EXAMPLES_FOLDER
 from support.service import (
     FAKE_WORKER,
     PATIENCE_S,
@@ -24,7 +27,7 @@ from support.service import (
     server_process,
 )
 
-EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*/*.rscd"))
+EXAMPLES = sorted(EXAMPLES_FOLDER.glob("*/*.rscd"))
 
 ERRONEOUS = "robot R { component C { incoming message go with type: Missing } requirement jump needs C.x }"
 
@@ -137,9 +140,9 @@ class TestSameAsHere:
         assert here == there
         assert here[0] == 0
 
-    @pytest.mark.parametrize("deployment", ["controller", "layer"])
-    @pytest.mark.parametrize("model", EXAMPLES, ids=lambda path: path.stem)
-    def test_synth(self, both: Any, model: Any, deployment: Any) -> None:
+    @pytest.mark.parametrize(("name", "deployment"), EXAMPLE_DEPLOYMENTS)
+    def test_synth(self, both: Any, name: str, deployment: Deployment) -> None:
+        model = EXAMPLES_FOLDER / f"{name}.rscd"
         here, there = both("synth", model, "-o", "robot.rsup", "--deployment", deployment)
         assert here == there
         assert here[0] == 0

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from robosc.language import load_bundle
 from robosc.model import Checked, check
-from robosc.model.structure import Model
+from robosc.model.structure import Deployment, Model
 from robosc.source import Bundle, SourceFile
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -13,6 +13,14 @@ EXAMPLE_NAMES = (
     "line_follower/line_follower_layer",
     "maze_solver/maze_solver",
     "navigation/navigation",
+)
+
+EXAMPLE_DEPLOYMENTS = tuple(
+    (name, deployment)
+    for name in EXAMPLE_NAMES
+    for deployment in Deployment
+    # As a layer, it could not tell its two messages on one topic apart: that is what the other model is for.
+    if (name, deployment) != ("line_follower/line_follower", Deployment.LAYER)
 )
 
 

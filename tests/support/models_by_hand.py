@@ -13,6 +13,7 @@ from robosc.model.structure import (
     Communication,
     CommunicationKind,
     Component,
+    Invariant,
     Model,
     ObjectDefinition,
     Requirement,
@@ -111,4 +112,5 @@ def model(
         objects=tuple(part for part in parts if isinstance(part, ObjectDefinition)),
         requirements=tuple(part for part in parts if isinstance(part, Requirement)),
         provides=(),
+        invariants=tuple(part for part in parts if isinstance(part, Invariant)),
     )

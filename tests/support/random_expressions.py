@@ -6,10 +6,13 @@ from robosc.automata import Automaton, DiscreteVariable, Edge, Event, InputVaria
 from robosc.expressions import (
     Binary,
     BooleanType,
+    Call,
+    Conditional,
     Constant,
     EnumType,
     EnumValue,
     Expression,
+    Function,
     IntegerType,
     Received,
     StateTest,
@@ -52,11 +55,29 @@ _whole = st.one_of(
 _double = st.sampled_from([0.0, 0.5, -1.5, 2.0]).map(Constant)
 
 
+_kinds: st.SearchStrategy[Function] = st.sampled_from(["integer", "double"])
+
+
 def _numbers(children: st.SearchStrategy[Expression]) -> st.SearchStrategy[Expression]:
     return st.one_of(
         st.builds(Binary, st.sampled_from(["+", "-", "*", "+", "-", "/"]), children, children),
         st.builds(Unary, st.just("-"), children),
+        st.builds(lambda name, child: Call(name, (child,)), st.sampled_from(["abs", "integer", "double"]), children),
+        st.builds(_pair, st.sampled_from(["min", "max", "if"]), _kinds, children, children),
+        st.builds(_clamped, children, children, children),
     )
+
+
+def _clamped(*parts: Expression) -> Expression:
+    return Call("clamp", tuple(Call("integer", (part,)) for part in parts))
+
+
+def _pair(name: str, kind: Function, left: Expression, right: Expression) -> Expression:
+    """Two numbers of one type together."""
+    first, second = Call(kind, (left,)), Call(kind, (right,))
+    if name == "if":
+        return Conditional(Binary("<", left, right), second, first)
+    return Call("min" if name == "min" else "max", (first, second))
 
 
 numbers: st.SearchStrategy[Expression] = st.recursive(st.one_of(_whole, _whole, _double), _numbers, max_leaves=4)
@@ -77,6 +98,7 @@ def _conditions(children: st.SearchStrategy[Expression]) -> st.SearchStrategy[Ex
     return st.one_of(
         st.builds(Binary, st.sampled_from(["and", "or", "implies", "=", "!="]), children, children),
         st.builds(Unary, st.sampled_from(["not", "holds"]), children),
+        st.builds(Conditional, children, children, children),
     )
 
 

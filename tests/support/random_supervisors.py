@@ -15,18 +15,24 @@ from typing import Any
 from robosc.automata import System, to_automata
 from robosc.automata.state import subject_domain, subjects
 from robosc.expressions import (
+    ArrayPart,
     ArrayType,
     Binary,
     BooleanType,
+    Call,
+    Conditional,
     Constant,
     DoubleType,
+    Element,
     EnumType,
     EnumValue,
     Expression,
     IntegerType,
     NoneType,
     ObjectType,
+    Quantifier,
     Received,
+    Reduction,
     StateTest,
     StringType,
     Type,
@@ -102,9 +108,13 @@ OBJECTS = (
             Property("numbers", ArrayType(DOUBLE)),
             Property("inner", INNER),
             Property("kind", KIND),
+            Property("items", ArrayType(INNER)),
+            Property("levels", ArrayType(RANGE)),
+            Property("kinds", ArrayType(KIND)),
+            Property("grid", ArrayType(ArrayType(INTEGER))),
         ),
     ),
-    ObjectDefinition("Inner", (Property("class", DOUBLE), Property("self", INTEGER))),
+    ObjectDefinition("Inner", (Property("class", DOUBLE), Property("self", INTEGER), Property("mood", KIND))),
 )
 
 _PATHS: dict[Type, list[tuple[tuple[str | int, ...], Type]]] = {
@@ -121,6 +131,15 @@ _PATHS: dict[Type, list[tuple[tuple[str | int, ...], Type]]] = {
         (("kind",), KIND),
     ],
 }
+
+_ARRAYS: list[tuple[str, Type]] = [
+    ("numbers", DOUBLE),
+    ("items", INNER),
+    ("levels", RANGE),
+    ("kinds", KIND),
+    ("grid", ArrayType(INTEGER)),
+]
+"""The arrays of an object, with the types of their elements."""
 
 # Names that would break careless code: keywords, built-ins, our own, and pairs that look alike.
 COMPONENT_NAMES = ("class", "self", "A", "A__state", "None", "__init__")
@@ -164,6 +183,44 @@ def _leaves(world: _World, type_: Type) -> list[Expression]:
     return found
 
 
+def _part(dice: Random, array: Received | Element) -> ArrayPart:
+    return ArrayPart(array) if dice.random() < 0.4 else ArrayPart(array, dice.randint(0, 4), dice.randint(0, 4))
+
+
+def _reduced(dice: Random, world: _World, type_: Type) -> Expression | None:
+    """A number that is made of an array, if there is one."""
+    if world.received != OBJECT or world.is_finite:
+        return None
+    if type_ == DOUBLE:
+        return Reduction(dice.choice(["min", "max"]), _part(dice, Received(("numbers",))))
+    name = dice.choice(["numbers", "items", "levels", "levels", "grid"])
+    if name == "levels":
+        return Reduction(dice.choice(["min", "max"]), _part(dice, Received((name,))))
+    return Reduction("length", ArrayPart(Received((name,))))
+
+
+def _quantified(dice: Random, world: _World) -> Expression | None:
+    """A condition about an array's elements, if there is an array."""
+    if world.received != OBJECT or world.is_finite:
+        return None
+    name, element = dice.choice(_ARRAYS)
+    condition: Expression
+    match element:
+        case ArrayType():
+            inner = Binary(">", Element(0), Binary("+", Element(0), Constant(dice.choice([0, 1]))))
+            least = Reduction("min", _part(dice, Element(0)))
+            condition = Quantifier("any", _part(dice, Element(0)), inner)
+            condition = Binary("or", condition, Binary("<", least, Constant(3)))
+        case EnumType():
+            condition = Binary("=", Element(0), _constant(dice, KIND))
+        case ObjectType():
+            mood = Binary("=", Element(0, ("mood",)), _constant(dice, KIND))
+            condition = Binary(dice.choice(["and", "or"]), mood, Binary("<", Element(0, ("class",)), Constant(0.5)))
+        case _:
+            condition = Binary(dice.choice(["<", "=", ">="]), Element(0), _constant(dice, element))
+    return Quantifier(dice.choice(["any", "all"]), _part(dice, Received((name,))), condition)
+
+
 def _constant(dice: Random, type_: Type) -> Expression:
     match type_:
         case BooleanType():
@@ -188,7 +245,15 @@ def _expression(dice: Random, world: _World, type_: Type, depth: int) -> Express
         return _expression(dice, world, inner, depth - 1)
 
     if isinstance(type_, BooleanType):
-        return _condition(dice, world, below)
+        quantified = _quantified(dice, world) if dice.random() < 0.3 else None
+        return quantified or _condition(dice, world, below)
+    shape = dice.random()
+    if shape < 0.12:
+        reduced = _reduced(dice, world, type_)
+        if reduced is not None:
+            return reduced
+    if shape < 0.35:
+        return _called(dice, type_, below)
     if dice.random() < 0.2:
         return Unary("-", below(type_))
     if type_ == DOUBLE:
@@ -198,10 +263,28 @@ def _expression(dice: Random, world: _World, type_: Type, depth: int) -> Express
     return Binary(dice.choice("+-*"), below(INTEGER), below(INTEGER))  # type: ignore[arg-type]
 
 
+def _called(dice: Random, type_: Type, below: Callable[[Type], Expression]) -> Expression:
+    """A function of numbers, or a conditional number."""
+    kind = DOUBLE if type_ == DOUBLE else INTEGER
+    match dice.randrange(5):
+        case 0:
+            return Call("double" if kind == DOUBLE else "integer", (below(dice.choice([DOUBLE, INTEGER])),))
+        case 1:
+            return Call("abs", (below(kind),))
+        case 2:
+            return Call("clamp", (below(kind), below(kind), below(kind)))
+        case 3:
+            return Call(dice.choice(["min", "max"]), (below(kind), below(kind)))
+        case _:
+            return Conditional(below(BOOLEAN), below(kind), below(kind))
+
+
 def _condition(dice: Random, world: _World, below: Callable[[Type], Expression]) -> Expression:
     enums = [variable.type for _, variable in world.variables if isinstance(variable.type, EnumType)]
     enums += [KIND] * (world.received == OBJECT)
-    match dice.randrange(5):
+    match dice.randrange(6):
+        case 5:
+            return Conditional(below(BOOLEAN), below(BOOLEAN), below(BOOLEAN))
         case 0:
             return Unary(dice.choice(["not", "holds"]), below(BOOLEAN))
         case 1 | 2:
@@ -287,6 +370,7 @@ def random_supervisor(seed: int) -> Supervisor:
         objects=OBJECTS,
         requirements=_requirements(dice, requested, world),
         provides=_provides(dice, requested, world),
+        invariants=(),
     )
     deployment = dice.choice(list(Deployment))
     return Supervisor(model, deployment, _added(dice, to_automata(model, deployment)), CERTIFICATE)
@@ -422,6 +506,13 @@ def random_data(dice: Random) -> Any:
                 dice.choice([None, "text", {0: 1.0}, {5: 1.0}, {"a": 1}, 3]),
             ]
         ),
+        "items": [
+            dice.choice([{"class": dice.choice(_SCALARS), "mood": dice.choice(_SCALARS)}, None, Trap()])
+            for _ in range(dice.randint(0, 3))
+        ],
+        "levels": dice.choice([[dice.choice(_SCALARS) for _ in range(dice.randint(0, 4))], b"bytes", "no", None]),
+        "kinds": [dice.choice(_SCALARS) for _ in range(dice.randint(0, 4))],
+        "grid": dice.choice([[[1, 2], [], [2**31 - 1]], [[dice.choice(_SCALARS)], None], [3], {}]),
         "inner": dice.choice([{"class": dice.choice(_SCALARS), "self": dice.choice(_SCALARS)}, None, 3]),
     }
     kept = {name: value for name, value in fields.items() if dice.random() < 0.9}

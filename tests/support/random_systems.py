@@ -31,6 +31,8 @@ from robosc.expressions import (
     Binary,
     BinaryOperator,
     BooleanType,
+    Call,
+    Conditional,
     Constant,
     EnumType,
     EnumValue,
@@ -142,7 +144,8 @@ class _Builder:
         read = {(edge.event, leaf) for automaton in automata for edge in automaton.edges for leaf in _paths(edge)}
         inputs = tuple(item for item in self.inputs if (item.event, item.path) in read)
         conditions = tuple(condition for event in self.events for condition in self._event_conditions(event))
-        return System("random", self.events, automata, inputs, conditions)
+        invariants = (Binary("or", self._condition(), self._condition()),) if self._chance(0.25) else ()
+        return System("random", self.events, automata, inputs, conditions, invariants)
 
     def _automaton(self, name: str, alphabet: list[Event]) -> Automaton:
         locations = self.locations[name]
@@ -209,6 +212,15 @@ class _Builder:
 
     def _arithmetic(self, own: VariableRead) -> Expression:
         others = [VariableRead(*v) for v, type_ in self.variables.items() if isinstance(type_, IntegerType)]
+        shape = self.random.randrange(6)
+        if shape == 0:
+            return Call("clamp", (self._count(own), Constant(-1), Constant(2)))
+        if shape == 1:
+            return Conditional(self._condition(), self._count(own), Call("abs", (self.random.choice(others),)))
+        if shape == 2:
+            return Call(self.random.choice(("min", "max")), (own, self.random.choice(others)))
+        if shape == 3:
+            return Call("integer", (Binary("/", own, self.random.choice(others)),))
         return Binary(self.random.choice(("+", "-", "*")), own, self.random.choice(others))
 
     def _constant(self, type_: Type) -> Expression:

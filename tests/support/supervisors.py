@@ -26,6 +26,7 @@ from robosc.model.structure import (
     EnumDefinition,
     EnumRule,
     Interface,
+    Invariant,
     Model,
     ObjectDefinition,
     ObjectValue,
@@ -83,6 +84,7 @@ def model() -> Model:
             ),
             Provide("move", ObjectValue(()), None),
         ),
+        invariants=(Invariant(True, Binary(">", VariableRead("Base", "failures"), Constant(3))),),
     )
 
 

@@ -55,6 +55,7 @@ def _info(model: Model, communication: Communication) -> CommunicationInfo:
         interface=interface.type if interface else None,
         requirement_count=len(requirements),
         conjunct_count=sum(len(conjuncts(item.condition)) for item in requirements),
+        max_age_s=communication.max_age,
     )
 
 

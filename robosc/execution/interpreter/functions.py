@@ -2,20 +2,28 @@
 
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any, assert_never
 
 from robosc.expressions import (
+    ArrayPart,
     Binary,
+    Call,
+    Conditional,
     Constant,
+    Element,
     EnumValue,
     Expression,
     PathStep,
+    Quantifier,
     Received,
+    Reduction,
     StateTest,
     Unary,
     Value,
     VariableRead,
 )
-from robosc.expressions.evaluate import BINARY, UNARY
+from robosc.expressions.evaluate import BINARY, CALL, QUANTIFIER, REDUCTION, UNARY
+from robosc.expressions.values import array_part, conditional, part_at
 from robosc.supervisor.structure import DecisionDiagram, DecisionNode
 
 Place = tuple[str, str | None]
@@ -25,20 +33,31 @@ State = Mapping[Place, Value]
 
 Path = tuple[PathStep, ...]
 
-Data = Callable[[Path], Value | None]
-"""Received data by path; None where it is unknown."""
+Data = Callable[[Path], Any]
+"""Received data by path; None where it is unknown. Arrays are lists, and objects in them mappings."""
 
-Function = Callable[[State, Data], Value | None]
+Elements = tuple[Any, ...]
+"""What the quantifiers around an expression look at, the innermost first."""
+
+Function = Callable[[State, Data], Any]
 """The value of an expression; None where it is unknown."""
 
+Inner = Callable[[State, Data, Elements], Any]
+"""The same, of a part inside quantifiers."""
 
-def no_data(path: Path) -> Value | None:
+
+def no_data(path: Path) -> Any:
     """Nothing was received."""
     return None
 
 
 def function_of(expression: Expression) -> Function:
     """An expression as a function, built once so that it need not be taken apart again."""
+    inner = _inner(expression)
+    return lambda state, data: inner(state, data, ())
+
+
+def _inner(expression: Expression) -> Inner:
     # A long chain of operators leans to the left: it is as deep as it is long, so a loop goes down there.
     chain: list[Binary] = []
     node = expression
@@ -48,34 +67,61 @@ def function_of(expression: Expression) -> Function:
     first = _operand(node)
     if not chain:
         return first
-    steps = [(BINARY[item.operator], function_of(item.right)) for item in reversed(chain)]
+    steps = [(BINARY[item.operator], _inner(item.right)) for item in reversed(chain)]
 
-    def value(state: State, data: Data) -> Value | None:
-        result = first(state, data)
+    def value(state: State, data: Data, elements: Elements) -> Any:
+        result = first(state, data, elements)
         for apply, right in steps:
-            result = apply(result, right(state, data))
+            result = apply(result, right(state, data, elements))
         return result
 
     return value
 
 
-def _operand(expression: Expression) -> Function:
+def _operand(expression: Expression) -> Inner:
     match expression:
         case Constant(value=value) | EnumValue(value=value):
-            return lambda state, data: value
+            return lambda state, data, elements: value
         case VariableRead(component=component, variable=variable):
             place = (component, variable)
-            return lambda state, data: state[place]
+            return lambda state, data, elements: state[place]
         case StateTest(component=component, state=location):
             home = (component, None)
-            return lambda state, data: state[home] == location
+            return lambda state, data, elements: state[home] == location
         case Received(path=path):
-            return lambda state, data: data(path)
+            return lambda state, data, elements: data(path)
+        case Element(level=level, path=path):
+            return lambda state, data, elements: part_at(elements[level], path)
         case Unary(operator=operator, operand=operand):
-            apply, inner = UNARY[operator], function_of(operand)
-            return lambda state, data: apply(inner(state, data))
+            apply, inner = UNARY[operator], _inner(operand)
+            return lambda state, data, elements: apply(inner(state, data, elements))
         case Binary():
-            return function_of(expression)
+            return _inner(expression)
+        case Conditional(condition=condition, then=then, otherwise=otherwise):
+            return _call(conditional, [_inner(item) for item in (condition, then, otherwise)])
+        case Call(function=name, arguments=arguments):
+            return _call(CALL[name], [_inner(item) for item in arguments])
+        case Reduction(function=name, part=part):
+            return _reduction(REDUCTION[name], _inner(part.array), part)
+        case Quantifier(word=word, part=part, condition=condition):
+            return _quantifier(QUANTIFIER[word], _inner(part.array), part, _inner(condition))
+    assert_never(expression)
+
+
+def _call(apply: Callable[..., Any], arguments: list[Inner]) -> Inner:
+    return lambda state, data, elements: apply(*[item(state, data, elements) for item in arguments])
+
+
+def _reduction(apply: Callable[[Any], Any], array: Inner, part: ArrayPart) -> Inner:
+    return lambda state, data, elements: apply(array_part(array(state, data, elements), part.low, part.high))
+
+
+def _quantifier(apply: Callable[[Any, Any], Any], array: Inner, part: ArrayPart, condition: Inner) -> Inner:
+    def value(state: State, data: Data, elements: Elements) -> Any:
+        found = array_part(array(state, data, elements), part.low, part.high)
+        return apply(found, lambda element: condition(state, data, (element, *elements)))
+
+    return value
 
 
 def holds(function: Function, state: State) -> bool:

@@ -14,7 +14,6 @@ from robosc.expressions import (
     ObjectType,
     StringType,
     Type,
-    Value,
     values,
 )
 from robosc.model.structure import EnumDefinition, Model
@@ -41,7 +40,8 @@ class Reader:
         found = {path: datum.value(path) for path in paths}
         return Reading(
             values=found,
-            data={path_text(path): value for path, value in found.items()},
+            # Arrays can be long, and what is made of them is logged anyway.
+            data={path_text(path): value for path, value in found.items() if not datum.is_array(path)},
             unknown=tuple(datum.unknown),
             enum_unknown=datum.enum_unknown,
         )
@@ -55,6 +55,10 @@ class Reader:
                 return element
             case _:
                 return None
+
+    def properties(self, name: str) -> Mapping[str, Type]:
+        """The properties of an object, by name."""
+        return self._properties[name]
 
     def enum(self, name: str) -> "_CompiledEnum":
         """The definition of an enum."""
@@ -82,11 +86,11 @@ class _Datum:
         self._reader = reader
         self._root = root
         self._raw = raw
-        self._known: dict[Path, Value | None] = {}
+        self._known: dict[Path, Any] = {}
         self.unknown: list[str] = []
         self.enum_unknown = False
 
-    def value(self, path: Path) -> Value | None:
+    def value(self, path: Path) -> Any:
         """The value at a path, or None where it is unknown; each path is converted once."""
         if path not in self._known:
             raw, type_ = self._raw, self._root
@@ -95,18 +99,33 @@ class _Datum:
             self._known[path] = self._convert(raw, type_, path)
         return self._known[path]
 
-    def _convert(self, raw: Any, type_: Type | None, path: Path) -> Value | None:
+    def is_array(self, path: Path) -> bool:
+        """Whether there is an array at a path."""
+        type_ = self._root
+        for step in path:
+            type_ = self._reader.step(type_, step)
+        return isinstance(type_, ArrayType)
+
+    def _convert(self, raw: Any, type_: Type | None, path: Path) -> Any:
         match type_:
+            case ArrayType(element=element):
+                elements = whole_array(raw)
+                if elements is None:
+                    return None
+                return [self._convert(item, element, (*path, index)) for index, item in enumerate(elements)]
+            case ObjectType(name=name):
+                parts = self._reader.properties(name)
+                return {part: self._convert(_part(raw, part), inner, (*path, part)) for part, inner in parts.items()}
             case BooleanType():
-                return values.read_boolean(raw)  # type: ignore[no-any-return]
+                return values.read_boolean(raw)
             case IntegerType(low=int(low), high=int(high)):
                 return self._in_range(values.read_whole(raw), low, high, path)
             case IntegerType():
-                return values.read_integer(raw)  # type: ignore[no-any-return]
+                return values.read_integer(raw)
             case DoubleType():
-                return values.read_double(raw)  # type: ignore[no-any-return]
+                return values.read_double(raw)
             case StringType():
-                return values.read_string(raw)  # type: ignore[no-any-return]
+                return values.read_string(raw)
             case EnumType(name=name):
                 return self._enum_value(raw, self._reader.enum(name), path)
             case _:
@@ -136,6 +155,15 @@ class _Datum:
         if was_unknown:
             self.unknown.append(f"{path_text(path)} is {value} by default: an earlier rule is unknown")
         return value
+
+
+def whole_array(raw: Any) -> list[Any] | None:
+    """The elements of a received array; None where something else came."""
+    try:
+        return values.array_part(raw)  # type: ignore[no-any-return]
+    except Exception:
+        # As below.
+        return None
 
 
 def _part(raw: Any, step: str | int) -> Any:

@@ -10,7 +10,7 @@ unknown. Whether an integer result can leave 32 bits is decided by interval arit
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import assert_never
 
@@ -18,20 +18,28 @@ from robosc.errors import InternalError
 from robosc.expressions import (
     MAXIMUM_INTEGER,
     MINIMUM_INTEGER,
+    ArrayPart,
+    ArrayType,
     Binary,
     BooleanType,
+    Call,
+    Conditional,
     Constant,
     DoubleType,
+    Element,
     EnumValue,
     Expression,
     IntegerType,
     PathStep,
+    Quantifier,
     Received,
+    Reduction,
     StateTest,
     Type,
     Unary,
     VariableRead,
 )
+from robosc.expressions.bounds import call_bounds
 
 
 class Precedence(Enum):
@@ -103,12 +111,18 @@ class Scope:
         location: Text of an automaton's current location.
         received: The code that reads received data of a path.
         used: Called with the name of each function of `values` that the code needs.
+        received_type: The type of received data of a path.
+        type_below: The type of a part of a type.
+        elements: Local name and type of what the quantifiers around look at, the innermost first.
     """
 
     variable: Callable[[str, str], tuple[str, Type]]
     location: Callable[[str], str]
     received: Callable[[tuple[PathStep, ...]], Code]
     used: Callable[[str], None]
+    received_type: Callable[[tuple[PathStep, ...]], Type]
+    type_below: Callable[[Type, tuple[PathStep, ...]], Type]
+    elements: tuple[tuple[str, Type], ...] = ()
 
 
 _KLEENE = {
@@ -171,7 +185,100 @@ def value(expression: Expression, scope: Scope) -> Code:
             return _negate(value(operand, scope), scope)
         case Binary(operator=operator, left=left, right=right):
             return _binary(operator, value(left, scope), value(right, scope), right, scope)
+        case Conditional(condition=condition, then=then, otherwise=otherwise):
+            return _conditional(value(condition, scope), value(then, scope), value(otherwise, scope), scope)
+        case Call(function=function, arguments=arguments):
+            return _function(function, [value(item, scope) for item in arguments], scope)
+        case Element(level=level, path=path):
+            return _element(level, path, scope)
+        case Reduction(function=function, part=part):
+            return _reduction(function, part, scope)
+        case Quantifier():
+            return _quantifier(expression, scope)
     raise InternalError(f"no Python for {expression!r}")
+
+
+def _conditional(condition: Code, then: Code, otherwise: Code, scope: Scope) -> Code:
+    """A conditional expression; both branches are pure, so it does not matter whether both are worked out."""
+    unknown = then.unknown if then.unknown is otherwise.unknown else Unknown.NONE
+    low, high = min(then.low, otherwise.low), max(then.high, otherwise.high)
+    if condition.unknown is Unknown.NEVER:
+        text = f"({then.text} if {condition.text} else {otherwise.text})"
+        return Code(text, Precedence.ATOM, then.sort, unknown, low, high)
+    code = _call("conditional", condition, then, otherwise, sort=then.sort, scope=scope)
+    return replace(code, low=low, high=high)
+
+
+_FUNCTIONS = {
+    "abs": "absolute",
+    "min": "minimum",
+    "max": "maximum",
+    "clamp": "clamp",
+    "integer": "to_integer",
+    "double": "to_double",
+}
+
+
+def _function(function: str, arguments: list[Code], scope: Scope) -> Code:
+    """A function of numbers: known wherever its arguments are, unless an absolute value leaves 32 bits."""
+    sort = {"integer": Sort.INTEGER, "double": Sort.DOUBLE}.get(function, arguments[0].sort)
+    code = _call(_FUNCTIONS[function], *arguments, sort=sort, scope=scope)
+    low, high = MINIMUM_INTEGER, MAXIMUM_INTEGER
+    if function == "integer" and arguments[0].sort is Sort.INTEGER:
+        low, high = arguments[0].low, arguments[0].high
+    elif function != "double" and all(item.sort is Sort.INTEGER for item in arguments):
+        low, high = call_bounds(function, [(item.low, item.high) for item in arguments])
+    is_known = all(item.unknown is Unknown.NEVER for item in arguments) and high <= MAXIMUM_INTEGER
+    unknown = Unknown.NEVER if is_known else Unknown.NONE
+    return replace(code, unknown=unknown, low=low, high=min(high, MAXIMUM_INTEGER))
+
+
+def _element(level: int, path: tuple[PathStep, ...], scope: Scope) -> Code:
+    """A converted element of an array, or a part of it; None where it is unknown."""
+    name, type_ = scope.elements[level]
+    text = name
+    for step in path:
+        function = "read_element" if isinstance(step, int) else "read_property"
+        scope.used(function)
+        text = f"{function}({text}, {step!r})"
+    return code_for(text, scope.type_below(type_, path), Unknown.NONE)
+
+
+def _array(part: ArrayPart, scope: Scope) -> tuple[str, Type]:
+    """Text of the elements that are looked at, and their type."""
+    match part.array:
+        case Received(path=path):
+            text, type_ = scope.received(path).text, scope.received_type(path)
+        case Element(level=level, path=path):
+            text, type_ = _element(level, path, scope).text, scope.type_below(scope.elements[level][1], path)
+    if not isinstance(type_, ArrayType):
+        raise InternalError(f"{text} is no array")
+    if part.low is not None:
+        scope.used("array_part")
+        text = f"array_part({text}, {part.low}, {part.high})"
+    return text, type_.element
+
+
+_REDUCTIONS = {"length": "array_length", "min": "least", "max": "greatest"}
+
+
+def _reduction(function: str, part: ArrayPart, scope: Scope) -> Code:
+    text, element = _array(part, scope)
+    scope.used(_REDUCTIONS[function])
+    call = f"{_REDUCTIONS[function]}({text})"
+    if function == "length":
+        return Code(call, sort=Sort.INTEGER, unknown=Unknown.NONE, low=0)
+    return code_for(call, element, Unknown.NONE)
+
+
+def _quantifier(expression: Quantifier, scope: Scope) -> Code:
+    text, element = _array(expression.part, scope)
+    name = f"x{len(scope.elements) + 1}"
+    inner = replace(scope, elements=((name, element), *scope.elements))
+    function = f"{expression.word}_of"
+    scope.used(function)
+    condition = value(expression.condition, inner)
+    return Code(f"{function}({text}, lambda {name}: {condition.text})", unknown=Unknown.NONE)
 
 
 def truth(expression: Expression, scope: Scope) -> Code:

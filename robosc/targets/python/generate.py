@@ -16,7 +16,10 @@ from robosc.targets.python.text import indent, printable
 from robosc.targets.python.writer import Writer, make_writer
 
 _READING_FUNCTIONS = frozenset(
-    {"clamped", "element", "integer", "known", "member", "moved", "number", "number_at", "stays_in_range", "whole"}
+    """
+    clamped element elements flag_of integer known member moved noted_enum noted_integer number number_at
+    plain_elements stays_in_range whole words_of
+    """.split()
 )
 
 OLDEST_PYTHON = (3, 8)

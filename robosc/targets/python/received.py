@@ -6,6 +6,7 @@ from robosc.errors import InternalError
 from robosc.expressions import (
     ArrayType,
     BooleanType,
+    Call,
     DoubleType,
     EnumType,
     Expression,
@@ -35,6 +36,14 @@ from robosc.targets.python.naming import Namer
 from robosc.targets.python.text import comment, indent
 
 Path = tuple[PathStep, ...]
+
+_PLAIN: dict[type, str] = {
+    DoubleType: "read_double",
+    IntegerType: "read_integer",
+    BooleanType: "read_boolean",
+    StringType: "read_string",
+}
+"""Functions of `values` that convert an element about which there is nothing to note."""
 
 
 def path_text(path: Path) -> str:
@@ -83,6 +92,14 @@ class Reader:
         if path not in self._codes:
             self._codes[path] = self._read(path, path_type(self.layout.model, self.root_type, path))
         return self._codes[path]
+
+    def type_at(self, path: Path) -> Type:
+        """The type of a path."""
+        return path_type(self.layout.model, self.root_type, path)
+
+    def type_below(self, type_: Type, path: Path) -> Type:
+        """The type of a part of a type."""
+        return path_type(self.layout.model, type_, path)
 
     def seen(self, path: Path) -> str:
         """Text of a path's value as the event log shows it: as it came, None where nothing fitting came."""
@@ -144,7 +161,51 @@ class Reader:
                 return self._assign(path, type_, self._call("read_string", self._access(path)), Unknown.NONE)
             case EnumType(name=enum):
                 return self._read_enum(path, type_, enum)
+            case ArrayType(element=element):
+                return self._read_array(path, type_, element)
         raise InternalError(f"{path_text(path)} is no single value")
+
+    def _read_array(self, path: Path, type_: Type, element: Type) -> Code:
+        plain = _PLAIN.get(type(element))
+        if isinstance(element, IntegerType) and element.is_bounded:
+            plain = None
+        if plain is not None:
+            self.used.add(plain)
+            text = self._call("plain_elements", self._access(path), plain)
+            return self._assign(path, type_, text, Unknown.NONE)
+        notes = self._local(path, "_notes")
+        self._lines.append(f"{notes} = []")
+        convert = f"lambda item, path, notes: {self._element(element, 'item', 'path', 1)}"
+        code = self._assign(
+            path, type_, self._call("elements", self._access(path), repr(path_text(path)), notes, convert), Unknown.NONE
+        )
+        self.words.append(self._call("words_of", notes))
+        self.enum_flags.append(self._call("flag_of", notes))
+        return code
+
+    def _element(self, type_: Type, raw: str, path: str, depth: int) -> str:
+        """Text that converts one element of an array, given the texts of it and of its path in words."""
+        match type_:
+            case IntegerType(low=int(low), high=int(high)):
+                return self._call("noted_integer", raw, path, "notes", repr(low), repr(high))
+            case EnumType(name=enum):
+                return self._call("noted_enum", f"{self.layout.converters[enum]}({raw}, {path})", "notes")
+            case ObjectType(name=name):
+                parts = [
+                    f"{item.name!r}: "
+                    + self._element(
+                        item.type, self._call("member", raw, repr(item.name)), f"{path} + {f'.{item.name}'!r}", depth
+                    )
+                    for item in self.layout.model.object(name).properties
+                ]
+                return f"{{{', '.join(parts)}}}"
+            case ArrayType(element=element):
+                inner = self._element(element, f"item{depth}", f"path{depth}", depth + 1)
+                convert = f"lambda item{depth}, path{depth}, notes: {inner}"
+                return self._call("elements", raw, path, "notes", convert)
+            case _:
+                plain = _PLAIN.get(type(type_))
+                return "None" if plain is None else self._call(plain, raw)
 
     def _read_enum(self, path: Path, type_: Type, enum: str) -> Code:
         name, words, flag = self._local(path), self._local(path, "_words"), self._local(path, "_unknown")
@@ -163,7 +224,7 @@ class Reader:
 def converter(layout: Layout, enum: EnumDefinition, used: set[str]) -> list[str]:
     """The function that makes an enum out of received data, as a readable chain of conditions."""
     reader = Reader(layout, enum.source, used)
-    scope = Scope(_no_variable, _no_location, reader.read, used.add)
+    scope = Scope(_no_variable, _no_location, reader.read, used.add, reader.type_at, reader.type_below)
     body: list[str] = []
     all_false = TRUE_CODE
     for rule in enum.rules:
@@ -203,7 +264,7 @@ def _may_be_unknown(conditions: list[Expression]) -> bool:
     stack = list(conditions)
     while stack:
         node = stack.pop()
-        if isinstance(node, Received) or getattr(node, "operator", None) in _ARITHMETIC:
+        if isinstance(node, Received | Call) or getattr(node, "operator", None) in _ARITHMETIC:
             return True
         stack.extend(children(node))
     return False

@@ -10,6 +10,7 @@ from robosc.automata.plants import communication_plant_name
 from robosc.expressions import (
     MAXIMUM_INTEGER,
     MINIMUM_INTEGER,
+    ArrayType,
     BooleanType,
     DoubleType,
     Expression,
@@ -44,7 +45,7 @@ def read_method(writer: Writer, event: str) -> list[str]:
         return [*head, f"    {docstring(f'{event}: nothing of its data is converted.')}", "    return NO_DATA"]
     reader = Reader(writer.layout, _event_type(writer, event), writer.used)
     codes = [reader.read(path) for path in paths]
-    entries = ", ".join(f"{path_text(path)!r}: {reader.seen(path)}" for path in paths)
+    entries = ", ".join(f"{path_text(path)!r}: {reader.seen(path)}" for path in paths if not _is_array(reader, path))
     values = "".join(f"{code.text}, " for code in codes).strip()
     words, flags = " + ".join(reader.words) or "()", " or ".join(reader.enum_flags) or "False"
     return [
@@ -53,6 +54,11 @@ def read_method(writer: Writer, event: str) -> list[str]:
         *indent(reader.take_lines()),
         f"    return Reading(({values}), {{{entries}}}, {words}, {flags})",
     ]
+
+
+def _is_array(reader: Reader, path: Path) -> bool:
+    """Whether a path leads to an array: those can be long, so they are not logged."""
+    return isinstance(reader.type_at(path), ArrayType)
 
 
 def _event_type(writer: Writer, event: str) -> Type:
@@ -78,7 +84,9 @@ class _StepWriter:
         self.received: dict[Path, Code] = {}
         self.copies: dict[str, str] = {}
         self.may_skip = False
-        self.scope = Scope(self._variable, self._location, self._received, writer.used.add)
+        self.scope = Scope(
+            self._variable, self._location, self._received, writer.used.add, self._received_type, self._type_below
+        )
         self._protocol = _protocol(writer, event)
 
     def method(self) -> list[str]:
@@ -185,6 +193,12 @@ class _StepWriter:
     def _received(self, path: tuple[PathStep, ...]) -> Code:
         return self.received[path]
 
+    def _received_type(self, path: Path) -> Type:
+        return path_type(self.writer.model, _event_type(self.writer, self.event), path)
+
+    def _type_below(self, type_: Type, path: Path) -> Type:
+        return path_type(self.writer.model, type_, path)
+
     def _block(self, component: str, behaviour: Behaviour, branches: list[_Branch]) -> list[str]:
         """What one component does."""
         lines: list[str] = []
@@ -274,7 +288,7 @@ def received_unknown(type_: Type) -> Unknown:
     match type_:
         case DoubleType() | IntegerType():
             return Unknown.NAN
-        case BooleanType() | StringType():
+        case BooleanType() | StringType() | ArrayType():
             return Unknown.NONE
         case _:
             return Unknown.NEVER

@@ -17,6 +17,10 @@ def _no_received(path: Sequence[PathStep]) -> Code:
     raise InternalError("a condition on the state reads received data")
 
 
+def _no_type(*path: object) -> Type:
+    raise InternalError("a condition on the state looks into an array")
+
+
 @dataclass(slots=True)
 class Writer:
     """The state of one run of the generator.
@@ -36,7 +40,7 @@ class Writer:
     diagrams: Diagrams = field(init=False)
 
     def __post_init__(self) -> None:
-        self.scope = Scope(self._variable, self._location, _no_received, self.used.add)
+        self.scope = Scope(self._variable, self._location, _no_received, self.used.add, _no_type, _no_type)
         self.diagrams = Diagrams(self.system, self.scope)
 
     @property

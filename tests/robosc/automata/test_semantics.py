@@ -335,7 +335,7 @@ def _some_states(subject: Semantics, count: int) -> list[State]:
 def test_agrees_with_the_naive_reading_of_the_definition(drawn: System) -> None:
     subject, naive = Semantics(drawn), _Naive(drawn)
     for at in _some_states(subject, 12):
-        is_bad = False
+        is_bad = not all(naive.evaluate(item, at, {}) is True for item in drawn.invariants)
         for event in drawn.events:
             targets, leaves_range = naive.step(at, event.name)
             conditions = [item.condition for item in drawn.conditions if item.event == event.name]

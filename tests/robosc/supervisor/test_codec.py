@@ -3,7 +3,6 @@ import json
 import random
 import re
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -14,14 +13,12 @@ from hypothesis import strategies as st
 from robosc.automata import to_automata
 from robosc.errors import InvalidSupervisorError, UnsupportedModelError
 from robosc.expressions import TRUE, Constant, Unary
-from robosc.language import load_bundle
 from robosc.model.structure import Deployment, Requirement, RequirementForm
 from robosc.supervisor.codec import MAXIMUM_BYTES, MAXIMUM_EXPRESSION_DEPTH, decode, encode
 from robosc.supervisor.make import make_supervisor
 from robosc.supervisor.structure import Supervisor
+from support.models import EXAMPLE_DEPLOYMENTS, example_bundle
 from support.supervisors import supervisor
-
-EXAMPLES = sorted((Path(__file__).parents[3] / "examples").glob("*/*.rscd"))
 
 
 @cache
@@ -77,10 +74,9 @@ class TestRoundTrip:
         assert decode(encode(made)) == made
 
 
-@pytest.mark.parametrize("model", EXAMPLES, ids=lambda path: path.stem)
-@pytest.mark.parametrize("deployment", list(Deployment))
-def test_made_supervisors_there_and_back(model: Any, deployment: Any) -> None:
-    made = make_supervisor(load_bundle(model), deployment=deployment).supervisor
+@pytest.mark.parametrize(("name", "deployment"), EXAMPLE_DEPLOYMENTS)
+def test_made_supervisors_there_and_back(name: str, deployment: Deployment) -> None:
+    made = make_supervisor(example_bundle(name), deployment=deployment).supervisor
     assert made is not None
     assert decode(encode(made)) == made
     assert encode(decode(encode(made))) == encode(made)

@@ -12,7 +12,7 @@ from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.structure import AddedCondition, DecisionDiagram
 from robosc.synthesis import SynthesisResult, synthesize
 from robosc.verification import verify
-from support.models import EXAMPLE_NAMES, bundle_of, example_bundle
+from support.models import EXAMPLE_DEPLOYMENTS, bundle_of, example_bundle
 
 COUNTER = """robot Counter {
     component C {
@@ -28,8 +28,7 @@ COUNTER = """robot Counter {
 }"""
 
 
-@pytest.mark.parametrize("name", EXAMPLE_NAMES)
-@pytest.mark.parametrize("deployment", list(Deployment))
+@pytest.mark.parametrize(("name", "deployment"), EXAMPLE_DEPLOYMENTS)
 def test_the_examples_get_a_certified_supervisor(name: str, deployment: Deployment) -> None:
     bundle = example_bundle(name)
     made = make_supervisor(bundle, deployment=deployment)

@@ -28,6 +28,61 @@ def element(array: Any, index: int) -> Any:
         return None
 
 
+def array(value: Any) -> Any:
+    """The elements of a received array; None where something else came."""
+    try:
+        return values.array_part(value)
+    except Exception:  # As above.
+        return None
+
+
+def elements(value: Any, path: str, notes: Any, convert: Any) -> Any:
+    """A received array with every element converted; None where something else came.
+
+    Args:
+        value: What was received.
+        path: Where it was, in words.
+        notes: A list that takes what was unknown, as texts and a flag.
+        convert: Takes an element, its path and the notes.
+    """
+    found = array(value)
+    if found is None:
+        return None
+    return [convert(item, f"{path}[{index}]", notes) for index, item in enumerate(found)]
+
+
+def plain_elements(value: Any, convert: Any) -> Any:
+    """The same where there is nothing to note: `convert` takes an element alone."""
+    found = array(value)
+    return None if found is None else [convert(item) for item in found]
+
+
+def noted_integer(value: Any, path: str, notes: Any, low: int, high: int) -> Any:
+    """A received integer moved into its declared range, noted if it was; None where something else came."""
+    value = values.read_whole(value)
+    if value is None:
+        return None
+    notes.append((moved(path, value, low, high), False))
+    return clamped(value, low, high)
+
+
+def noted_enum(converted: Any, notes: Any) -> Any:
+    """The value of an enum from what its converter returned; what was unknown is noted."""
+    value, words, is_unknown = converted
+    notes.append((words, is_unknown))
+    return value
+
+
+def words_of(notes: Any) -> Any:
+    """Every text that was noted."""
+    return tuple(text for texts, _ in notes for text in texts)
+
+
+def flag_of(notes: Any) -> bool:
+    """Whether an enum fell to its default past an unknown rule."""
+    return any(flag for _, flag in notes)
+
+
 def number(value: Any) -> Any:
     """A received number as a double; NaN where something else came."""
     if type(value) is float:

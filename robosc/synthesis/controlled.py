@@ -1,0 +1,198 @@
+"""What is asked about the controlled system, answered on predicates: no state is ever looked at by itself."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+from robosc.expressions import Expression
+from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.fixed_point import FixedPoint, Problem, allowed, safe_states
+from robosc.synthesis.questions import Answers, Cause, Questions, Restriction, Together
+from robosc.synthesis.runs import ShortestRuns
+from robosc.synthesis.symbolic import Symbols
+from robosc.synthesis.transitions import Steps
+from robosc.synthesis.watch import Watch
+
+MAXIMUM_TOGETHER = 100
+"""Pairs of rivals that are told: a hundred requests on one identifier make thousands, which would tell nothing new."""
+
+
+class ControlledSystem:
+    """The system under its supervisor.
+
+    Args:
+        encoding: The variables.
+        watch: Who waits.
+        problem: What was solved.
+        good: Its good states.
+        reachable: States of the controlled system.
+    """
+
+    def __init__(self, encoding: Encoding, watch: Watch, problem: Problem, good: Any, reachable: Any) -> None:
+        self._encoding = encoding
+        self._manager = encoding.manager
+        self._watch = watch
+        self._problem = problem
+        self._good = good
+        self._reachable = reachable
+        self._symbols = Symbols(encoding)
+        self._steps = {steps.event.name: steps for steps in problem.steps}
+        self._known: dict[str, Any] = {}
+
+    def answers(self, questions: Questions) -> Answers:
+        """The answers to some questions.
+
+        Raises:
+            SynthesisCancelled: The work is to end.
+            KeyError: A question names an event that there is not.
+            ValueError: A restriction has a condition or an invariant that the system has not.
+        """
+        return Answers(
+            never=tuple(self._never(questions.events)),
+            unused=self._unused(questions.restrictions),
+            together=self._together(questions.rivals),
+        )
+
+    def _possible(self, event: str) -> Any:
+        """The states of the controlled system in which an event can happen."""
+        found = self._known.get(event)
+        if found is None:
+            self._watch.check_stop()
+            steps = self._steps[event]
+            found = self._known[event] = self._reachable & steps.plant & allowed(steps, self._good)
+        return found
+
+    def _never(self, events: Iterable[str]) -> Iterator[tuple[str, Cause]]:
+        for event in events:
+            if self._possible(event) == self._manager.false:
+                yield event, self._cause(self._steps[event])
+
+    def _cause(self, steps: Steps) -> Cause:
+        enabled = self._reachable & steps.plant
+        if enabled == self._manager.false:
+            return Cause.PLANT
+        return Cause.REQUIREMENT if enabled & steps.condition == self._manager.false else Cause.SUPERVISOR
+
+    # Restrictions
+
+    def _unused(self, restrictions: Sequence[Restriction]) -> tuple[int, ...]:
+        """Those that forbid nothing in any state of the controlled system, nor anywhere that synthesis looks ahead to.
+
+        What a restriction forbids in states beyond can make these states bad, so that synthesis keeps away from
+        them: then the system would do more without it, although it never shows itself. All that are named can go
+        together; of two that could stand in for each other the later one is named.
+        """
+        candidates = tuple(place for place, item in enumerate(restrictions) if not self._restricts(item))
+        if not self._supervisor_disables():
+            # Nothing lies beyond: what can be reached is what plants and conditions let happen.
+            return candidates
+        found = self._removable(restrictions, [item for item in candidates if not restrictions[item].invariants], [])
+        for place in reversed(candidates):
+            # Invariants always are candidates, but mostly needed: to try several at once would be in vain.
+            if restrictions[place].invariants:
+                found = self._removable(restrictions, [place], found)
+        return tuple(sorted(found))
+
+    def _restricts(self, restriction: Restriction) -> bool:
+        """Whether, in a state of the controlled system, the plant enables an event and a condition is not true."""
+        condition, broken = None, self._manager.false
+        for item in (*restriction.conditions, *restriction.watched):
+            # What one requirement brings is mostly one condition on many events.
+            if item.condition is not condition:
+                condition, broken = item.condition, self._reachable & ~self._holds(item.condition)
+            if broken & self._steps[item.event].plant != self._manager.false:
+                return True
+        return False
+
+    def _holds(self, condition: Expression) -> Any:
+        self._watch.check_stop()
+        return self._symbols.holds(condition)
+
+    def _supervisor_disables(self) -> bool:
+        return any(
+            self._reachable & steps.plant & steps.condition & ~self._possible(name) != self._manager.false
+            for name, steps in self._steps.items()
+            if steps.event.is_controllable
+        )
+
+    def _removable(self, restrictions: Sequence[Restriction], more: list[int], removed: list[int]) -> list[int]:
+        """What can go and nothing changes: what is removed already, and of `more` what can go beside, later ones first.
+
+        Where all of them can go together, each can: the less is forbidden, the more is allowed. Else they are tried
+        by halves.
+        """
+        if not more or self._is_the_same_without([restrictions[place] for place in (*removed, *more)]):
+            return [*removed, *more]
+        middle = len(more) // 2
+        if middle == 0:
+            return removed
+        return self._removable(restrictions, more[:middle], self._removable(restrictions, more[middle:], removed))
+
+    def _is_the_same_without(self, restrictions: Sequence[Restriction]) -> bool:
+        """Whether the controlled system of the problem without some restrictions allows nothing more."""
+        problem = self._without(restrictions)
+        good = FixedPoint(self._encoding, self._watch).good_states(problem, known=self._good)
+        return all(
+            self._reachable & steps.plant & allowed(steps, good.states) == self._possible(steps.event.name)
+            for steps in problem.steps
+        )
+
+    def _without(self, restrictions: Sequence[Restriction]) -> Problem:
+        """The problem without some restrictions; what they are watched for stays as it is."""
+        system = self._encoding.system
+        dropped = set[int]().union(*(_places(item.conditions, system.conditions) for item in restrictions))
+        touched = {system.conditions[place].event for place in dropped}
+        left = [item for place, item in enumerate(system.conditions) if place not in dropped]
+
+        def under_what_is_left(steps: Steps) -> Steps:
+            conditions = [item.condition for item in left if item.event == steps.event.name]
+            return steps.under(self._encoding.all_of(self._holds(condition) for condition in conditions))
+
+        steps = tuple(
+            under_what_is_left(steps) if steps.event.name in touched else steps for steps in self._problem.steps
+        )
+        dropped = set[int]().union(*(_places(item.invariants, system.invariants) for item in restrictions))
+        invariants = [item for place, item in enumerate(system.invariants) if place not in dropped]
+        return Problem(steps, safe_states(self._encoding, invariants) if dropped else self._problem.safe)
+
+    # Rivals
+
+    def _together(self, groups: Iterable[Sequence[str]]) -> tuple[Together, ...]:
+        pairs = list(self._pairs(groups))
+        if not pairs:
+            return ()
+        possible = {name: self._reachable & allowed(steps, self._good) for name, steps in self._steps.items()}
+        runs = ShortestRuns(self._encoding, self._watch, self._problem.steps, possible)
+        return tuple(Together(first, second, runs.trace_to(states)) for first, second, states in pairs)
+
+    def _pairs(self, groups: Iterable[Sequence[str]]) -> Iterator[tuple[str, str, Any]]:
+        """Rivals that are possible together, and where: the first `MAXIMUM_TOGETHER` of them."""
+        count = 0
+        for group in groups:
+            earlier = self._manager.false
+            for number, second in enumerate(group):
+                here = self._possible(second)
+                # One look tells whether there is any at all: of most groups no two are ever possible together.
+                rivals = group[:number] if here & earlier != self._manager.false else ()
+                for first in rivals:
+                    both = here & self._possible(first)
+                    if both != self._manager.false:
+                        yield first, second, both
+                        count += 1
+                        if count == MAXIMUM_TOGETHER:
+                            return
+                earlier = earlier | here
+
+
+def _places[Item](wanted: Iterable[Item], items: Sequence[Item]) -> set[int]:
+    """Where some items stand among others, equal ones at different places.
+
+    Raises:
+        ValueError: One is not among them.
+    """
+    found = set[int]()
+    for item in wanted:
+        place = items.index(item)
+        while place in found:
+            place = items.index(item, place + 1)
+        found.add(place)
+    return found

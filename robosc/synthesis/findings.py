@@ -1,0 +1,203 @@
+"""What only synthesis can tell about a model: warnings about what its controlled system never does, or does twice.
+
+- `never-enabled`: an event that can happen in no state of the controlled system. Where a communication can never be
+  requested, that alone is told, not also that nothing ever comes back. A request counts whether or not a behaviour
+  reacts to it: whoever declares it wants it. Cancel counts only where a behaviour reacts to it: else nobody wrote it,
+  and an action whose requirements hold as long as it runs needs none. Resets belong to the protocol and count.
+- `unused-requirement`: a written requirement that never restricts any of its communications. For an action it
+  also restricts where it turns false while the action runs, for then it is a reason to cancel; and any
+  requirement where synthesis keeps away from states because of it, as it does for one that must always hold (or
+  never): what counts is whether the controlled system would do more without it. All that are told can go
+  together. What never is requested is never restricted.
+- `competing-requests`: two communications of one kind (topics, services and actions have name spaces of their own)
+  with one identifier that can be requested in one state, with a shortest run to such a state. Only for the
+  controller: in a layer it is the existing controller that chooses.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import islice
+
+from robosc.automata.structure import EventCondition, System
+from robosc.errors import Diagnostic, RelatedPlace, Severity
+from robosc.model.places import Places
+from robosc.model.structure import (
+    Communication,
+    CommunicationKind,
+    Component,
+    Deployment,
+    EventKind,
+    Model,
+    Requirement,
+    Transition,
+    is_tau,
+)
+from robosc.source import Location
+from robosc.synthesis.questions import Answers, Cause, Questions, Restriction, Together
+
+MAXIMUM_EVENTS = 12
+"""Events of a run that a message shows."""
+
+MAXIMUM_NAMES = 5
+"""Names, and other places, that a message shows."""
+
+
+def questions_about(model: Model, system: System, deployment: Deployment) -> Questions:
+    """What `findings` needs to know about the controlled system of a model's automata."""
+    communications = {item.name: item for item in model.communications}
+    return Questions(
+        events=tuple(event.name for event in system.events),
+        restrictions=(
+            *(_restriction(communications, item) for item in model.requirements),
+            *(Restriction(invariants=(item.condition,)) for item in model.invariants),
+        ),
+        rivals=_rivals(model) if deployment is Deployment.CONTROLLER else (),
+    )
+
+
+def _restriction(communications: Mapping[str, Communication], requirement: Requirement) -> Restriction:
+    restricted = [communications[name] for name in requirement.communications]
+    condition = requirement.condition
+    return Restriction(
+        conditions=tuple(EventCondition(item.event(EventKind.REQUEST), condition) for item in restricted),
+        watched=tuple(
+            EventCondition(item.event(EventKind.CANCEL), condition)
+            for item in restricted
+            if item.kind is CommunicationKind.ACTION
+        ),
+    )
+
+
+def _rivals(model: Model) -> tuple[tuple[str, ...], ...]:
+    """The requests on each identifier, where there are several."""
+    found: dict[tuple[CommunicationKind, str], list[str]] = {}
+    for item in model.communications:
+        if item.kind is not CommunicationKind.OUTGOING_MESSAGE:
+            found.setdefault((item.kind, item.identifier), []).append(item.event(EventKind.REQUEST))
+    return tuple(tuple(group) for group in found.values() if len(group) > 1)
+
+
+def findings(model: Model, places: Places, answers: Answers) -> tuple[Diagnostic, ...]:
+    """The warnings about a model.
+
+    Args:
+        model: The checked model.
+        places: Where its parts stand.
+        answers: The answers to `questions_about` it.
+    """
+    never = dict(answers.never)
+    return (
+        *_never_requested(model, places, never),
+        *_never_taken(model, places, never),
+        *(_unused(model, places, number) for number in answers.unused),
+        *(_competing(model, places, pair) for pair in answers.together),
+    )
+
+
+def _warning(
+    code: str, message: str, location: Location, mend: str, related: Iterable[RelatedPlace] = ()
+) -> Diagnostic:
+    return Diagnostic(Severity.WARNING, code, message, location, mend, tuple(related))
+
+
+# Events that can never happen
+
+_EXPLANATIONS = {
+    Cause.PLANT: (
+        "the behaviours never get to states that allow it",
+        "Let every behaviour that reacts to it get to a state where it may happen, or remove it.",
+    ),
+    Cause.REQUIREMENT: (
+        "wherever the behaviours allow it, a requirement on it does not hold",
+        "Relax the requirements on it, or let the components get to where they hold.",
+    ),
+    Cause.SUPERVISOR: (
+        "synthesis forbids it everywhere, because of what could follow it",
+        "Give a way back to marked states and into every variable's range from wherever it leads.",
+    ),
+}
+
+_NEVER_TAKEN = (
+    "its component never gets to a state where it stands and its guard holds",
+    "Correct its guard or the way to its state, or remove it.",
+)
+
+
+def _never_requested(model: Model, places: Places, never: Mapping[str, Cause]) -> Iterator[Diagnostic]:
+    """Findings about the events of communications."""
+    reactions = {item.event for component in model.components for item in _transitions(component)}
+    for item in model.communications:
+        request, cancel = item.event(EventKind.REQUEST), item.event(EventKind.CANCEL)
+        found = [event for event in item.events if event in never and (event != cancel or event in reactions)]
+        for event in found[:1] if request in never else found:
+            what = f"'{item.name}' can never be requested" if event == request else f"'{event}' can never happen"
+            why, mend = _EXPLANATIONS[never[event]]
+            related = _requirements_on(model, places, item.name) if never[event] is Cause.REQUIREMENT else ()
+            yield _warning("never-enabled", f"{what}: {why}", places.communications[item.name], mend, related)
+
+
+def _requirements_on(model: Model, places: Places, communication: str) -> tuple[RelatedPlace, ...]:
+    """The first requirements on a communication."""
+    found = (
+        RelatedPlace("a requirement on it", place)
+        for requirement, place in zip(model.requirements, places.requirements, strict=True)
+        if communication in requirement.communications
+    )
+    return tuple(islice(found, MAXIMUM_NAMES))
+
+
+def _never_taken(model: Model, places: Places, never: Mapping[str, Cause]) -> Iterator[Diagnostic]:
+    """Findings about tau transitions."""
+    for component in model.components:
+        told = set[str]()
+        for number, transition in enumerate(_transitions(component)):
+            event = transition.event
+            if is_tau(event) and event in never and event not in told:
+                told.add(event)
+                why, mend = _NEVER_TAKEN if never[event] is Cause.PLANT else _EXPLANATIONS[never[event]]
+                location = places.transitions[component.name][number]
+                yield _warning("never-enabled", f"'{event}' can never happen: {why}", location, mend)
+
+
+def _transitions(component: Component) -> tuple[Transition, ...]:
+    return component.behaviour.transitions if component.behaviour else ()
+
+
+# Requirements that never restrict
+
+
+def _unused(model: Model, places: Places, number: int) -> Diagnostic:
+    # First the requirements on events, then those that must always hold.
+    is_lasting = number >= len(model.requirements)
+    names = [] if is_lasting else [f"'{name}'" for name in model.requirements[number].communications]
+    shown = ", ".join(names[:MAXIMUM_NAMES]) + (
+        f" and {len(names) - MAXIMUM_NAMES} more" if names[MAXIMUM_NAMES:] else ""
+    )
+    return _warning(
+        "unused-requirement",
+        f"this requirement never restricts {shown or 'anything'}",
+        places.invariants[number - len(model.requirements)] if is_lasting else places.requirements[number],
+        "Correct its condition, which holds whenever it matters, or remove it.",
+    )
+
+
+# Requests that compete
+
+
+def _competing(model: Model, places: Places, pair: Together) -> Diagnostic:
+    first, second = (event.rpartition(".")[0] for event in (pair.first, pair.second))
+    identifier = next(item.identifier for item in model.communications if item.name == second)
+    return _warning(
+        "competing-requests",
+        f"'{second}' and '{first}' can both be requested on '{identifier}' {_after(pair.trace)}",
+        places.communications[second],
+        "Put them into the deployment's priority list, or let a requirement forbid the one where the other is wanted.",
+        [RelatedPlace("the other one is here", places.communications[first])],
+    )
+
+
+def _after(trace: Sequence[str]) -> str:
+    """When it happens: a run, cut where it is long."""
+    if not trace:
+        return "in the initial state"
+    shown = ", ".join(trace[:MAXIMUM_EVENTS])
+    return f"after {shown}" + (f", ... ({len(trace)} in all)" if len(trace) > MAXIMUM_EVENTS else "")

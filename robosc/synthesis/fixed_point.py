@@ -1,0 +1,146 @@
+"""The fixed point of synthesis, and what the controlled system can reach.
+
+Source: L. Ouedraogo, R. Kumar, R. Malik and K. Akesson, "Nonblocking and safe control of discrete-event systems
+modeled as extended finite automata", IEEE T-ASE 8(3), 2011, pp. 560-569, Algorithm 1, on predicates instead of
+guards. Predecessors are found by substitution, forward images with a relation for each event. Events are chained:
+each works on what the ones before it have found, backwards in the opposite order, since a system's events mostly
+follow each other in the order in which they are given.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from robosc.expressions import Expression
+from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.symbolic import Symbols
+from robosc.synthesis.transitions import Steps
+from robosc.synthesis.watch import Watch
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """What a supervisor has to keep to.
+
+    Attributes:
+        steps: The events under their conditions, in the system's order.
+        safe: States that may be entered at all, whatever events can do there.
+    """
+
+    steps: tuple[Steps, ...]
+    safe: Any
+
+
+@dataclass(frozen=True, slots=True)
+class GoodStates:
+    """Where a supervisor can keep the system safe and nonblocking.
+
+    Attributes:
+        states: The states; where the initial one is none of them, what was left when that was found.
+        rounds: Rounds of the fixed point.
+        reason: Why the initial state is none of them; empty if it is one.
+    """
+
+    states: Any
+    rounds: int
+    reason: str = ""
+
+
+def safe_states(encoding: Encoding, invariants: Iterable[Expression]) -> Any:
+    """Where every place of the state encodes a value and every invariant is true."""
+    symbols = Symbols(encoding)
+    return encoding.all_of([encoding.valid_states(), *(symbols.holds(item) for item in invariants)])
+
+
+Step = Callable[[Any], Any]
+"""What one event adds to a set of states."""
+
+
+class FixedPoint:
+    """Works out good states and controlled systems.
+
+    Args:
+        encoding: The variables.
+        watch: Who waits.
+    """
+
+    def __init__(self, encoding: Encoding, watch: Watch) -> None:
+        self._encoding = encoding
+        self._watch = watch
+        self.initial = encoding.initial_states()
+        """The initial state."""
+        self._marked = encoding.marked_states()
+
+    def good_states(self, problem: Problem, known: Any) -> GoodStates:
+        """The states from which a supervisor can solve a problem; `known` ones are told beforehand to be such."""
+        good, rounds = problem.safe, 0
+        if self._is_lost(good):
+            return GoodStates(good, rounds, "the initial state is against a state invariant")
+        for steps in problem.steps:
+            good = good & ~steps.bad
+            if self._is_lost(good):
+                return GoodStates(good, rounds, f"{steps.event.name} can do harm in the initial state already")
+        while True:
+            before = good
+            good = self._nonblocking(problem, good, known)
+            if self._is_lost(good):
+                return GoodStates(good, rounds, "from the initial state no marked state can be reached safely")
+            good = self._controllable(problem, good)
+            if self._is_lost(good):
+                reason = "uncontrollable events can lead from the initial state into states to be avoided"
+                return GoodStates(good, rounds, reason)
+            rounds += 1
+            self._watch.tell("fixed point", rounds, good)
+            if good == before:
+                return GoodStates(good, rounds)
+
+    def _is_lost(self, good: Any) -> bool:
+        return bool(self.initial & good == self._encoding.manager.false)
+
+    def _nonblocking(self, problem: Problem, good: Any, known: Any) -> Any:
+        """The states of `good` that reach a marked state through transitions that stay in `good`."""
+        steps = [self._towards(steps, allowed(steps, good)) for steps in self._each(problem)]
+        return self._closure((good & self._marked) | known, steps[::-1], "coreachability")
+
+    @staticmethod
+    def _towards(steps: Steps, source: Any) -> Step:
+        return lambda states: source & steps.some(states)
+
+    def _controllable(self, problem: Problem, good: Any) -> Any:
+        """The states of `good` that no run of uncontrollable events leaves."""
+        steps = [steps.some for steps in self._each(problem) if not steps.event.is_controllable]
+        return ~self._closure(~good, steps[::-1], "controllability")
+
+    def reachable_states(self, problem: Problem, good: Any) -> Any:
+        """Every state of the controlled system."""
+        steps = [self._onwards(steps, allowed(steps, good)) for steps in self._each(problem)]
+        return self._closure(self.initial, steps, "reachability")
+
+    @staticmethod
+    def _onwards(steps: Steps, source: Any) -> Step:
+        return lambda states: steps.image(states & source)
+
+    def _closure(self, states: Any, steps: Sequence[Step], phase: str) -> Any:
+        """`states` and all that steps from them add, one step after the other until none adds anything."""
+        rounds = unchanged = 0
+        while unchanged < len(steps):
+            for step in steps:
+                self._watch.check_stop()
+                grown = states | step(states)
+                unchanged = unchanged + 1 if grown == states else 0
+                states = grown
+                if unchanged == len(steps):
+                    break
+            rounds += 1
+            self._watch.tell(phase, rounds, states)
+        return states
+
+    def _each(self, problem: Problem) -> Iterator[Steps]:
+        for steps in problem.steps:
+            self._watch.check_stop()
+            yield steps
+
+
+def allowed(steps: Steps, good: Any) -> Any:
+    """The states of `good` in which an event may happen as far as the supervisor goes."""
+    return good & steps.condition & steps.only(good) & steps.plant if steps.event.is_controllable else good

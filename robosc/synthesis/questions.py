@@ -1,0 +1,79 @@
+"""What can be asked about a controlled system beside its supervisor, and the answers: plain values."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from robosc.automata.structure import EventCondition
+from robosc.expressions import Expression
+
+
+class Cause(StrEnum):
+    """Why an event can never happen: the first of these that explains it."""
+
+    PLANT = "plant"
+    """The plants never enable it, or taking it would always leave a variable's range."""
+    REQUIREMENT = "requirement"
+    """Wherever the plants enable it, an event condition is not true."""
+    SUPERVISOR = "supervisor"
+    """Synthesis disables it wherever plants and conditions allow it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Restriction:
+    """Event conditions and invariants that stand or fall together, such as all that one written requirement brings.
+
+    Attributes:
+        conditions: Event conditions of the system, each as often as it is meant.
+        invariants: Invariants of the system, likewise.
+        watched: Where else it shows that the restriction is used: the plants enable the event, and the condition is
+            not true.
+    """
+
+    conditions: tuple[EventCondition, ...] = ()
+    invariants: tuple[Expression, ...] = ()
+    watched: tuple[EventCondition, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Questions:
+    """What to find out about the controlled system.
+
+    Attributes:
+        events: Events of which to tell whether they can ever happen.
+        restrictions: Restrictions of which to tell whether they ever restrict.
+        rivals: Groups of events of which no two should be possible together.
+    """
+
+    events: tuple[str, ...] = ()
+    restrictions: tuple[Restriction, ...] = ()
+    rivals: tuple[tuple[str, ...], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Together:
+    """Two rivals that can both happen in one state.
+
+    Attributes:
+        first: The rival that stands earlier in its group.
+        second: The other one.
+        trace: Events of a shortest run from the initial state to such a state.
+    """
+
+    first: str
+    second: str
+    trace: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """What was found out; each part in the order of its questions.
+
+    Attributes:
+        never: Events that can never happen, and why.
+        unused: Places in `Questions.restrictions` of those that never restrict.
+        together: Rivals that are possible together, by group, then by the second, then by the first.
+    """
+
+    never: tuple[tuple[str, Cause], ...] = ()
+    unused: tuple[int, ...] = ()
+    together: tuple[Together, ...] = ()

@@ -1,0 +1,39 @@
+"""The one who waits for a synthesis: asked whether to stop, told where it is."""
+
+from collections.abc import Callable
+from typing import Any
+
+from robosc.errors import SynthesisCancelled
+from robosc.synthesis.result import Progress
+
+
+class Watch:
+    """Passes on questions and progress, and counts nodes.
+
+    Args:
+        should_stop: Asked before each step of the work with one event; once true, the work ends.
+        on_progress: Told after each event's encoding and after each round.
+
+    Attributes:
+        peak_nodes: Most nodes that a predicate took that progress was told of.
+    """
+
+    def __init__(self, should_stop: Callable[[], bool], on_progress: Callable[[Progress], None]) -> None:
+        self._should_stop = should_stop
+        self._on_progress = on_progress
+        self.peak_nodes = 0
+
+    def check_stop(self) -> None:
+        """Before each step.
+
+        Raises:
+            SynthesisCancelled: The work is to end.
+        """
+        if self._should_stop():
+            raise SynthesisCancelled("synthesis was stopped")
+
+    def tell(self, phase: str, rounds: int, states: Any) -> None:
+        """After each round: its phase and number, and the predicate that was found."""
+        nodes = states.dag_size
+        self.peak_nodes = max(self.peak_nodes, nodes)
+        self._on_progress(Progress(phase, rounds, nodes))

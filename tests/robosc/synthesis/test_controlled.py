@@ -1,0 +1,380 @@
+"""Questions about the controlled system, answered symbolically and by going through its states."""
+
+import os
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import lru_cache, reduce
+from itertools import combinations
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robosc.automata import EventCondition, Semantics, System
+from robosc.automata.compile import NO_DATA, State, compile_expression
+from robosc.automata.controlled import controlled_graph
+from robosc.automata.state import subjects
+from robosc.automata.structure import Assignment, DiscreteVariable
+from robosc.errors import SynthesisCancelled
+from robosc.expressions import TRUE, Binary, Expression, IntegerType, StateTest, Unary
+from robosc.supervisor.conditions import state_predicates
+from robosc.supervisor.structure import AddedCondition
+from robosc.synthesis import (
+    Answers,
+    Cause,
+    Progress,
+    Questions,
+    Restriction,
+    Together,
+    synthesize,
+)
+from robosc.verification import ExplicitSupervisor, synthesize_explicit
+from support.random_systems import random_system
+from support.systems import automaton, edge, operation, read
+from support.systems import system as system_of
+
+ENGINES = ("cudd", "autoref")
+EXAMPLES = int(os.environ.get("ROBOSC_RANDOM_SYSTEMS", "200"))
+LIMIT = 50_000
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _needs_cudd() -> None:
+    pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+
+
+@pytest.fixture(params=ENGINES)
+def engine(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+# The twin: every state by itself
+
+
+@lru_cache(maxsize=100)
+def explicit(system: System) -> ExplicitSupervisor:
+    supervisor = synthesize_explicit(system, limit=LIMIT)
+    assert supervisor is not None
+    return supervisor
+
+
+def places_of(wanted: Sequence[object], items: Sequence[object]) -> set[int]:
+    """Where the first of equal items stand; a question names no item twice."""
+    return {items.index(item) for item in wanted}
+
+
+def without[Item](items: Sequence[Item], places: set[int]) -> tuple[Item, ...]:
+    return tuple(item for place, item in enumerate(items) if place not in places)
+
+
+class Twin:
+    """Answers by enumeration; counts what it met."""
+
+    def __init__(self, system: System, added: tuple[AddedCondition, ...]) -> None:
+        self.system = system
+        self._added = state_predicates(system, added)
+        self.semantics = Semantics(system)
+        self.supervisor = explicit(system)
+        self.met: Counter[str] = Counter()
+        self._places = {subject: place for place, subject in enumerate(subjects(system))}
+
+    def can_happen(self, state: State, event: str) -> bool:
+        if self.system.event(event).is_controllable:
+            return self.supervisor.allows(state, event)
+        return self.semantics.enabled(state, event)
+
+    def answers(self, questions: Questions) -> Answers:
+        found = Answers(
+            never=tuple((event, self._cause(event)) for event in questions.events if self._is_never(event)),
+            unused=self._unused(questions.restrictions),
+            together=tuple(pair for group in questions.rivals for pair in self._pairs(group)),
+        )
+        self.met.update(cause for _, cause in found.never)
+        self.met["unused"] += len(found.unused)
+        self.met["together"] += len(found.together)
+        self.met["long"] += sum(len(pair.trace) > 3 for pair in found.together)
+        return found
+
+    def _is_never(self, event: str) -> bool:
+        return not any(self.can_happen(state, event) for state in self.supervisor.reachable)
+
+    def _cause(self, event: str) -> Cause:
+        enabled = [state for state in self.supervisor.reachable if self.semantics.enabled(state, event)]
+        if not enabled:
+            return Cause.PLANT
+        meets = any(self.semantics.condition(state, event) for state in enabled)
+        return Cause.SUPERVISOR if meets else Cause.REQUIREMENT
+
+    def _unused(self, restrictions: Sequence[Restriction]) -> tuple[int, ...]:
+        """One after the other is left out for good if nothing changes: events' conditions first, later ones first."""
+        candidates = [place for place, item in enumerate(restrictions) if not self._restricts(item)]
+        unused: list[int] = []
+        for place in sorted(candidates, key=lambda place: (bool(restrictions[place].invariants), -place)):
+            is_unused = self._is_the_same_without([restrictions[other] for other in (*unused, place)])
+            if is_unused:
+                unused.append(place)
+            kind = "invariant" if restrictions[place].invariants else "looked ahead"
+            self.met[f"{kind} {'unused' if is_unused else 'used'}"] += 1
+        return tuple(sorted(unused))
+
+    def _restricts(self, restriction: Restriction) -> bool:
+        for item in (*restriction.conditions, *restriction.watched):
+            holds = compile_expression(item.condition, self._places)
+            for state in self.supervisor.reachable:
+                if self.semantics.enabled(state, item.event) and holds(state, NO_DATA) is not True:
+                    self.met["used"] += 1
+                    return True
+        return False
+
+    def _is_the_same_without(self, restrictions: Sequence[Restriction]) -> bool:
+        """Restrictions of one question may share conditions: the union is left out."""
+        dropped = [places_of(item.conditions, self.system.conditions) for item in restrictions]
+        lasting = [places_of(item.invariants, self.system.invariants) for item in restrictions]
+        other = replace(
+            self.system,
+            conditions=without(self.system.conditions, set().union(*dropped)),
+            invariants=without(self.system.invariants, set().union(*lasting)),
+        )
+        return self._seen(explicit(other)) == self._seen(self.supervisor)
+
+    @staticmethod
+    def _seen(supervisor: ExplicitSupervisor) -> object:
+        allowed = {(state, event) for state, event in supervisor.allowed if state in supervisor.reachable}
+        return supervisor.reachable, allowed
+
+    def _pairs(self, group: Sequence[str]) -> list[Together]:
+        """Traces are those of another breadth-first search: only their lengths need to agree."""
+        graph = controlled_graph(self.semantics, self._added, limit=LIMIT)
+        assert graph is not None
+        found = []
+        for second_place, second in enumerate(group):
+            for first in group[:second_place]:
+                numbers = [
+                    number
+                    for number, steps in enumerate(graph.steps)
+                    if {first, second} <= {event for event, _ in steps}
+                ]
+                if numbers:
+                    found.append(Together(first, second, min(map(graph.trace, numbers), key=len)))
+        return found
+
+    def replay(self, pair: Together) -> None:
+        """The trace is a run, and at its end both can happen."""
+        states = {self.semantics.initial}
+        for event in pair.trace:
+            sources = [state for state in states if self.can_happen(state, event)]
+            states = {target for state in sources for target in self.semantics.targets(state, event)}
+        assert any(self.can_happen(state, pair.first) and self.can_happen(state, pair.second) for state in states)
+
+
+def with_invariants(system: System, seed: int) -> System:
+    """Up to two conditions of a system as invariants too, or their opposites, as long as it starts in them."""
+    dice = Random(seed)
+    places = {subject: place for place, subject in enumerate(subjects(system))}
+    guards = [edge_.guard for automaton_ in system.automata for edge_ in automaton_.edges if edge_.guard != TRUE]
+    candidates = [*guards, *(item.condition for item in system.conditions)]
+    drawn = [dice.choice((item, Unary("not", item))) for item in dice.sample(candidates, min(2, len(candidates)))]
+    initial = Semantics(system).initial
+    kept = [item for item in drawn if compile_expression(item, places)(initial, NO_DATA) is True]
+    return replace(system, invariants=(*system.invariants, *kept))
+
+
+def random_questions(system: System, seed: int) -> Questions:
+    """Every event, every condition by itself and some together, and two groups of rivals."""
+    dice = Random(seed)
+    events = [event.name for event in system.events]
+    single = [Restriction((condition,)) for condition in system.conditions]
+    watching = [
+        Restriction((condition,), watched=(EventCondition(dice.choice(events), condition.condition),))
+        for condition in system.conditions
+    ]
+    several = [Restriction(pair) for pair in combinations(system.conditions, 2)]
+    lasting = [Restriction(invariants=(invariant,)) for invariant in system.invariants]
+    mixed = [Restriction(system.conditions[:1], system.invariants[:1])]
+    groups = tuple(tuple(dice.sample(events, min(len(events), size))) for size in (2, 4))
+    return Questions(tuple(events), (*single, *watching, *several, *lasting, *mixed), groups)
+
+
+def without_traces(answers: Answers) -> object:
+    return (
+        answers.never,
+        answers.unused,
+        [(pair.first, pair.second, len(pair.trace)) for pair in answers.together],
+    )
+
+
+def test_random_systems(record_property: Callable[[str, object], None]) -> None:
+    met: Counter[str] = Counter()
+
+    @settings(max_examples=EXAMPLES, deadline=None, database=None, derandomize=True)
+    @given(st.integers(0, 2**32 - 1))
+    def compare(seed: int) -> None:
+        system = with_invariants(random_system(seed), seed)
+        questions = random_questions(system, seed)
+        # The plain engine is slow: every other time will do.
+        engines = ENGINES if seed % 2 else ENGINES[:1]
+        results = [synthesize(system, engine=engine, questions=questions) for engine in engines]
+        assert results[0].answers == results[-1].answers
+        plain = synthesize(system)
+        assert (plain.added, plain.statistics) == (results[0].added, results[0].statistics)
+        twin = Twin(system, plain.added)
+        if twin.supervisor.is_empty:
+            assert results[0].answers == Answers()
+            return
+        assert without_traces(results[0].answers) == without_traces(twin.answers(questions))
+        for pair in results[0].answers.together:
+            twin.replay(pair)
+        met.update(twin.met)
+
+    compare()
+    record_property("answers compared with the explicit twin", ", ".join(f"{k} {met[k]}" for k in sorted(met)))
+    wanted = (*Cause, "used", "looked ahead used", "invariant used", "invariant unused", "together", "long")
+    assert all(met[kind] >= 3 for kind in wanted), met
+
+
+# By hand
+
+
+def chain(length: int) -> System:
+    """A counter that goes up to `length`, where two events can happen that cannot before."""
+    n = read("C.n")
+    up = edge("l -up-> l", operation(n, "<", length), n=operation(n, "+", 1))
+    ends = [edge(f"l -{name}-> l", operation(n, "=", length)) for name in ("first", "second")]
+    back = edge("l -zero-> l", n=operation(0, "*", n))
+    counter = DiscreteVariable("n", IntegerType(0, length), 0)
+    return system_of(automaton("C", [up, *ends, back], variables=[counter]))
+
+
+@pytest.mark.parametrize("length", [0, 1, 2, 50])
+def test_a_trace_is_as_long_as_the_shortest_run(engine: str, length: int) -> None:
+    questions = Questions(rivals=(("first", "second"), ("second", "first", "up")))
+    answers = synthesize(chain(length), engine=engine, questions=questions).answers
+    assert answers.together == (
+        Together("first", "second", ("up",) * length),
+        Together("second", "first", ("up",) * length),
+    )
+
+
+def test_beyond_the_effort_a_trace_is_still_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It may be longer, and is the same for both engines."""
+    for seed in range(25):
+        system = random_system(seed)
+        questions = replace(random_questions(system, seed), restrictions=())
+        shortest = synthesize(system, questions=questions).answers.together
+        for effort in (0, 300):
+            monkeypatch.setattr("robosc.synthesis.runs.MAXIMUM_EFFORT", effort)
+            found = [synthesize(system, engine=engine, questions=questions).answers.together for engine in ENGINES]
+            assert found[0] == found[1]
+            twin = Twin(system, ())
+            for pair, best in zip(found[0], shortest, strict=True):
+                twin.replay(pair)
+                assert len(pair.trace) >= len(best.trace)
+        monkeypatch.undo()
+
+
+def test_chained_events_find_the_longer_way_first(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    plant = automaton("A", ["s -a-> p", "p -b-> q", "q -c-> t", "s -z-> t", "t -x-> t", "t -y-> t"])
+    questions = Questions(rivals=(("x", "y"),))
+    traces = []
+    for effort in (1_000, 0):
+        monkeypatch.setattr("robosc.synthesis.runs.MAXIMUM_EFFORT", effort)
+        (pair,) = synthesize(system_of(plant), engine=engine, questions=questions).answers.together
+        traces.append(pair.trace)
+    assert traces == [("z",), ("a", "b", "c")]
+
+
+def test_many_components_by_themselves_take_no_rings_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With rings alone this takes as many as there are steps; and all of it counts against the effort."""
+    monkeypatch.setattr("robosc.synthesis.runs.MAXIMUM_EFFORT", 10_000)
+    count = 30
+    plants = [automaton(f"P{n}", [f"a -e{n}-> b", f"b -e{n}-> c", f"c -e{n}-> a"]) for n in range(count)]
+    last = automaton("Last", ["l -x-> l", "l -y-> l"])
+    done: list[Expression] = [StateTest(f"P{n}", "c") for n in range(count)]
+    everywhere = reduce(lambda left, right: Binary("and", left, right), done[1:], done[0])
+    system = replace(
+        system_of(*plants, last), conditions=(EventCondition("x", everywhere), EventCondition("y", everywhere))
+    )
+    rounds: list[str] = []
+    result = synthesize(
+        system, questions=Questions(rivals=(("x", "y"),)), on_progress=lambda progress: rounds.append(progress.phase)
+    )
+    (pair,) = result.answers.together
+    assert Counter(pair.trace) >= Counter({f"e{n}": 2 for n in range(count)})
+    assert rounds.count("shortest runs") < 20
+
+
+def trap() -> System:
+    """From `pit` the only way out is `climb`, which is never allowed: so `jump` is forbidden."""
+    plant = automaton("A", ["ground -jump-> pit", "pit -climb-> ground", "ground -walk-> ground"], marked=["ground"])
+    return system_of(plant, conditions={"climb": StateTest("A", "ground"), "walk": StateTest("A", "ground")})
+
+
+def test_causes(engine: str) -> None:
+    answers = synthesize(trap(), engine=engine, questions=Questions(events=("climb", "jump", "walk"))).answers
+    assert answers.never == (("climb", Cause.PLANT), ("jump", Cause.SUPERVISOR))
+    stuck = replace(trap(), conditions=(EventCondition("jump", StateTest("A", "pit")),))
+    answers = synthesize(stuck, engine=engine, questions=Questions(events=("climb", "jump", "walk"))).answers
+    assert answers.never == (("climb", Cause.PLANT), ("jump", Cause.REQUIREMENT))
+
+
+def test_a_condition_that_synthesis_looks_ahead_to_is_used(engine: str) -> None:
+    """No state is ever reached where it forbids `climb`; and yet without it `jump` would be allowed."""
+    questions = Questions(restrictions=tuple(Restriction((condition,)) for condition in trap().conditions))
+    assert [item.event for item in trap().conditions] == ["climb", "walk"]
+    assert synthesize(trap(), engine=engine, questions=questions).answers.unused == (1,)
+
+
+def test_what_is_watched_counts(engine: str) -> None:
+    away = StateTest("A", "home")
+    plant = automaton("A", ["home -go-> away", "away -back-> home"])
+    system = system_of(plant, conditions={"go": away})
+    restrictions = (
+        Restriction((EventCondition("go", away),)),
+        Restriction((EventCondition("go", away),), watched=(EventCondition("back", away),)),
+    )
+    answers = synthesize(system, engine=engine, questions=Questions(restrictions=restrictions)).answers
+    assert answers.unused == (0,)
+
+
+def test_an_update_that_always_leaves_its_range_is_the_plants_own_fault(engine: str) -> None:
+    plant = automaton(
+        "A",
+        [replace(edge("l -go-> l"), updates=(Assignment("n", operation(5, "+", 5)),)), edge("l -stay-> l")],
+        variables=[DiscreteVariable("n", IntegerType(0, 3), 0)],
+    )
+    answers = synthesize(system_of(plant), engine=engine, questions=Questions(events=("go", "stay"))).answers
+    assert answers.never == (("go", Cause.PLANT),)
+
+
+def test_many_rivals_are_told_by_the_first_hundred_pairs(engine: str) -> None:
+    names = tuple(f"e{number:02}" for number in range(40))
+    plant = automaton("A", [f"l -{name}-> l" for name in names])
+    answers = synthesize(system_of(plant), engine=engine, questions=Questions(rivals=(names,))).answers
+    pairs = [(pair.first, pair.second) for pair in answers.together]
+    assert pairs == [(first, second) for place, second in enumerate(names) for first in names[:place]][:100]
+
+
+def test_cancelling_while_runs_are_searched(engine: str) -> None:
+    """The search for runs asks too: it can be the longest part."""
+    phases: list[str] = []
+
+    def watch(progress: Progress) -> None:
+        phases.append(progress.phase)
+
+    questions = Questions(rivals=(("first", "second"),))
+    with pytest.raises(SynthesisCancelled):
+        synthesize(
+            chain(50),
+            engine=engine,
+            questions=questions,
+            on_progress=watch,
+            should_stop=lambda: phases.count("shortest runs") == 10,
+        )
+    assert phases.count("shortest runs") == 10
+
+
+def test_an_event_that_there_is_not(engine: str) -> None:
+    with pytest.raises(KeyError, match="nothing"):
+        synthesize(trap(), engine=engine, questions=Questions(events=("nothing",)))

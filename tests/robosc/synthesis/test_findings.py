@@ -1,0 +1,485 @@
+"""Warnings about a model that only synthesis can give: by hand in pairs, and against enumerated states."""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+
+import msgspec
+import pytest
+
+from robosc.automata import Semantics, System, to_automata
+from robosc.automata.compile import NO_DATA, compile_expression
+from robosc.automata.state import subjects
+from robosc.errors import Diagnostic, UnsupportedModelError
+from robosc.exploration import explore
+from robosc.model import Places
+from robosc.model.structure import CommunicationKind, Deployment, EventKind, Model
+from robosc.source import Location
+from robosc.supervisor import MadeStatus, make_supervisor
+from robosc.supervisor.conditions import state_predicates
+from robosc.synthesis import SynthesisStatus, findings, questions_about, synthesize
+from robosc.verification import ExplicitSupervisor, synthesize_explicit
+from support.models import EXAMPLE_DEPLOYMENTS, bundle_of, example_bundle, marked_place
+from support.random_supervisors import random_supervisor
+
+LIMIT = 5_000
+CODES = ("never-enabled", "unused-requirement", "competing-requests")
+
+INTERFACES = "interface i use S from p"
+DOOR = """component Door {
+    incoming message open with type: none
+    incoming message shut with type: none
+    behaviour {
+        initial marked state closed { on request to open goto opened }
+        marked state opened { on request to shut goto closed }
+    }
+}"""
+"""A door that opens and shuts."""
+
+SWITCH = """component Switch {
+    outgoing message up with type: none
+    outgoing message down with type: none
+    behaviour {
+        on response from up goto on_
+        on response from down goto off
+        initial marked state off { }
+        marked state on_ { }
+    }
+}"""
+"""A switch that somebody else flips."""
+
+MOTOR = """component Motor {
+    action drive with request: none, response: none, feedback: none links i
+    behaviour {
+        initial marked state still { on request to drive goto driving }
+        marked state driving {
+            on response from drive goto still
+            on error from drive goto still
+            on cancel to drive goto still
+        }
+    }
+}"""
+"""A motor that reacts to cancel."""
+
+
+BELL = "component Bell { incoming message §ring with type: none }"
+
+SERVICE = """component Clerk {
+    service ask with request: none, response: none links i
+    behaviour {
+        initial marked state there { on request to ask }
+        marked state gone { }
+    }
+}"""
+"""A service, and a state that is never entered."""
+
+LIGHTS = """component Lights {
+    incoming message red with identifier: "/light", type: none
+    incoming message §green with identifier: "/light", type: none
+}"""
+"""Two messages on one topic."""
+
+
+def robot(*parts: str) -> str:
+    return "\n".join(["robot R {", INTERFACES, *parts, "}"])
+
+
+def found(text: str, deployment: Deployment = Deployment.CONTROLLER) -> tuple[Diagnostic, ...]:
+    """The findings of a model that has a supervisor; the two engines agree on them."""
+    made = [make_supervisor(bundle_of(text), deployment=deployment, engine=name) for name in ("auto", "autoref")]
+    assert made[0].status is MadeStatus.SUPERVISOR
+    assert made[0].diagnostics == made[1].diagnostics
+    return tuple(item for item in made[0].diagnostics if item.code in CODES)
+
+
+def only(text: str, deployment: Deployment = Deployment.CONTROLLER) -> Diagnostic:
+    """The one finding of a model, at the place that is marked in its text."""
+    plain, line, column = marked_place(text)
+    diagnostics = found(plain, deployment)
+    assert len(diagnostics) == 1, [str(item) for item in diagnostics]
+    assert diagnostics[0].location is not None
+    assert (diagnostics[0].location.line, diagnostics[0].location.column) == (line, column)
+    assert "\n" not in diagnostics[0].message
+    return diagnostics[0]
+
+
+# never-enabled
+
+
+def test_a_request_that_the_behaviours_never_allow() -> None:
+    text = DOOR.replace("goto closed }", "goto closed }\n state ajar { on request to slam goto closed }")
+    text = text.replace("behaviour", "incoming message §slam with type: none\n behaviour")
+    item = only(robot(text))
+    assert (item.code, str(item.severity)) == ("never-enabled", "warning")
+    assert item.message.startswith("'slam' can never be requested: the behaviours never get to states")
+    assert found(robot(text.replace("§", "").replace("to shut goto closed", "to shut goto ajar"))) == ()
+
+
+def test_a_request_whose_requirement_never_holds() -> None:
+    """The requirement does restrict: it is not reported beside."""
+    item = only(robot(SWITCH, BELL, "requirement ring needs Switch.off and Switch.on_"))
+    assert item.message == (
+        "'ring' can never be requested: wherever the behaviours allow it, a requirement on it does not hold"
+    )
+    assert [(place.message, place.location.line) for place in item.related] == [("a requirement on it", 14)]
+    assert found(robot(SWITCH, BELL, "requirement ring needs Switch.on_").replace("§", "")) == ()
+
+
+def test_a_request_that_synthesis_forbids() -> None:
+    """Who locks the door cannot open it any more: the requirement on `unlock` never shows, but it is the reason."""
+    text = DOOR.replace("goto closed }", "goto closed }\n state locked { on request to unlock goto closed }")
+    text = text.replace("goto opened }", "goto opened on request to lock goto locked }")
+    text = text.replace(" behaviour", " incoming message §lock with type: none\nMORE\n behaviour")
+    more = "incoming message unlock with type: none"
+    both = found(robot(text.replace("MORE", more), "requirement unlock needs Door.opened").replace("§", ""))
+    assert [item.message for item in both] == [
+        "'lock' can never be requested: synthesis forbids it everywhere, because of what could follow it",
+        "'unlock' can never be requested: the behaviours never get to states that allow it",
+    ]
+    assert found(robot(text.replace("MORE", more)).replace("§", "")) == ()
+
+
+def test_of_a_call_that_is_never_made_only_the_request_is_told() -> None:
+    motor = MOTOR.replace("action drive", "action §drive")
+    assert only(robot(motor, SWITCH, "requirement drive needs Switch.off and Switch.on_")).code == "never-enabled"
+    service = SERVICE.replace("service ask", "service §ask")
+    assert "can never be requested" in only(robot(service, "requirement ask needs Clerk.gone")).message
+
+
+def test_cancel_counts_where_a_behaviour_reacts_to_it() -> None:
+    """Without requirements it is free; with one that holds as long as the action runs it never happens."""
+    assert found(robot(MOTOR)) == ()
+    # While it drives, nobody can shut the door.
+    requirements = ("requirement drive needs Door.opened", "requirement shut needs Motor.still")
+    item = only(robot(MOTOR.replace("action drive", "action §drive"), DOOR, *requirements))
+    assert item.message == (
+        "'drive.cancel' can never happen: wherever the behaviours allow it, a requirement on it does not hold"
+    )
+    without_reaction = MOTOR.replace("on cancel to drive goto still", "")
+    assert found(robot(without_reaction, DOOR, *requirements)) == ()
+    # In a layer the caller may always cancel.
+    assert found(robot(MOTOR, DOOR, *requirements), Deployment.LAYER) == ()
+
+
+def test_a_tau_that_can_never_be_taken() -> None:
+    lamp = """component Lamp {
+        incoming message glow with type: none
+        behaviour {
+            variable n: integer(0..3) = 1
+            initial marked state dark { on request to glow goto lit §transition if n > 1 goto dark }
+            marked state lit { transition if n = 1 goto dark }
+        }
+    }"""
+    item = only(robot(lamp))
+    assert item.message == (
+        "'Lamp.tau_1' can never happen: its component never gets to a state where it stands and its guard holds"
+    )
+    assert found(robot(lamp.replace("n > 1", "n > 0").replace("§", ""))) == ()
+
+
+def test_a_tau_of_the_whole_behaviour_is_told_once() -> None:
+    lamp = """component Lamp {
+        outgoing message glow with type: none
+        behaviour {
+            variable n: integer(0..3)
+            §transition if n > 1 goto dark
+            initial marked state dark { on response from glow goto lit }
+            marked state lit { on response from glow goto dark }
+        }
+    }"""
+    assert "tau_1" in only(robot(lamp)).message
+
+
+# unused-requirement
+
+
+def test_a_requirement_that_always_holds_where_it_matters() -> None:
+    item = only(robot(DOOR, "§requirement shut needs Door.opened"))
+    assert (item.code, item.message) == ("unused-requirement", "this requirement never restricts 'shut'")
+    assert found(robot(DOOR, SWITCH, "requirement shut needs Switch.on_")) == ()
+
+
+def test_disables_means_the_opposite() -> None:
+    assert only(robot(DOOR, "§requirement Door.closed disables shut")).code == "unused-requirement"
+    assert found(robot(DOOR, SWITCH, "requirement Switch.off disables shut")) == ()
+
+
+def test_a_set_is_used_where_one_member_is_restricted() -> None:
+    item = only(robot(DOOR, BELL.replace("§", ""), "§requirement { shut, ring } needs Door.closed or Door.opened"))
+    assert item.message == "this requirement never restricts 'shut', 'ring'"
+    assert found(robot(DOOR, BELL.replace("§", ""), "requirement { shut, ring } needs Door.opened")) == ()
+
+
+def test_many_names_are_cut() -> None:
+    names = [f"m{number}" for number in range(8)]
+    messages = " ".join(f"incoming message {name} with type: none" for name in names)
+    item = only(robot(f"component C {{ {messages} }}", f"§requirement {{ {', '.join(names)} }} needs true"))
+    assert item.message == "this requirement never restricts 'm0', 'm1', 'm2', 'm3', 'm4' and 3 more"
+
+
+def test_an_empty_set_restricts_nothing() -> None:
+    assert only(robot(DOOR, "§requirement { } needs false")).message == "this requirement never restricts anything"
+
+
+def test_a_requirement_that_must_always_hold() -> None:
+    """Without it the door could be opened while the motor drives, or the other way round."""
+    item = only(robot(DOOR, MOTOR, "§requirement always Door.closed or Door.opened"))
+    assert (item.code, item.message) == ("unused-requirement", "this requirement never restricts anything")
+    assert found(robot(DOOR, MOTOR, "requirement always Door.closed or Motor.still")) == ()
+    used, unused = "requirement never Door.opened and Motor.driving", "§requirement never Door.opened and Door.closed"
+    assert only(robot(DOOR, MOTOR, used, unused)).message == "this requirement never restricts anything"
+    # With the first one the second, though it says less, forbids nothing more; the first one does.
+    weaker = "§requirement never Door.opened and Motor.driving and Switch.on_"
+    assert only(robot(DOOR, MOTOR, SWITCH, used, weaker)).code == "unused-requirement"
+
+
+def test_a_requirement_that_can_cancel_an_action_is_used() -> None:
+    """It holds whenever the motor may be started, and turns false while it drives."""
+    starter = MOTOR.replace("marked state driving {", "marked state driving {\n on response from down goto driving")
+    kept = "requirement drive needs Switch.off or Motor.still"
+    assert found(robot(starter, SWITCH, kept)) == ()
+    item = only(
+        robot(
+            MOTOR.replace("on cancel to drive goto still", ""), "§requirement drive needs Motor.still or Motor.driving"
+        )
+    )
+    assert item.code == "unused-requirement"
+
+
+# competing-requests
+
+
+def test_two_requests_on_one_identifier() -> None:
+    item = only(robot(LIGHTS, SWITCH, "requirement green needs Switch.on_"))
+    assert item.message == "'green' and 'red' can both be requested on '/light' after up.response"
+    assert [(place.message, place.location.line) for place in item.related] == [("the other one is here", 4)]
+    assert "priority list" in item.mend
+    exclusive = (
+        LIGHTS.replace("§", ""),
+        SWITCH,
+        "requirement green needs Switch.on_",
+        "requirement red needs Switch.off",
+    )
+    assert found(robot(*exclusive)) == ()
+
+
+def test_a_pair_that_competes_from_the_start() -> None:
+    assert only(robot(LIGHTS)).message.endswith("on '/light' in the initial state")
+
+
+def test_in_a_layer_nothing_competes() -> None:
+    lights = """component Lights {
+        incoming message red with identifier: "/light", type: boolean, when: value
+        incoming message §green with identifier: "/light", type: boolean
+    }"""
+    assert only(robot(lights)).code == "competing-requests"
+    assert found(robot(lights).replace("§", ""), Deployment.LAYER) == ()
+
+
+def test_services_and_messages_have_names_of_their_own() -> None:
+    service = SERVICE.replace("ask with", 'ask with identifier: "/light",')
+    one = LIGHTS.replace('incoming message §green with identifier: "/light", type: none', "")
+    assert found(robot(service, one)) == ()
+    two = service.replace(
+        "behaviour", 'service §tell with identifier: "/light", request: none, response: none links i behaviour'
+    )
+    assert only(robot(two, one)).message.startswith("'tell' and 'ask' can both be requested")
+
+
+@pytest.mark.parametrize("height", [1, 12, 13, 40])
+def test_a_long_run_is_cut(height: int) -> None:
+    states = "\n".join(
+        f"{'initial ' if number == 0 else ''}marked state s{number} {{ on response from step goto s{number + 1} }}"
+        for number in range(height)
+    )
+    text = robot(
+        "component Stairs { outgoing message step with type: none",
+        f"behaviour {{ {states} marked state s{height} {{ }} }} }}",
+        LIGHTS,
+        f"requirement green needs Stairs.s{height}",
+    )
+    message = only(text).message
+    shown = ", ".join(["step.response"] * min(height, 12))
+    assert message.endswith(f" after {shown}" if height <= 12 else f" after {shown}, ... ({height} in all)")
+
+
+# What is sound, and what has no supervisor
+
+
+@pytest.mark.parametrize(("name", "deployment"), EXAMPLE_DEPLOYMENTS)
+def test_the_examples_have_none_of_these(name: str, deployment: Deployment) -> None:
+    made = make_supervisor(example_bundle(name), deployment=deployment)
+    assert made.status is MadeStatus.SUPERVISOR
+    assert not [item for item in made.diagnostics if item.code in CODES]
+
+
+def test_without_a_supervisor_there_is_nothing_to_tell() -> None:
+    text = robot(
+        LIGHTS, "component C { behaviour { initial state a { transition if false goto b } marked state b { } } }"
+    )
+    made = make_supervisor(bundle_of(text.replace("§", "")))
+    assert (made.status, made.diagnostics) == (MadeStatus.EMPTY, ())
+
+
+def test_findings_stand_among_the_others_by_place() -> None:
+    text = robot(LIGHTS, DOOR, "requirement shut needs Door.opened").replace("§", "")
+    text = text.replace("on request to open", "on request from open")
+    made = make_supervisor(bundle_of(text))
+    assert [item.code for item in made.diagnostics] == [
+        "competing-requests",
+        "wrong-preposition",
+        "unused-requirement",
+    ]
+
+
+# Random models against enumerated states
+
+
+def places_of(model: Model) -> Places:
+    """A place of its own for every part of a model; lines tell which part."""
+    places = Places(Location("m", 1, 1))
+    places.communications.update({item.name: Location("c", n + 1, 1) for n, item in enumerate(model.communications)})
+    places.requirements.extend(Location("r", n + 1, 1) for n in range(len(model.requirements)))
+    for number, item in enumerate(model.components):
+        if item.behaviour:
+            rows = range(len(item.behaviour.transitions))
+            places.transitions[item.name] = tuple(Location(f"t{number}", row + 1, 1) for row in rows)
+    return places
+
+
+def random_model(seed: int) -> Model:
+    """A random model; one identifier for all, and every state marked so that most have a supervisor."""
+    model = random_supervisor(seed).model
+    components = [
+        msgspec.structs.replace(
+            item,
+            behaviour=item.behaviour
+            and msgspec.structs.replace(
+                item.behaviour,
+                states=tuple(msgspec.structs.replace(state, is_marked=True) for state in item.behaviour.states),
+            ),
+        )
+        for item in model.components
+    ]
+    communications = [msgspec.structs.replace(item, identifier="/shared") for item in model.communications]
+    return msgspec.structs.replace(model, components=tuple(components), communications=tuple(communications))
+
+
+class TooLargeError(Exception):
+    """More states than a test should go through."""
+
+
+def explicit(system: System) -> ExplicitSupervisor:
+    supervisor = synthesize_explicit(system, limit=LIMIT)
+    if supervisor is None:
+        raise TooLargeError
+    return supervisor
+
+
+class Twin:
+    """What the findings should be, from the graph of the controlled system."""
+
+    def __init__(self, model: Model, system: System) -> None:
+        self.model = model
+        self.system = system
+        self.semantics = Semantics(system)
+        self.supervisor = explicit(system)
+        added = state_predicates(system, synthesize(system).added)
+        self.enabled = [set(state.enabled) for state in explore(system, added, model, limit=LIMIT).states]
+        self._places = {subject: place for place, subject in enumerate(subjects(system))}
+
+    def findings(self, places: Places, deployment: Deployment) -> set[tuple[str, Location]]:
+        expected = {("never-enabled", place) for place in self._never(places)}
+        expected |= {
+            ("unused-requirement", place)
+            for number, place in enumerate(places.requirements)
+            if number in self._unused(deployment)
+        }
+        if deployment is Deployment.CONTROLLER:
+            expected |= {("competing-requests", place) for place in self._competing(places)}
+        return expected
+
+    def _never(self, places: Places) -> set[Location]:
+        never = {event.name for event in self.system.events}.difference(*self.enabled)
+        written = {
+            (transition.event, places.transitions[item.name][row])
+            for item in self.model.components
+            if item.behaviour
+            for row, transition in reversed(list(enumerate(item.behaviour.transitions)))
+        }
+        events = {event for event, _ in written}
+        told = {
+            places.communications[item.name]
+            for item in self.model.communications
+            for event in item.events
+            if event in never
+            and (not event.endswith(".cancel") or event in events or item.event(EventKind.REQUEST) in never)
+        }
+        for event in {name for name in never if ".tau_" in name}:
+            told.add(min(place for name, place in written if name == event))
+        return told
+
+    def _unused(self, deployment: Deployment) -> list[int]:
+        """One after the other is left out for good if nothing changes, later ones first."""
+        unused: list[int] = []
+        for number in reversed(range(len(self.model.requirements))):
+            if self._is_unused(number, unused, deployment):
+                unused.append(number)
+        return unused
+
+    def _is_unused(self, number: int, removed: list[int], deployment: Deployment) -> bool:
+        requirement = self.model.requirements[number]
+        holds = compile_expression(requirement.condition, self._places)
+        for name in requirement.communications:
+            item = self.model.communication(name)
+            kinds = [EventKind.REQUEST, *[EventKind.CANCEL] * (item.kind is CommunicationKind.ACTION)]
+            for state in self.supervisor.reachable:
+                for kind in kinds:
+                    if self.semantics.enabled(state, item.event(kind)) and holds(state, NO_DATA) is not True:
+                        return False
+        rest = tuple(item for place, item in enumerate(self.model.requirements) if place not in (number, *removed))
+        other = to_automata(msgspec.structs.replace(self.model, requirements=rest), deployment)
+        # What is left out must not change when the action may be cancelled.
+        conditions = [
+            *(item for item in other.conditions if not item.event.endswith(".cancel")),
+            *(item for item in self.system.conditions if item.event.endswith(".cancel")),
+        ]
+        found = explicit(replace(self.system, conditions=tuple(conditions)))
+        return found.reachable == self.supervisor.reachable and {
+            pair for pair in found.allowed if pair[0] in found.reachable
+        } == {pair for pair in self.supervisor.allowed if pair[0] in found.reachable}
+
+    def _competing(self, places: Places) -> set[Location]:
+        requested = [item for item in self.model.communications if item.kind is not CommunicationKind.OUTGOING_MESSAGE]
+        return {
+            places.communications[second.name]
+            for number, second in enumerate(requested)
+            for first in requested[:number]
+            if (first.kind, first.identifier) == (second.kind, second.identifier)
+            and any({first.event(EventKind.REQUEST), second.event(EventKind.REQUEST)} <= here for here in self.enabled)
+        }
+
+
+def test_random_models(record_property: Callable[[str, object], None]) -> None:
+    met: Counter[str] = Counter()
+    for seed in range(160):
+        model, deployment = random_model(seed), list(Deployment)[seed % 3 == 0]
+        try:
+            system = to_automata(model, deployment)
+        except UnsupportedModelError:
+            continue
+        result = synthesize(system, questions=questions_about(model, system, deployment))
+        if result.status is SynthesisStatus.EMPTY:
+            continue
+        places = places_of(model)
+        told = findings(model, places, result.answers)
+        try:
+            expected = Twin(model, system).findings(places, deployment)
+        except TooLargeError:
+            continue
+        assert {(item.code, item.location) for item in told} == expected, seed
+        met.update(item.code for item in told)
+        met["models"] += 1
+    record_property("findings compared with enumerated states", ", ".join(f"{k} {met[k]}" for k in sorted(met)))
+    assert met["models"] >= 100
+    assert all(met[code] >= 5 for code in CODES), met

@@ -1,0 +1,96 @@
+"""Requirements, data of requests and rules of enums in sentences."""
+
+from collections.abc import Sequence
+
+from robosc.documentation.markdown import blocks, bullets, code, codes
+from robosc.expressions import Binary, BinaryOperator, Expression, Type, type_text
+from robosc.expressions.text import expression_text
+from robosc.model.structure import (
+    EnumDefinition,
+    Invariant,
+    ObjectValue,
+    Provide,
+    ProvidedValue,
+    Requirement,
+    RequirementForm,
+)
+
+
+def requirement_sentence(requirement: Requirement) -> str:
+    """What a requirement says, with a list below where several conditions play together."""
+    subject = f"{codes(requirement.communications)} {'is' if len(requirement.communications) == 1 else 'are'}"
+    if requirement.form is RequirementForm.NEEDS:
+        start, joint = f"{subject} requested only while", _joined(requirement.expression, "and")
+        return _listed(start, "all of these hold", joint)
+    start, joint = f"{subject} never requested while", _joined(requirement.expression, "or")
+    return _listed(start, "any of these holds", joint)
+
+
+def invariant_sentence(invariant: Invariant) -> str:
+    """What a state invariant says, with a list below where it has several parts."""
+    if invariant.is_never:
+        return _listed("There is never a state with", "any of these", _joined(invariant.expression, "or"))
+    return _listed("There are only states with", "all of these", _joined(invariant.expression, "and"))
+
+
+def _joined(expression: Expression, operator: BinaryOperator) -> tuple[Expression, ...]:
+    """The operands of the outermost `operator`s, in order; the expression alone where there is none."""
+    stack, found = [expression], []
+    while stack:
+        match stack.pop():
+            case Binary(operator=outermost, left=left, right=right) if outermost == operator:
+                stack += [right, left]
+            case operand:
+                found.append(operand)
+    return tuple(found)
+
+
+def _listed(start: str, meaning: str, conditions: Sequence[Expression]) -> str:
+    texts = [code(expression_text(condition)) for condition in conditions]
+    return f"{start} {texts[0]}." if len(texts) == 1 else f"{start} {meaning}:\n{bullets(texts, depth=1)}"
+
+
+def provide_sentences(communication: str, provides: Sequence[Provide]) -> str:
+    """What a request carries: one sentence, or a list of the cases in their order."""
+    statements = list(provides)
+    # What stands behind a statement without condition never gives the data.
+    final = next((number for number, item in enumerate(statements) if item.condition is None), None)
+    reached = statements if final is None else statements[: final + 1]
+    if final == 0:
+        return f"{code(communication)} is sent with {_data(reached[0].value)}."
+    cases = [
+        f"{_data(item.value)} if {code(expression_text(item.condition))}"
+        if item.condition
+        else f"otherwise {_data(item.value)}"
+        for item in reached
+    ]
+    if final is None:
+        cases.append("otherwise the default of the middleware")
+    return f"{code(communication)} is sent with the first of these that applies:\n{bullets(cases, depth=1)}"
+
+
+def _data(value: ProvidedValue) -> str:
+    return code(value_text(value))
+
+
+def value_text(value: ProvidedValue) -> str:
+    """Data as a user writes it."""
+    if not isinstance(value, ObjectValue):
+        return expression_text(value)
+    inner = ", ".join(f"{name}: {value_text(part)}" for name, part in value.properties)
+    return f"{{ {inner} }}" if inner else "{ }"
+
+
+def enum_sentences(enum: EnumDefinition) -> str:
+    """How received data becomes a value of the enum."""
+    start = f"Made from a received {code(type_text(enum.source))}"
+    otherwise = f"otherwise {code(enum.default)}"
+    if not enum.rules:
+        return f"{start}: always {code(enum.default)}."
+    rules = [f"{code(rule.value)} if {code(expression_text(rule.condition))}" for rule in enum.rules]
+    return blocks(f"{start}. The first that applies:", bullets([*rules, otherwise]))
+
+
+def type_cell(type_: Type | None) -> str:
+    """A type for a cell of a table; empty where there is none."""
+    return "" if type_ is None else code(type_text(type_))

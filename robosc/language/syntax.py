@@ -1,6 +1,7 @@
 """The syntax tree of RoboSC: what was written, with places, before any name is bound.
 
-Frozen values with tuples inside; msgspec makes them, as a large text has a hundred thousand of them.
+Frozen values with tuples inside. A large text has hundreds of thousands of them, so msgspec makes them, and the
+garbage collector does not look at them: trees have no cycles.
 """
 
 from enum import StrEnum
@@ -11,7 +12,7 @@ import msgspec
 from robosc.source import Location
 
 
-class Name(msgspec.Struct, frozen=True):
+class Name(msgspec.Struct, frozen=True, gc=False):
     """A name where it is defined or used; a leading `^` is taken off."""
 
     text: str
@@ -21,21 +22,21 @@ class Name(msgspec.Struct, frozen=True):
 # Expressions
 
 
-class Literal(msgspec.Struct, frozen=True):
+class Literal(msgspec.Struct, frozen=True, gc=False):
     """A number, text, true or false. An integer beyond 32 bits keeps its value."""
 
     value: bool | int | float | str
     location: Location
 
 
-class Index(msgspec.Struct, frozen=True):
+class Index(msgspec.Struct, frozen=True, gc=False):
     """`[i]` of an access; what stands in the brackets must be constant."""
 
     value: "Expression"
     location: Location
 
 
-class Slice(msgspec.Struct, frozen=True):
+class Slice(msgspec.Struct, frozen=True, gc=False):
     """`[i..j]` of an access: both ends belong to it, and with i > j it goes on at the array's beginning."""
 
     low: "Expression"
@@ -43,7 +44,7 @@ class Slice(msgspec.Struct, frozen=True):
     location: Location
 
 
-class Access(msgspec.Struct, frozen=True):
+class Access(msgspec.Struct, frozen=True, gc=False):
     """`value` or a name, followed by properties, states, variables and indices.
 
     Attributes:
@@ -57,7 +58,7 @@ class Access(msgspec.Struct, frozen=True):
     location: Location
 
 
-class Unary(msgspec.Struct, frozen=True):
+class Unary(msgspec.Struct, frozen=True, gc=False):
     """`!` or `-` before an operand."""
 
     operator: str
@@ -65,7 +66,7 @@ class Unary(msgspec.Struct, frozen=True):
     location: Location
 
 
-class Binary(msgspec.Struct, frozen=True):
+class Binary(msgspec.Struct, frozen=True, gc=False):
     """An operator between operands; `location` is the operator's."""
 
     operator: str
@@ -74,7 +75,7 @@ class Binary(msgspec.Struct, frozen=True):
     location: Location
 
 
-class Conditional(msgspec.Struct, frozen=True):
+class Conditional(msgspec.Struct, frozen=True, gc=False):
     """`if condition then one else other`; `location` is the word `if`."""
 
     condition: "Expression"
@@ -83,7 +84,7 @@ class Conditional(msgspec.Struct, frozen=True):
     location: Location
 
 
-class Call(msgspec.Struct, frozen=True):
+class Call(msgspec.Struct, frozen=True, gc=False):
     """`function(arguments)`; which functions there are is not the grammar's business."""
 
     function: Name
@@ -95,7 +96,7 @@ class Call(msgspec.Struct, frozen=True):
         return self.function.location
 
 
-class Quantifier(msgspec.Struct, frozen=True):
+class Quantifier(msgspec.Struct, frozen=True, gc=False):
     """`any(x in array: condition)` or `all(...)`."""
 
     word: Name
@@ -125,7 +126,7 @@ class BasicTypeName(StrEnum):
     INTEGER = "integer"
 
 
-class BasicType(msgspec.Struct, frozen=True):
+class BasicType(msgspec.Struct, frozen=True, gc=False):
     """A basic type, an integer perhaps with bounds."""
 
     name: BasicTypeName
@@ -134,14 +135,14 @@ class BasicType(msgspec.Struct, frozen=True):
     location: Location
 
 
-class ArrayType(msgspec.Struct, frozen=True):
+class ArrayType(msgspec.Struct, frozen=True, gc=False):
     """`array(T)`."""
 
     element: "Type"
     location: Location
 
 
-class NamedType(msgspec.Struct, frozen=True):
+class NamedType(msgspec.Struct, frozen=True, gc=False):
     """A use of a data type."""
 
     name: Name
@@ -155,28 +156,28 @@ class NamedType(msgspec.Struct, frozen=True):
 Type = BasicType | ArrayType | NamedType
 
 
-class Property(msgspec.Struct, frozen=True):
+class Property(msgspec.Struct, frozen=True, gc=False):
     """A property of an object type."""
 
     name: Name
     type: Type
 
 
-class ObjectDefinition(msgspec.Struct, frozen=True):
+class ObjectDefinition(msgspec.Struct, frozen=True, gc=False):
     """`datatype object`."""
 
     name: Name
     properties: tuple[Property, ...]
 
 
-class EnumRule(msgspec.Struct, frozen=True):
+class EnumRule(msgspec.Struct, frozen=True, gc=False):
     """`condition -> value`; without a condition, the default."""
 
     condition: Expression | None
     value: Name
 
 
-class EnumDefinition(msgspec.Struct, frozen=True):
+class EnumDefinition(msgspec.Struct, frozen=True, gc=False):
     """`datatype enum`."""
 
     name: Name
@@ -184,7 +185,7 @@ class EnumDefinition(msgspec.Struct, frozen=True):
     rules: tuple[EnumRule, ...]
 
 
-class Interface(msgspec.Struct, frozen=True):
+class Interface(msgspec.Struct, frozen=True, gc=False):
     """`interface name use type from package`."""
 
     name: Name
@@ -202,7 +203,7 @@ class Direction(StrEnum):
     OUTGOING = "outgoing"
 
 
-class Text(msgspec.Struct, frozen=True):
+class Text(msgspec.Struct, frozen=True, gc=False):
     """A string where it is written."""
 
     value: str
@@ -212,7 +213,7 @@ class Text(msgspec.Struct, frozen=True):
 OptionKey = Word["qos", "depth", "max_age", "stamped", "when"]
 
 
-class Option(msgspec.Struct, frozen=True):
+class Option(msgspec.Struct, frozen=True, gc=False):
     """`key: value` of a `with` list, other than name and types.
 
     Attributes:
@@ -225,7 +226,7 @@ class Option(msgspec.Struct, frozen=True):
     location: Location
 
 
-class Message(msgspec.Struct, frozen=True):
+class Message(msgspec.Struct, frozen=True, gc=False):
     """A message."""
 
     direction: Direction
@@ -236,7 +237,7 @@ class Message(msgspec.Struct, frozen=True):
     options: tuple[Option, ...] = ()
 
 
-class Service(msgspec.Struct, frozen=True):
+class Service(msgspec.Struct, frozen=True, gc=False):
     """A service."""
 
     name: Name
@@ -247,7 +248,7 @@ class Service(msgspec.Struct, frozen=True):
     options: tuple[Option, ...] = ()
 
 
-class Action(msgspec.Struct, frozen=True):
+class Action(msgspec.Struct, frozen=True, gc=False):
     """An action."""
 
     name: Name
@@ -262,7 +263,7 @@ class Action(msgspec.Struct, frozen=True):
 Communication = Message | Service | Action
 
 
-class Variable(msgspec.Struct, frozen=True):
+class Variable(msgspec.Struct, frozen=True, gc=False):
     """A variable with its written initial value, if any."""
 
     name: Name
@@ -270,14 +271,14 @@ class Variable(msgspec.Struct, frozen=True):
     initial: Expression | None
 
 
-class Update(msgspec.Struct, frozen=True):
+class Update(msgspec.Struct, frozen=True, gc=False):
     """`target := value`."""
 
     target: Access
     value: Expression
 
 
-class CommunicationTransition(msgspec.Struct, frozen=True):
+class CommunicationTransition(msgspec.Struct, frozen=True, gc=False):
     """`on kind from|to communication ...`."""
 
     kind: str
@@ -288,7 +289,7 @@ class CommunicationTransition(msgspec.Struct, frozen=True):
     location: Location
 
 
-class TauTransition(msgspec.Struct, frozen=True):
+class TauTransition(msgspec.Struct, frozen=True, gc=False):
     """`transition ...`."""
 
     guard: Expression | None
@@ -299,7 +300,7 @@ class TauTransition(msgspec.Struct, frozen=True):
 Transition = CommunicationTransition | TauTransition
 
 
-class State(msgspec.Struct, frozen=True):
+class State(msgspec.Struct, frozen=True, gc=False):
     """A state with the transitions written in it."""
 
     name: Name
@@ -308,21 +309,21 @@ class State(msgspec.Struct, frozen=True):
     transitions: tuple[Transition, ...]
 
 
-class Behaviour(msgspec.Struct, frozen=True):
+class Behaviour(msgspec.Struct, frozen=True, gc=False):
     """A behaviour: its parts in the order of the text."""
 
     items: tuple[Variable | State | Transition, ...]
     location: Location
 
 
-class Import(msgspec.Struct, frozen=True):
+class Import(msgspec.Struct, frozen=True, gc=False):
     """`from library import component`."""
 
     library: Name
     component: Name
 
 
-class Component(msgspec.Struct, frozen=True):
+class Component(msgspec.Struct, frozen=True, gc=False):
     """A component with its parts, or imported."""
 
     name: Name
@@ -333,7 +334,7 @@ class Component(msgspec.Struct, frozen=True):
 # Requirements and data
 
 
-class Requirement(msgspec.Struct, frozen=True):
+class Requirement(msgspec.Struct, frozen=True, gc=False):
     """`R needs E` (`disables` false) or `E disables R`."""
 
     communications: tuple[Name, ...]
@@ -342,7 +343,7 @@ class Requirement(msgspec.Struct, frozen=True):
     location: Location
 
 
-class Invariant(msgspec.Struct, frozen=True):
+class Invariant(msgspec.Struct, frozen=True, gc=False):
     """`requirement always E`, or `requirement never E` (`is_never`)."""
 
     is_never: bool
@@ -350,7 +351,7 @@ class Invariant(msgspec.Struct, frozen=True):
     location: Location
 
 
-class Constant(msgspec.Struct, frozen=True):
+class Constant(msgspec.Struct, frozen=True, gc=False):
     """`constant name: type = value`."""
 
     name: Name
@@ -358,14 +359,14 @@ class Constant(msgspec.Struct, frozen=True):
     value: Expression
 
 
-class ObjectValue(msgspec.Struct, frozen=True):
+class ObjectValue(msgspec.Struct, frozen=True, gc=False):
     """`{ property: value, ... }`."""
 
     properties: tuple[tuple[Name, "ObjectValue | Expression"], ...]
     location: Location
 
 
-class Provide(msgspec.Struct, frozen=True):
+class Provide(msgspec.Struct, frozen=True, gc=False):
     """`provide communication with value if condition`."""
 
     communication: Name
@@ -377,7 +378,7 @@ class Provide(msgspec.Struct, frozen=True):
 Item = Component | ObjectDefinition | EnumDefinition | Interface | Constant | Requirement | Invariant | Provide
 
 
-class File(msgspec.Struct, frozen=True):
+class File(msgspec.Struct, frozen=True, gc=False):
     """A robot or a library.
 
     Attributes:

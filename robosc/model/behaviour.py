@@ -1,7 +1,7 @@
 """Builds and checks the behaviour of a component."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from robosc.errors import RelatedPlace
 from robosc.expressions import (
@@ -226,7 +226,7 @@ class BehaviourBuilder:
         if tree.initial is None:
             return default
         # Only literals, constants and enum values can stand here, so no component or variable is in sight.
-        scope = Scope(self._scope.types, {}, self._scope.enums, constants=self._scope.constants)
+        scope = replace(self._scope, components={}, own=None)
         checker = ExpressionChecker(scope, self._findings)
         typed = checker.fitting(tree.initial, type_)
         if typed is None or not isinstance(typed.expression, Constant | EnumValue):

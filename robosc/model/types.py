@@ -46,6 +46,7 @@ class Types:
         self.sources: dict[str, Type] = {}
         self._findings = findings
         self._open: list[str] = []
+        self._properties: dict[str, dict[str, Type]] = {}
         self._depths: dict[str, int] = {}
 
     def resolve(self, tree: syntax.Type, unit: Unit, *, in_object: bool = False) -> Type | None:
@@ -189,7 +190,9 @@ class Types:
         """The type of an object's property, or None if there is no such property."""
         if not isinstance(type_, ObjectType):
             return None
-        return next((item.type for item in self.objects[type_.name].properties if item.name == name), None)
+        if type_.name not in self._properties:
+            self._properties[type_.name] = {item.name: item.type for item in self.objects[type_.name].properties}
+        return self._properties[type_.name].get(name)
 
     def property_names(self, type_: Type) -> tuple[str, ...]:
         """The names of an object's properties."""

@@ -404,7 +404,124 @@ RULES: list[tuple[str, str, str, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("code", "severity", "broken", "sound"), RULES, ids=[rule[0] for rule in RULES])
+def enum(condition: str) -> str:
+    """A robot with one enum rule over a scan."""
+    return robot(OBJECT, f"datatype enum T from Scan to {{ {condition} -> near default -> far }}", SEEN)
+
+
+SEEN = (
+    "component S { outgoing message scanned with type: T links i "
+    "behaviour { variable t: T on response from scanned do t := value initial marked state a { } } }"
+)
+
+EXTENSION_RULES: list[tuple[str, str, str, str]] = [
+    (
+        "duplicate-constant",
+        "error",
+        robot("constant K: integer = 1 constant §k: integer = 2", component(STATES)),
+        robot("constant K: integer = 1 constant L: integer = 2", component(STATES)),
+    ),
+    (
+        "constant-cycle",
+        "error",
+        robot("constant §K: integer = L constant L: integer = K + 1", component(STATES)),
+        robot("constant K: integer = L constant L: integer = 1", component(STATES)),
+    ),
+    (
+        "not-constant",
+        "error",
+        robot("constant K: double = 1 §/ 0", component(STATES)),
+        robot("constant K: double = 1 / 2", component(STATES)),
+    ),
+    (
+        "type-mismatch",
+        "error",
+        robot("constant K: integer(0..3) = §4", component(STATES)),
+        robot("constant K: integer(0..3) = 3", component(STATES)),
+    ),
+    (
+        "object-variable",
+        "error",
+        robot(OBJECT, "constant K: §Scan = 4", component(STATES)),
+        robot(OBJECT, "constant K: double = 4", component(STATES)),
+    ),
+    ("unknown-name", "error", enum("§least(value.list) > 1"), enum("min(value.list) > 1")),
+    ("type-mismatch", "error", enum("§abs(1, 2) > value.range"), enum("abs(-1) < value.range")),
+    ("type-mismatch", "error", enum("min(§value.range) > 1"), enum("min(value.list) > 1")),
+    ("type-mismatch", "error", enum("value.list§[1..2] = 3.0"), enum("value.list[1] = 3.0")),
+    ("type-mismatch", "error", enum("length(§value.list[1..2]) = 3"), enum("length(value.list) = 3")),
+    ("type-mismatch", "error", enum("value.list[0 §- 1] > 0.0"), enum("value.list[2 - 1] > 0.0")),
+    ("type-mismatch", "error", enum("§any(value.list)"), enum("any(x in value.list: x > 1)")),
+    ("type-mismatch", "error", enum("any(x in value.list: §x)"), enum("all(x in value.list[1..2]: x < 1)")),
+    ("unknown-name", "error", enum("any(x in value.list: §y > 1)"), enum("any(y in value.list: y > 1)")),
+    (
+        "type-mismatch",
+        "error",
+        enum("if value.n = 1 then value.n = 2 else §value.range"),
+        enum("if value.n = 1 then value.n = 2 else value.range > 1"),
+    ),
+    (
+        "type-mismatch",
+        "error",
+        robot(component("variable v: boolean " + STATES), "requirement always §1"),
+        robot(component("variable v: boolean " + STATES), "requirement always !C.v"),
+    ),
+    (
+        "double-in-synthesis",
+        "error",
+        robot(component("variable v: §double " + STATES), "requirement never C.v > 1"),
+        robot(component("variable v: integer(0..3) " + STATES), "requirement never C.v > 1"),
+    ),
+    (
+        "option-not-allowed",
+        "error",
+        robot("component C { incoming message m with type: none, §max_age: 1.0 }"),
+        robot("component C { outgoing message m with type: none, max_age: 1.0 }"),
+    ),
+    (
+        "option-value",
+        "error",
+        robot("component C { outgoing message m with type: none, §depth: 0 }"),
+        robot("component C { outgoing message m with type: none, depth: 1 }"),
+    ),
+    (
+        "links-required",
+        "error",
+        robot('component C { incoming message m with type: none, §stamped: "base" }'),
+        robot('interface i use T from p component C { incoming message m with type: none, stamped: "base" links i }'),
+    ),
+    (
+        "type-mismatch",
+        "error",
+        robot("component C { incoming message m with type: double, when: §value }"),
+        robot("component C { incoming message m with type: double, when: value > 1 }"),
+    ),
+    (
+        "invalid-identifier",
+        "warning",
+        robot("component C { incoming message m with identifier: §'a b', type: none }"),
+        robot("component C { incoming message m with identifier: '/a/b', type: none }"),
+    ),
+    (
+        "conflicting-topic",
+        "warning",
+        robot(
+            "component C { incoming message m with identifier: 't', type: none, qos: reliable "
+            "incoming message §n with identifier: 't', type: none, qos: best_effort }"
+        ),
+        robot(
+            "component C { incoming message m with identifier: 't', type: none, qos: best_effort "
+            "incoming message n with identifier: 't', type: none, qos: best_effort }"
+        ),
+    ),
+]
+
+
+@pytest.mark.parametrize(
+    ("code", "severity", "broken", "sound"),
+    [*RULES, *EXTENSION_RULES],
+    ids=[rule[0] for rule in (*RULES, *EXTENSION_RULES)],
+)
 def test_rule(code: str, severity: str, broken: str, sound: str) -> None:
     text, line, column = marked_place(broken)
     found = checked(text).diagnostics

@@ -51,6 +51,15 @@ robot R {
 }
 """
 
+COMPETING = """
+robot R {
+    component Lights {
+        incoming message red with identifier: "/light", type: none
+        incoming message green with identifier: "/light", type: none
+    }
+}
+"""
+
 LIBRARY = """
 library Parts {
     component Platform {
@@ -149,6 +158,13 @@ class TestSameAsHere:
         supervisor = decode(there[3]["robot.rsup"][0])
         assert supervisor.deployment == deployment
         assert supervisor.certificate.bundle_sha256 == load_bundle(model).digest
+
+    @pytest.mark.parametrize("json", [[], ["--json"]])
+    def test_warnings_that_only_synthesis_can_give(self, both: Any, tmp_path: Path, json: Any) -> None:
+        here, there = both("synth", write(tmp_path, COMPETING), *json)
+        assert here == there
+        assert here[0] == 0
+        assert "'green' and 'red' can both be requested on '/light' in the initial state" in "".join(here[1:3])
 
     def test_synth_json(self, both: Any) -> None:
         here, there = both("synth", EXAMPLES[0], "--json")

@@ -56,11 +56,14 @@ class Bundle:
         main: The file with the robot (or the library that is being checked).
         libraries: Other files, sorted by name.
         searched: Where libraries were looked for, in words for an error message.
+        interfaces: Definitions of middleware types that the files use, named like `std_msgs/msg/Bool.msg`, as far as
+            they were found; they are checked against but are no part of the model.
     """
 
     main: SourceFile
     libraries: tuple[SourceFile, ...] = ()
     searched: tuple[str, ...] = ()
+    interfaces: tuple[SourceFile, ...] = ()
 
     @property
     def files(self) -> tuple[SourceFile, ...]:

@@ -109,7 +109,10 @@ def generation(response: pb.GenerateResponse) -> Generation:
 def _bundle(bundle: Bundle) -> pb.Bundle:
     try:
         return pb.Bundle(
-            main=_file(bundle.main), libraries=map(_file, bundle.libraries), searched=list(bundle.searched)
+            main=_file(bundle.main),
+            libraries=map(_file, bundle.libraries),
+            searched=list(bundle.searched),
+            interfaces=map(_file, bundle.interfaces),
         )
     except UnicodeEncodeError as error:
         raise RequestRefusedError("a file's name or text cannot be sent: it is not valid Unicode") from error

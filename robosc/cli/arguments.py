@@ -20,6 +20,16 @@ def add_model_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="another folder with libraries (may be repeated; always searched: the model's folder and its ../shared)",
     )
+    parser.add_argument(
+        "-I",
+        "--interface-path",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="DIR",
+        help="another folder with ROS packages whose .msg, .srv and .action files the model is checked against (may be "
+        "repeated; always searched: those of an installed ROS)",
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
 
 
@@ -51,16 +61,19 @@ def read_bundle(arguments: argparse.Namespace) -> Bundle:
         LanguageError: A file's content cannot be a model.
     """
     from robosc.language import load_bundle
+    from robosc.language.interfaces import interface_folders
 
     model: Path = arguments.model
     if model.is_dir():
         raise UsageError(f"{model} is a folder, not a model's file")
     if not model.exists():
         raise UsageError(f"there is no file {model}")
-    for folder in arguments.library_path:
-        if not folder.is_dir():
-            raise UsageError(f"there is no library folder {folder}")
+    for what, folders in (("library", arguments.library_path), ("interface", arguments.interface_path)):
+        for folder in folders:
+            if not folder.is_dir():
+                raise UsageError(f"there is no {what} folder {folder}")
     try:
-        return load_bundle(model, arguments.library_path)
+        interface_paths = (*arguments.interface_path, *interface_folders())
+        return load_bundle(model, arguments.library_path, interface_paths)
     except OSError as error:
         raise UsageError(f"cannot read {error.filename or model}: {error.strerror or error}") from error

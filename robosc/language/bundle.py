@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robosc.errors import Diagnostic, LanguageError, Severity
+from robosc.language.interfaces import find_interfaces
 from robosc.language.scan import declared_libraries, imported_libraries
 from robosc.source import Bundle, Location, SourceFile
 
@@ -15,7 +16,7 @@ MAXIMUM_BYTES = 16 * 1024 * 1024
 SUFFIX = ".rscd"
 
 
-def load_bundle(model: Path, library_paths: Sequence[Path] = ()) -> Bundle:
+def load_bundle(model: Path, library_paths: Sequence[Path] = (), interface_paths: Sequence[Path] = ()) -> Bundle:
     """Read a model and the libraries that it needs.
 
     Libraries are looked for in the model's folder, its sibling `../shared` and `library_paths`. Only files
@@ -25,6 +26,7 @@ def load_bundle(model: Path, library_paths: Sequence[Path] = ()) -> Bundle:
     Args:
         model: The model's file.
         library_paths: More folders to look in.
+        interface_paths: Folders with ROS packages whose definitions of middleware types are looked up.
 
     Raises:
         LanguageError: The model, or a library that it needs, is too large or not UTF-8.
@@ -48,9 +50,11 @@ def load_bundle(model: Path, library_paths: Sequence[Path] = ()) -> Bundle:
         for file in readable:
             chosen[file.name] = file
             wanted.extend(imported_libraries(file.text))
+    libraries = tuple(chosen[name] for name in sorted(chosen))
     return Bundle(
         main=main,
-        libraries=tuple(chosen[name] for name in sorted(chosen)),
+        libraries=libraries,
+        interfaces=find_interfaces((file.text for file in (main, *libraries)), interface_paths),
         searched=tuple(_shown(folder, model) for folder in folders),
     )
 

@@ -113,7 +113,8 @@ def component_names(part: Part, tree: BehaviourTree | None, types: Types, findin
     variables: dict[str, Type | None] = {}
     for variable in tree.variables:
         variables.setdefault(variable.name.text, _variable_type(variable, part, types, findings))
-    return ComponentNames(part.name, frozenset(state.name.text for state in tree.states), variables)
+    declared = {variable.name.text: variable.type.location for variable in reversed(tree.variables)}
+    return ComponentNames(part.name, frozenset(state.name.text for state in tree.states), variables, declared)
 
 
 def _unique_names(tree: BehaviourTree, findings: Findings) -> None:
@@ -228,7 +229,8 @@ class BehaviourBuilder:
         # Only literals, constants and enum values can stand here, so no component or variable is in sight.
         scope = replace(self._scope, components={}, own=None)
         checker = ExpressionChecker(scope, self._findings)
-        typed = checker.fitting(tree.initial, type_)
+        because = RelatedPlace(f"'{tree.name.text}' is declared as {type_text(type_)} here", tree.type.location)
+        typed = checker.fitting(tree.initial, type_, because)
         if typed is None or not isinstance(typed.expression, Constant | EnumValue):
             return default
         if may_leave(typed.type, type_):
@@ -354,7 +356,10 @@ class BehaviourBuilder:
         if type_ is None:
             checker.infer(update.value)
             return None
-        typed = checker.fitting(update.value, type_)
+        own = self._scope.own
+        place = own.declared.get(name) if own else None
+        because = RelatedPlace(f"'{name}' is declared as {type_text(type_)} here", place) if place else None
+        typed = checker.fitting(update.value, type_, because)
         if typed is None:
             return None
         if may_leave(typed.type, type_):

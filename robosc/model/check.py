@@ -1,7 +1,7 @@
 """From a bundle to the checked model: every name bound, every type known, every rule of part A applied."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from robosc.errors import Diagnostic, InternalError, LanguageError, RelatedPlace, Severity, sorted_diagnostics
 from robosc.expressions import StateTest, conjuncts
@@ -23,6 +23,7 @@ from robosc.model.communications import (
 from robosc.model.constants import Constants
 from robosc.model.expressions import ExpressionChecker
 from robosc.model.findings import Findings
+from robosc.model.interfaces import check_fields
 from robosc.model.places import Places
 from robosc.model.restrictions import Restrictions
 from robosc.model.scope import Scopes
@@ -101,6 +102,7 @@ class _RobotChecker:
         self._findings = findings
         self._types = Types(findings)
         self._unit = make_unit(tree, findings)
+        self._interfaces = bundle.interfaces
         self._libraries = Libraries(bundle, self._unit, findings)
         self._parts = parts_of(self._unit, self._libraries, findings)
         self.places = Places(tree.name.location)
@@ -131,6 +133,7 @@ class _RobotChecker:
             if tree is not None:
                 check_synthesis_variables(tree, behaviour, communications, self._types, self._findings)
                 partial_updates(tree, behaviour, self._findings)
+        check_fields(communications.values(), self._interfaces, self.places.communications, self._types, self._findings)
         self._check_requests(communications, marked, requirements)
         self._check_empty(communications)
         self.places.objects.update(self._types.object_places)
@@ -254,6 +257,7 @@ class _Unknown:
     communications: Mapping[str, Communication]
     broken: set[str]
     findings: Findings
+    told: set[str] = field(default_factory=set)
 
     def __call__(self, name: syntax.Name) -> None:
         if name.text in self.broken:
@@ -261,6 +265,9 @@ class _Unknown:
         if self.part.unit is self.robot:
             self.findings.unknown("communication", name.text, name.location, self.communications)
             return
+        if name.text in self.told:
+            return  # Several transitions may react to it: the import is wrong once.
+        self.told.add(name.text)
         self.findings.error(
             "unknown-name",
             f"the imported component '{self.part.tree.name.text}' reacts to '{name.text}', which is not imported",

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
+from robosc.errors import RelatedPlace
 from robosc.expressions import (
     ArrayType,
     Constant,
@@ -107,7 +108,15 @@ class _Resolution(Mapping[str, Typed | None]):
                 "Make it a number, a boolean, a text or a value of an enum.",
             )
             return None
-        found = None if type_ is None else self._checker.fitting(tree.value, type_)
+        found = (
+            None
+            if type_ is None
+            else self._checker.fitting(
+                tree.value,
+                type_,
+                RelatedPlace(f"'{tree.name.text}' is declared as {type_text(type_)} here", tree.type.location),
+            )
+        )
         if found is None or type_ is None:
             return None
         value = constant_value(found)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import reduce
 from itertools import chain
 
-from robosc.errors import InternalError
+from robosc.errors import InternalError, RelatedPlace
 from robosc.expressions import (
     ARGUMENTS,
     MAXIMUM_INTEGER,
@@ -96,11 +96,11 @@ class ExpressionChecker:
         typed = self.fitting(tree, wanted)
         return None if typed is None else typed.expression
 
-    def fitting(self, tree: syntax.Expression, wanted: Type) -> Typed | None:
-        """As `value`, with the type."""
+    def fitting(self, tree: syntax.Expression, wanted: Type, because: RelatedPlace | None = None) -> Typed | None:
+        """As `value`, with the type; `because` is where the wanted type is declared."""
         typed = self.infer(tree, wanted)
         if typed is not None and not fits(typed.type, wanted):
-            self._mismatch(tree, typed.type, f"{type_text(wanted)} is needed here")
+            self._mismatch(tree, typed.type, f"{type_text(wanted)} is needed here", because)
             return None
         return typed
 
@@ -122,12 +122,25 @@ class ExpressionChecker:
             case syntax.Quantifier():
                 return self._quantifier(tree)
 
-    def _mismatch(self, tree: syntax.Expression, found: Type, needed: str) -> None:
+    def _declaration(self, tree: syntax.Expression) -> tuple[RelatedPlace, ...]:
+        """Where the variable that a tree names is declared, if it names one."""
+        if not isinstance(tree, syntax.Access) or tree.root is None or len(tree.steps) > 1:
+            return ()
+        component, name = self._scope.own, tree.root.text
+        if tree.steps and isinstance(tree.steps[0], syntax.Name):
+            component, name = self._scope.components.get(name), tree.steps[0].text
+        if component is None or name not in component.declared:
+            return ()
+        return (RelatedPlace(f"'{name}' is declared here", component.declared[name]),)
+
+    def _mismatch(self, tree: syntax.Expression, found: Type, needed: str, because: RelatedPlace | None = None) -> None:
         self._findings.error(
             "type-mismatch",
-            f"this is {_article(type_text(found))}, but {needed}",
+            f"this is {_article(_plain_text(found))}, but {needed}",
             tree.location,
             "Write an expression of the needed type.",
+            *self._declaration(tree),
+            *((because,) if because else ()),
         )
 
     # Operators
@@ -190,6 +203,8 @@ class ExpressionChecker:
                 f"'{tree.operator}' compares {_article(type_text(left.type))} with {_article(type_text(right.type))}",
                 tree.location,
                 "Compare values of one type.",
+                *self._declaration(tree.left),
+                *self._declaration(tree.right),
             )
             return None
         return Typed(Binary(tree.operator, left.expression, right.expression), _BOOLEAN)  # type: ignore[arg-type]
@@ -517,6 +532,13 @@ def _same_kind(first: Type, second: Type) -> bool:
     if isinstance(first, IntegerType) and isinstance(second, IntegerType):
         return True
     return first == second
+
+
+def _plain_text(type_: Type) -> str:
+    """A type in words; of a single number it is enough that it is an integer."""
+    if isinstance(type_, IntegerType) and type_.low == type_.high:
+        return "integer"
+    return type_text(type_)
 
 
 def _literal_type(value: bool | int | float | str) -> Type:

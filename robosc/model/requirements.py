@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
+from robosc.errors import RelatedPlace
 from robosc.expressions import EnumType, NoneType, ObjectType, Type, type_text
 from robosc.language import syntax
 from robosc.model.expressions import ExpressionChecker, may_leave
@@ -18,6 +19,7 @@ from robosc.model.structure import (
 )
 from robosc.model.types import Types
 from robosc.model.units import unique
+from robosc.source import Location
 
 
 def build_requirement(
@@ -66,10 +68,15 @@ class ProvideBuilder:
         checker: Resolves expressions of the robot.
         types: All types.
         findings: Where faults are reported.
+        places: Where each communication is declared.
     """
 
-    def __init__(self, checker: ExpressionChecker, types: Types, findings: Findings) -> None:
+    def __init__(
+        self, checker: ExpressionChecker, types: Types, findings: Findings, places: Mapping[str, Location]
+    ) -> None:
         self._checker = checker
+        self._places = places
+        self._because: RelatedPlace | None = None
         self._types = types
         self._findings = findings
 
@@ -89,6 +96,7 @@ class ProvideBuilder:
                 "Provide data for an incoming message, a service or an action.",
             )
             return None
+        self._because = RelatedPlace(f"'{name.text}' is declared here", self._places[name.text])
         value = self._value(tree.value, communication.request, name)
         if value is None or (tree.condition is not None and condition is None):
             return None
@@ -111,7 +119,7 @@ class ProvideBuilder:
                 "Remove the statement." if isinstance(wanted, NoneType) else "Write '{ property: value }'.",
             )
             return None
-        typed = self._checker.fitting(tree, wanted)
+        typed = self._checker.fitting(tree, wanted, self._because)
         if typed is None:
             return None
         if may_leave(typed.type, wanted):

@@ -105,7 +105,7 @@ class Restrictions:
     def _add(self, tree: _Item, unit: Unit, communications: Mapping[str, Communication], places: Places) -> None:
         if unit not in self._builders:
             checker = ExpressionChecker(self._scopes.of(unit), self._findings)
-            self._builders[unit] = checker, ProvideBuilder(checker, self._types, self._findings)
+            self._builders[unit] = checker, ProvideBuilder(checker, self._types, self._findings, places.communications)
         checker, provide_builder = self._builders[unit]
         match tree:
             case syntax.Requirement():

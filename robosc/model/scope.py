@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from robosc.expressions import EnumType, Type
 from robosc.model.types import Types
 from robosc.model.units import Libraries, Part, Unit
+from robosc.source import Location
 
 if TYPE_CHECKING:
     from robosc.model.constants import Constants
@@ -21,11 +22,13 @@ class ComponentNames:
         name: Its name in the robot.
         states: Names of its states.
         variables: Types of its variables; None for one whose type is broken.
+        declared: Where the type of each variable is written.
     """
 
     name: str
     states: frozenset[str]
     variables: Mapping[str, Type | None]
+    declared: Mapping[str, Location] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

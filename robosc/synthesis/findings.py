@@ -148,13 +148,12 @@ def _requirements_on(model: Model, places: Places, communication: str) -> tuple[
 def _never_taken(model: Model, places: Places, never: Mapping[str, Cause]) -> Iterator[Diagnostic]:
     """Findings about tau transitions."""
     for component in model.components:
-        told = set[str]()
-        for number, transition in enumerate(_transitions(component)):
+        for location, transition in zip(
+            places.transitions.get(component.name, ()), _transitions(component), strict=True
+        ):
             event = transition.event
-            if is_tau(event) and event in never and event not in told:
-                told.add(event)
+            if is_tau(event) and event in never:
                 why, mend = _NEVER_TAKEN if never[event] is Cause.PLANT else _EXPLANATIONS[never[event]]
-                location = places.transitions[component.name][number]
                 yield _warning("never-enabled", f"'{event}' can never happen: {why}", location, mend)
 
 

@@ -133,11 +133,13 @@ def _bundle(message: pb.Bundle, max_bytes: int) -> Bundle:
             raise RequestError(f"two files of the bundle are called '{file.name}'")
         names.add(file.name)
     libraries = sorted((SourceFile(file.name, file.text) for file in message.libraries), key=lambda file: file.name)
-    return Bundle(SourceFile(message.main.name, message.main.text), tuple(libraries), tuple(message.searched))
+    interfaces = tuple(SourceFile(file.name, file.text) for file in message.interfaces)
+    main = SourceFile(message.main.name, message.main.text)
+    return Bundle(main, tuple(libraries), tuple(message.searched), interfaces)
 
 
 def _texts(message: pb.Bundle) -> list[str]:
-    files = (message.main, *message.libraries)
+    files = (message.main, *message.libraries, *message.interfaces)
     return [*(file.name for file in files), *(file.text for file in files), *message.searched]
 
 

@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from robosc.errors import Diagnostic, InternalError, LanguageError, Severity
 from robosc.explain import Block, Page, Stage, codes, document, page, pages, parse_page
 from robosc.language.bundle import MAXIMUM_BYTES, decode_source
+from robosc.language.interfaces import find_interfaces, interface_folders
 from robosc.model import check
 from robosc.model.structure import Deployment
 from robosc.source import Bundle, SourceFile
@@ -31,6 +33,9 @@ def bundle_of(blocks: tuple[Block, ...]) -> Bundle:
 def findings(item: Page, blocks: tuple[Block, ...]) -> tuple[Diagnostic, ...]:
     """What the stage of a page says about its blocks."""
     bundle = bundle_of(blocks)
+    # The definitions of ROS's own types come with what the tests are installed with.
+    texts = (file.text for file in bundle.files)
+    bundle = replace(bundle, interfaces=find_interfaces(texts, interface_folders()))
     if item.stage in (Stage.TEXT, Stage.MODEL):
         checked = check(bundle)
         if checked.model is None:

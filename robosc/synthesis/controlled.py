@@ -44,7 +44,6 @@ class ControlledSystem:
         Raises:
             SynthesisCancelled: The work is to end.
             KeyError: A question names an event that there is not.
-            ValueError: A restriction has a condition or an invariant that the system has not.
         """
         return Answers(
             never=tuple(self._never(questions.events)),
@@ -95,7 +94,8 @@ class ControlledSystem:
     def _restricts(self, restriction: Restriction) -> bool:
         """Whether, in a state of the controlled system, the plant enables an event and a condition is not true."""
         condition, broken = None, self._manager.false
-        for item in (*restriction.conditions, *restriction.watched):
+        conditions = self._encoding.system.conditions
+        for item in (*(conditions[place] for place in restriction.conditions), *restriction.watched):
             # What one requirement brings is mostly one condition on many events.
             if item.condition is not condition:
                 condition, broken = item.condition, self._reachable & ~self._holds(item.condition)
@@ -139,7 +139,7 @@ class ControlledSystem:
     def _without(self, restrictions: Sequence[Restriction]) -> Problem:
         """The problem without some restrictions; what they are watched for stays as it is."""
         system = self._encoding.system
-        dropped = set[int]().union(*(_places(item.conditions, system.conditions) for item in restrictions))
+        dropped = {place for item in restrictions for place in item.conditions}
         touched = {system.conditions[place].event for place in dropped}
         left = [item for place, item in enumerate(system.conditions) if place not in dropped]
 
@@ -150,7 +150,7 @@ class ControlledSystem:
         steps = tuple(
             under_what_is_left(steps) if steps.event.name in touched else steps for steps in self._problem.steps
         )
-        dropped = set[int]().union(*(_places(item.invariants, system.invariants) for item in restrictions))
+        dropped = {place for item in restrictions for place in item.invariants}
         invariants = [item for place, item in enumerate(system.invariants) if place not in dropped]
         return Problem(steps, safe_states(self._encoding, invariants) if dropped else self._problem.safe)
 
@@ -181,18 +181,3 @@ class ControlledSystem:
                         if count == MAXIMUM_TOGETHER:
                             return
                 earlier = earlier | here
-
-
-def _places[Item](wanted: Iterable[Item], items: Sequence[Item]) -> set[int]:
-    """Where some items stand among others, equal ones at different places.
-
-    Raises:
-        ValueError: One is not among them.
-    """
-    found = set[int]()
-    for item in wanted:
-        place = items.index(item)
-        while place in found:
-            place = items.index(item, place + 1)
-        found.add(place)
-    return found

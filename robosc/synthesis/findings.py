@@ -14,6 +14,7 @@
   controller: in a layer it is the existing controller that chooses.
 """
 
+from collections import defaultdict, deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 
@@ -21,13 +22,11 @@ from robosc.automata.structure import EventCondition, System
 from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.model.places import Places
 from robosc.model.structure import (
-    Communication,
     CommunicationKind,
     Component,
     Deployment,
     EventKind,
     Model,
-    Requirement,
     Transition,
     is_tau,
 )
@@ -43,28 +42,32 @@ MAXIMUM_NAMES = 5
 
 def questions_about(model: Model, system: System, deployment: Deployment) -> Questions:
     """What `findings` needs to know about the controlled system of a model's automata."""
-    communications = {item.name: item for item in model.communications}
     return Questions(
         events=tuple(event.name for event in system.events),
         restrictions=(
-            *(_restriction(communications, item) for item in model.requirements),
-            *(Restriction(invariants=(item.condition,)) for item in model.invariants),
+            *_restrictions(model, system),
+            *(Restriction(invariants=(place,)) for place in range(len(model.invariants))),
         ),
         rivals=_rivals(model) if deployment is Deployment.CONTROLLER else (),
     )
 
 
-def _restriction(communications: Mapping[str, Communication], requirement: Requirement) -> Restriction:
-    restricted = [communications[name] for name in requirement.communications]
-    condition = requirement.condition
-    return Restriction(
-        conditions=tuple(EventCondition(item.event(EventKind.REQUEST), condition) for item in restricted),
-        watched=tuple(
-            EventCondition(item.event(EventKind.CANCEL), condition)
-            for item in restricted
-            if item.kind is CommunicationKind.ACTION
-        ),
-    )
+def _restrictions(model: Model, system: System) -> Iterator[Restriction]:
+    """What each requirement on requests brings: the n-th one on a request is the n-th condition on that event."""
+    communications = {item.name: item for item in model.communications}
+    places = defaultdict[str, deque[int]](deque)
+    for place, condition in enumerate(system.conditions):
+        places[condition.event].append(place)
+    for requirement in model.requirements:
+        restricted = [communications[name] for name in requirement.communications]
+        yield Restriction(
+            conditions=tuple(places[item.event(EventKind.REQUEST)].popleft() for item in restricted),
+            watched=tuple(
+                EventCondition(item.event(EventKind.CANCEL), requirement.condition)
+                for item in restricted
+                if item.kind is CommunicationKind.ACTION
+            ),
+        )
 
 
 def _rivals(model: Model) -> tuple[tuple[str, ...], ...]:

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from robosc.automata.structure import EventCondition
-from robosc.expressions import Expression
 
 
 class Cause(StrEnum):
@@ -23,14 +22,14 @@ class Restriction:
     """Event conditions and invariants that stand or fall together, such as all that one written requirement brings.
 
     Attributes:
-        conditions: Event conditions of the system, each as often as it is meant.
-        invariants: Invariants of the system, likewise.
+        conditions: Places in `System.conditions`.
+        invariants: Places in `System.invariants`.
         watched: Where else it shows that the restriction is used: the plants enable the event, and the condition is
             not true.
     """
 
-    conditions: tuple[EventCondition, ...] = ()
-    invariants: tuple[Expression, ...] = ()
+    conditions: tuple[int, ...] = ()
+    invariants: tuple[int, ...] = ()
     watched: tuple[EventCondition, ...] = ()
 
 

@@ -60,11 +60,6 @@ def explicit(system: System) -> ExplicitSupervisor:
     return supervisor
 
 
-def places_of(wanted: Sequence[object], items: Sequence[object]) -> set[int]:
-    """Where the first of equal items stand; a question names no item twice."""
-    return {items.index(item) for item in wanted}
-
-
 def without[Item](items: Sequence[Item], places: set[int]) -> tuple[Item, ...]:
     return tuple(item for place, item in enumerate(items) if place not in places)
 
@@ -120,7 +115,8 @@ class Twin:
         return tuple(sorted(unused))
 
     def _restricts(self, restriction: Restriction) -> bool:
-        for item in (*restriction.conditions, *restriction.watched):
+        conditions = [self.system.conditions[place] for place in restriction.conditions]
+        for item in (*conditions, *restriction.watched):
             holds = compile_expression(item.condition, self._places)
             for state in self.supervisor.reachable:
                 if self.semantics.enabled(state, item.event) and holds(state, NO_DATA) is not True:
@@ -129,13 +125,10 @@ class Twin:
         return False
 
     def _is_the_same_without(self, restrictions: Sequence[Restriction]) -> bool:
-        """Restrictions of one question may share conditions: the union is left out."""
-        dropped = [places_of(item.conditions, self.system.conditions) for item in restrictions]
-        lasting = [places_of(item.invariants, self.system.invariants) for item in restrictions]
         other = replace(
             self.system,
-            conditions=without(self.system.conditions, set().union(*dropped)),
-            invariants=without(self.system.invariants, set().union(*lasting)),
+            conditions=without(self.system.conditions, {place for item in restrictions for place in item.conditions}),
+            invariants=without(self.system.invariants, {place for item in restrictions for place in item.invariants}),
         )
         return self._seen(explicit(other)) == self._seen(self.supervisor)
 
@@ -185,14 +178,15 @@ def random_questions(system: System, seed: int) -> Questions:
     """Every event, every condition by itself and some together, and two groups of rivals."""
     dice = Random(seed)
     events = [event.name for event in system.events]
-    single = [Restriction((condition,)) for condition in system.conditions]
+    places = range(len(system.conditions))
+    single = [Restriction((place,)) for place in places]
     watching = [
-        Restriction((condition,), watched=(EventCondition(dice.choice(events), condition.condition),))
-        for condition in system.conditions
+        Restriction((place,), watched=(EventCondition(dice.choice(events), system.conditions[place].condition),))
+        for place in places
     ]
-    several = [Restriction(pair) for pair in combinations(system.conditions, 2)]
-    lasting = [Restriction(invariants=(invariant,)) for invariant in system.invariants]
-    mixed = [Restriction(system.conditions[:1], system.invariants[:1])]
+    several = [Restriction(pair) for pair in combinations(places, 2)]
+    lasting = [Restriction(invariants=(place,)) for place in range(len(system.invariants))]
+    mixed = [Restriction(tuple(places[:1]), tuple(range(len(system.invariants)))[:1])]
     groups = tuple(tuple(dice.sample(events, min(len(events), size))) for size in (2, 4))
     return Questions(tuple(events), (*single, *watching, *several, *lasting, *mixed), groups)
 
@@ -321,9 +315,18 @@ def test_causes(engine: str) -> None:
 
 def test_a_condition_that_synthesis_looks_ahead_to_is_used(engine: str) -> None:
     """No state is ever reached where it forbids `climb`; and yet without it `jump` would be allowed."""
-    questions = Questions(restrictions=tuple(Restriction((condition,)) for condition in trap().conditions))
+    questions = Questions(restrictions=(Restriction((0,)), Restriction((1,))))
     assert [item.event for item in trap().conditions] == ["climb", "walk"]
     assert synthesize(trap(), engine=engine, questions=questions).answers.unused == (1,)
+
+
+def test_of_two_alike_the_later_one_can_go(engine: str) -> None:
+    """With two on `climb` neither is needed by itself, but one of them is."""
+    climb = trap().conditions[0]
+    system = replace(trap(), conditions=(climb, climb))
+    each, both = (Restriction((0,)), Restriction((1,))), Restriction((0, 1))
+    assert synthesize(system, engine=engine, questions=Questions(restrictions=each)).answers.unused == (1,)
+    assert synthesize(system, engine=engine, questions=Questions(restrictions=(both,))).answers.unused == ()
 
 
 def test_what_is_watched_counts(engine: str) -> None:
@@ -331,8 +334,8 @@ def test_what_is_watched_counts(engine: str) -> None:
     plant = automaton("A", ["home -go-> away", "away -back-> home"])
     system = system_of(plant, conditions={"go": away})
     restrictions = (
-        Restriction((EventCondition("go", away),)),
-        Restriction((EventCondition("go", away),), watched=(EventCondition("back", away),)),
+        Restriction((0,)),
+        Restriction((0,), watched=(EventCondition("back", away),)),
     )
     answers = synthesize(system, engine=engine, questions=Questions(restrictions=restrictions)).answers
     assert answers.unused == (0,)

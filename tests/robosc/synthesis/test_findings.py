@@ -137,6 +137,11 @@ def test_a_request_that_synthesis_forbids() -> None:
         "'unlock' can never be requested: the behaviours never get to states that allow it",
     ]
     assert found(robot(text.replace("MORE", more)).replace("§", "")) == ()
+    # Written twice, one of the two requirements can go: the later one.
+    twice = robot(text.replace("MORE", more), *["requirement unlock needs Door.opened"] * 2).replace("§", "")
+    (item,) = (item for item in found(twice) if item.code == "unused-requirement")
+    assert item.location is not None
+    assert item.location.line == len(twice.splitlines()) - 1
 
 
 def test_of_a_call_that_is_never_made_only_the_request_is_told() -> None:

@@ -4,9 +4,10 @@ Starts the synthesis server, lets the client send it the line follower, starts t
 and a simulated robot as processes of their own on real ROS 2 topics, shows what happened and judges it.
 Everything it writes lies in a temporary folder; nothing is left behind, also after Ctrl-C.
 
-Usage: demo.py        (or: make demo)
+Usage: demo.py [--model FILE]        (or: make demo)
 """
 
+import argparse
 import os
 import re
 import shutil
@@ -129,8 +130,8 @@ def run_client(arguments: Sequence[str], environment: dict[str, str]) -> None:
         raise DemoError(f"robosc-client ended with status {result.returncode}")
 
 
-def run(folder: Path) -> list[str]:
-    """The whole demonstration; returns what was wrong."""
+def run(folder: Path, model_path: Path) -> list[str]:
+    """The whole demonstration with one model; returns what was wrong."""
     environment = ros_environment(folder)
     with ExitStack() as stack:
         server_log = folder / "server.log"
@@ -139,7 +140,7 @@ def run(folder: Path) -> list[str]:
         )
         address = wait_for_line(server, server_log, r"listening on (\S+:\d+)$", "the server")[1]
         say(f"robosc-server listens on {address}")
-        model = os.path.relpath(MODEL)
+        model = os.path.relpath(model_path)
         supervisor, package = folder / "line_follower.rsup", folder / "package"
         run_client(["synth", model, "--server", address, "-o", str(supervisor)], environment)
         run_client(["generate", model, "--server", address, "--target", "ros2", "-o", str(package)], environment)
@@ -197,13 +198,28 @@ def judge(log: Path, record: Path) -> list[str]:
     return faults
 
 
+def read_arguments() -> Path:
+    """The model to run."""
+    parser = argparse.ArgumentParser(
+        description="Generate a line follower's controller, run it with a simulated robot, and judge what it did.",
+        epilog="A model of your own needs the messages of examples/line_follower, with the same identifiers, and the "
+        "states that its requirements name: the simulated robot and the checks know these.",
+    )
+    parser.add_argument("--model", type=Path, default=MODEL, metavar="FILE", help="the model (default: the example's)")
+    model: Path = parser.parse_args().model
+    if not model.is_file():
+        parser.error(f"there is no file {model}")
+    return model
+
+
 def main() -> int:
     """Run the demonstration; 0 if the robot did what its requirements say."""
+    model = read_arguments()
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.default_int_handler)
     try:
         with tempfile.TemporaryDirectory(prefix="robosc-demo-") as folder:
-            faults = run(Path(folder))
+            faults = run(Path(folder), model)
     except KeyboardInterrupt:
         sys.stderr.write("interrupted; everything is stopped\n")
         return 130

@@ -29,11 +29,13 @@ from robosc.model.structure import (
     Update,
     Variable,
 )
+from robosc.supervisor import decode, encode, make_supervisor
 from robosc.supervisor.structure import Supervisor
 from robosc.targets import GenerateOptions, generate
 from robosc.targets.python.layout import events, is_controllable
 from support.generated import example_supervisor, imported, load_system, python_text, same
 from support.models import EXAMPLE_DEPLOYMENTS, EXAMPLE_NAMES, model_of
+from support.random_models import random_bundle
 from support.random_supervisors import CERTIFICATE, random_data, random_supervisor
 
 STEPS = 25
@@ -110,6 +112,15 @@ class Twins:
 def test_a_random_supervisor_behaves_as_interpreted(seed: int) -> None:
     twins = Twins(random_supervisor(seed))
     twins.run(Random(seed), STEPS)
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.integers(0, 2**32 - 1))
+def test_the_supervisor_of_a_random_text_behaves_as_interpreted(seed: int) -> None:
+    made = make_supervisor(random_bundle(seed)).supervisor
+    if made is not None:
+        assert decode(encode(made)) == made
+        Twins(made).run(Random(seed), 10)
 
 
 def test_the_random_supervisors_show_everything() -> None:

@@ -27,6 +27,9 @@ from robosc.model.units import Unit
 _MAXIMUM_CHAIN = 50
 """Constants that are worked out because an earlier one needs them, one inside the other."""
 
+_MAXIMUM_CHAIN = 50
+"""Constants that are worked out because an earlier one needs them, one inside the other."""
+
 
 class Constants:
     """Resolves the constants of every file, each once, in whichever order they need each other.
@@ -68,18 +71,22 @@ class _Resolution(Mapping[str, Typed | None]):
         self._findings = findings
         self._found: dict[str, Typed | None] = {}
         self._open: list[str] = []
+        self._has_told_depth = False
         self._checker = ExpressionChecker(replace(scope, constants=self), findings)
 
     def __getitem__(self, name: str) -> Typed | None:
         tree = self._unit.constants[name]
         if name in self._open:
             chain = " needs ".join(f"'{item}'" for item in [*self._open[self._open.index(name) :], name])
-            self._findings.error(
-                "constant-cycle",
-                f"the constant depends on itself: {chain}",
-                tree.name.location,
-                "Write one as a value.",
-            )
+            message = f"the constant depends on itself: {chain}"
+            self._findings.error("constant-cycle", message, tree.name.location, "Write one of them as a value.")
+            self._found[name] = None
+        elif len(self._open) >= _MAXIMUM_CHAIN and name not in self._found:
+            if not self._has_told_depth:
+                message = f"constants need each other in a chain of more than {_MAXIMUM_CHAIN}"
+                mend = "Define them before they are used."
+                self._findings.error("nesting-too-deep", message, tree.name.location, mend)
+            self._has_told_depth = True
             self._found[name] = None
         if name not in self._found:
             self._open.append(name)
@@ -87,6 +94,9 @@ class _Resolution(Mapping[str, Typed | None]):
             self._open.pop()
             self._found.setdefault(name, found)
         return self._found[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._unit.constants  # Asking whether there is one must not resolve it.
 
     def __iter__(self) -> Iterator[str]:
         return iter(dict.fromkeys(i.name.text for i in self._unit.tree.items if isinstance(i, syntax.Constant)))

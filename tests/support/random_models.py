@@ -130,9 +130,9 @@ class _Author:
             f"{self._condition(2, {}, values, arrays=True)} -> {name}" for name in self._dice.sample(["near", "far"], 1)
         )
         parts.append(f"datatype enum {kind} from {scan} to {{ {rules} default -> nothing }}")
-        number = {"double": "value"}
+        received = {"double": "value"}
         parts.append(
-            f"datatype enum {level} from double to {{ {self._condition(1, {}, number)} -> low default -> high }}"
+            f"datatype enum {level} from double to {{ {self._condition(1, {}, received)} -> low default -> high }}"
         )
         return parts
 

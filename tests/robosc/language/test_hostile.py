@@ -1,0 +1,131 @@
+"""Texts that are no models, or far too much of one: one clear finding each, in time linear in the text."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from robosc.cli.main import main
+from robosc.errors import LanguageError
+from robosc.language import decode_source
+from robosc.language.bundle import MAXIMUM_BYTES
+from robosc.model import check
+from robosc.source import Bundle, SourceFile
+
+
+def codes(text: str, **libraries: str) -> list[str]:
+    files = tuple(SourceFile(f"{name}.rscd", source) for name, source in libraries.items())
+    return [item.code for item in check(Bundle(SourceFile("model.rscd", text), files)).diagnostics]
+
+
+@pytest.mark.parametrize(
+    ("content", "code"),
+    [
+        (b"robot R { \xff }", "not-utf8"),
+        (b"\xff\xfer\x00o\x00b\x00", "not-utf8"),
+        (b" " * (MAXIMUM_BYTES + 1), "file-too-large"),
+    ],
+)
+def test_what_is_no_text(content: bytes, code: str) -> None:
+    with pytest.raises(LanguageError) as raised:
+        decode_source(content, "model.rscd")
+    assert [item.code for item in raised.value.diagnostics] == [code]
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        ("", "empty-file"),
+        (" \n\t", "empty-file"),
+        ("// nothing", "syntax-error"),
+        ("robot R { /* open", "unclosed-comment"),
+        ("robot R { component C { incoming message m with identifier: 'x", "unclosed-string"),
+        ("robot R { \0 }", "invalid-character"),
+        ("robot R { requirement r needs " + "(" * 201 + "a" + ")" * 201 + " }", "nesting-too-deep"),
+        ("robot R { requirement r needs " + "min(" * 201 + "a" + ")" * 201 + " }", "nesting-too-deep"),
+        ("robot R { requirement r needs " + "if a then b else " * 201 + "c }", "nesting-too-deep"),
+        ("robot R { requirement r needs " + "a[" * 201 + "0" + "]" * 201 + " }", "nesting-too-deep"),
+        ("robot R { requirement r needs " + "any(x in y: " * 201 + "a" + ")" * 201 + " }", "nesting-too-deep"),
+        ("robot R { requirement r needs " + "!" * 201 + "a }", "nesting-too-deep"),
+        ("robot R { requirement r needs a" + " + a" * 201 + " }", "nesting-too-deep"),
+        ("robot R { provide r with " + "{ a: " * 201 + "1" + " }" * 201 + " }", "nesting-too-deep"),
+        ("robot R { datatype object O { x: " + "array(" * 201 + "double" + ")" * 201 + " } }", "nesting-too-deep"),
+        ("robot " + "r" * 1_000_000 + " { }", "name-too-long"),
+        ("robot R { constant K: integer = " + "9" * 100_000 + " }", "integer-too-large"),
+        ("robot R { constant K: double = " + "9" * 100_000 + ".0 }", "number-too-large"),
+        ("robot R { constant K: integer = -2147483649 }", "integer-too-large"),
+        ("r\u00f6bot R { }", "syntax-error"),
+        ("\ufeffrobot R { }", "syntax-error"),
+    ],
+)
+def test_one_finding(text: str, code: str) -> None:
+    assert [item for item in codes(text) if item != "empty-model"] == [code]
+
+
+def test_a_byte_order_mark_and_lone_carriage_returns_are_no_matter(tmp_path: Path) -> None:
+    path = tmp_path / "model.rscd"
+    path.write_bytes(b"\xef\xbb\xbfrobot R {\rcomponent C { incoming message m with type: none } // a\r\n}\r")
+    assert main(["check", str(path)]) == 0
+
+
+SIZES = 20_000
+LARGE: dict[str, Callable[[int], str]] = {
+    "states": lambda n: (
+        "robot R { component C { incoming message m with type: none behaviour { initial marked state s { } "
+        + "".join(f"state s{i} {{ on request to m goto s }}\n" for i in range(n))
+        + "} } }"
+    ),
+    "components": lambda n: "robot R {" + "".join(f"component C{i} {{ }}\n" for i in range(n)) + "}",
+    "enum values": lambda n: (
+        "robot R { datatype enum E from integer to {"
+        + "".join(f"value = {i} -> v{i}\n" for i in range(n))
+        + "default -> no } component C { outgoing message m with type: E behaviour { variable e: E "
+        "on response from m do e := value initial marked state s { } } } }"
+    ),
+    "properties": lambda n: (
+        "robot R { interface i use T from p datatype object O {"
+        + "".join(f"p{i}: double\n" for i in range(n))
+        + "} component C { incoming message m with type: O links i } provide m with {"
+        + ",\n".join(f"p{i}: {i}.5" for i in range(n))
+        + "} }"
+    ),
+    "operators": lambda n: (
+        "robot R { component C { incoming message m with type: none behaviour { initial marked state s { } } } "
+        "requirement m needs C.s" + " and C.s" * n + " }"
+    ),
+    "constants": lambda n: (
+        "robot R { component C { incoming message m with type: none } constant K0: integer = 1\n"
+        + "".join(f"constant K{i + 1}: integer = K{i}\n" for i in range(n))
+        + "}"
+    ),
+}
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("name", LARGE)
+def test_large_models_are_models(name: str) -> None:
+    assert codes(LARGE[name](SIZES)) in ([], ["empty-model"])
+
+
+@pytest.mark.timeout(60)
+def test_constants_that_need_each_other_backwards() -> None:
+    text = "robot R {" + "".join(f"constant K{i}: integer = K{i + 1}\n" for i in range(SIZES)) + "}"
+    found = codes(text)
+    assert sorted(found) == ["nesting-too-deep", "unknown-name"]
+
+
+@pytest.mark.timeout(60)
+def test_a_long_chain_of_imports() -> None:
+    libraries = {f"l{i}": f"library L{i} {{ component C from L{i + 1} import C }}" for i in range(500)}
+    libraries["l500"] = "library L500 { component C { incoming message m with type: none } }"
+    assert codes("robot R { component C from L0 import C }", **libraries) == []
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize(
+    "piece", ["component {", "requirement ", "provide m with {", "state s {", "on ", "constant :"]
+)
+def test_many_errors_are_told_up_to_a_limit(piece: str) -> None:
+    found = codes("robot R {" + piece * 50_000 + "}")
+    assert 1 <= len(found) <= 100
+    assert set(found) <= {"syntax-error", "nesting-too-deep"}

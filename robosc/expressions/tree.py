@@ -18,47 +18,47 @@ BinaryOperator = Literal["or", "and", "implies", "=", "!=", "<", "<=", ">", ">="
 PathStep = Name | Annotated[int, msgspec.Meta(ge=0, le=2**31 - 1)]
 
 
-class Constant(msgspec.Struct, frozen=True, tag_field="node", tag="constant"):
+class Constant(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="constant"):
     """A literal that is not an enum value."""
 
     value: Value
 
 
-class EnumValue(msgspec.Struct, frozen=True, tag_field="node", tag="enum"):
+class EnumValue(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="enum"):
     """A value of an enum."""
 
     enum: ScopedName
     value: Name
 
 
-class VariableRead(msgspec.Struct, frozen=True, tag_field="node", tag="variable"):
+class VariableRead(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="variable"):
     """The value of a component's variable."""
 
     component: Name
     variable: Name
 
 
-class StateTest(msgspec.Struct, frozen=True, tag_field="node", tag="state"):
+class StateTest(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="state"):
     """Whether a component is in a state."""
 
     component: Name
     state: Name
 
 
-class Received(msgspec.Struct, frozen=True, tag_field="node", tag="received"):
+class Received(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="received"):
     """Received data, or a part of it: property names and array indices, outermost first."""
 
     path: tuple[PathStep, ...] = ()
 
 
-class Unary(msgspec.Struct, frozen=True, tag_field="node", tag="unary"):
+class Unary(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="unary"):
     """An operator before one operand."""
 
     operator: UnaryOperator
     operand: "Expression"
 
 
-class Binary(msgspec.Struct, frozen=True, tag_field="node", tag="binary"):
+class Binary(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="binary"):
     """An operator between two operands."""
 
     operator: BinaryOperator
@@ -66,7 +66,7 @@ class Binary(msgspec.Struct, frozen=True, tag_field="node", tag="binary"):
     right: "Expression"
 
 
-class Conditional(msgspec.Struct, frozen=True, tag_field="node", tag="if"):
+class Conditional(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="if"):
     """`then` where the condition is true, `otherwise` where it is false; unknown where that is unknown."""
 
     condition: "Expression"
@@ -80,14 +80,14 @@ ARGUMENTS: dict[str, int] = {"abs": 1, "min": 2, "max": 2, "clamp": 3, "integer"
 """How many arguments each function takes."""
 
 
-class Call(msgspec.Struct, frozen=True, tag_field="node", tag="call"):
+class Call(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="call"):
     """A function of numbers: clamp takes value, least, greatest; the other names speak for themselves."""
 
     function: Function
     arguments: Annotated[tuple["Expression", ...], msgspec.Meta(max_length=3)]
 
 
-class Element(msgspec.Struct, frozen=True, tag_field="node", tag="element"):
+class Element(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="element"):
     """The element that a quantifier looks at, or a part of it.
 
     Attributes:
@@ -99,7 +99,7 @@ class Element(msgspec.Struct, frozen=True, tag_field="node", tag="element"):
     path: tuple[PathStep, ...] = ()
 
 
-class ArrayPart(msgspec.Struct, frozen=True):
+class ArrayPart(msgspec.Struct, frozen=True, gc=False):
     """The elements of an array that something looks at.
 
     Attributes:
@@ -114,14 +114,14 @@ class ArrayPart(msgspec.Struct, frozen=True):
     high: Annotated[int, msgspec.Meta(ge=0, le=2**31 - 1)] | None = None
 
 
-class Reduction(msgspec.Struct, frozen=True, tag_field="node", tag="reduction"):
+class Reduction(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="reduction"):
     """Number of elements, or the least or greatest of them; NaN entries do not count for the latter two."""
 
     function: Literal["length", "min", "max"]
     part: ArrayPart
 
 
-class Quantifier(msgspec.Struct, frozen=True, tag_field="node", tag="quantifier"):
+class Quantifier(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="quantifier"):
     """Whether a condition over `Element` is true for any, or for all, elements; unknown if there are none."""
 
     word: Literal["any", "all"]

@@ -22,11 +22,11 @@ ScopedName = Annotated[
 Integer32 = Annotated[int, msgspec.Meta(ge=MINIMUM_INTEGER, le=MAXIMUM_INTEGER)]
 
 
-class BooleanType(msgspec.Struct, frozen=True, tag_field="type", tag="boolean"):
+class BooleanType(msgspec.Struct, frozen=True, gc=False, tag_field="type", tag="boolean"):
     """true or false."""
 
 
-class IntegerType(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="type", tag="integer"):
+class IntegerType(msgspec.Struct, frozen=True, gc=False, omit_defaults=True, tag_field="type", tag="integer"):
     """A 32-bit integer; bounded when both `low` and `high` are given (inclusive)."""
 
     low: Integer32 | None = None
@@ -38,32 +38,32 @@ class IntegerType(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="ty
         return self.low is not None and self.high is not None
 
 
-class DoubleType(msgspec.Struct, frozen=True, tag_field="type", tag="double"):
+class DoubleType(msgspec.Struct, frozen=True, gc=False, tag_field="type", tag="double"):
     """An IEEE binary64 number."""
 
 
-class StringType(msgspec.Struct, frozen=True, tag_field="type", tag="string"):
+class StringType(msgspec.Struct, frozen=True, gc=False, tag_field="type", tag="string"):
     """A text."""
 
 
-class NoneType(msgspec.Struct, frozen=True, tag_field="type", tag="none"):
+class NoneType(msgspec.Struct, frozen=True, gc=False, tag_field="type", tag="none"):
     """No data at all."""
 
 
-class EnumType(msgspec.Struct, frozen=True, tag_field="type", tag="enum"):
+class EnumType(msgspec.Struct, frozen=True, gc=False, tag_field="type", tag="enum"):
     """One of finitely many names, in the order of their rules (each name once), the default included."""
 
     name: ScopedName
     values: tuple[Name, ...]
 
 
-class ObjectType(msgspec.Struct, frozen=True, tag_field="type", tag="object"):
+class ObjectType(msgspec.Struct, frozen=True, gc=False, tag_field="type", tag="object"):
     """A record; its properties stand in the model's `objects`."""
 
     name: ScopedName
 
 
-class ArrayType(msgspec.Struct, frozen=True, tag_field="type", tag="array"):
+class ArrayType(msgspec.Struct, frozen=True, gc=False, tag_field="type", tag="array"):
     """A sequence of unknown length."""
 
     element: "Type"

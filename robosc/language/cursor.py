@@ -51,6 +51,7 @@ class Cursor:
         self._possible: tuple[int, tuple[str, ...]] = (-1, ())
         self._resumed = -1
         self._depth = 0
+        self._faults = 0
 
     # Places
 
@@ -98,9 +99,15 @@ class Cursor:
 
     def told(self) -> Fault:
         """What to raise behind an error that has been reported with `report`."""
+        self._faults += 1
         if len(self.diagnostics) >= MAXIMUM_SYNTAX_ERRORS:
             raise TooManyFaults
         return Fault()
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether nothing had to be skipped so far."""
+        return not self._faults
 
     def deeper(self, opening: int, levels: int = 1) -> None:
         """Count brackets that are opened; the innermost construct calls `shallower` behind their end."""

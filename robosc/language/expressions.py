@@ -141,7 +141,8 @@ class ExpressionParser(Cursor):
         opening = self.take("(")
         self.deeper(opening)
         tree: syntax.Expression
-        if name.text in _QUANTIFIERS and self.texts[self.place + 1] == "in":
+        is_quantifier = name.text in _QUANTIFIERS and self.kinds[self.place] == _NAME
+        if is_quantifier and self.texts[self.place + 1] == "in":
             variable = self.name()
             self.take("in")
             array = self.access()

@@ -96,7 +96,7 @@ class _Parser(ExpressionParser):
         name = self.name()
         words = (f"'{word}'" for word in self._library_items)
         items = self.items(self._library_items, *words)
-        if self.kinds[self.place] != _END and not self.diagnostics:
+        if self.kinds[self.place] != _END and self.is_whole:
             raise self.fault("the end of the file")
         return syntax.File(self.texts[index] == "library", name, items)
 
@@ -320,14 +320,14 @@ class _Parser(ExpressionParser):
 
     def _disables_follows(self) -> bool:
         """Whether the word is the begin of an expression with `disables` behind it; reads nothing."""
-        begin, found, possible = self.place, len(self.diagnostics), self._possible
+        begin, found, possible, faults = self.place, len(self.diagnostics), self._possible, self._faults
         try:
             self.expression()
             return self.texts[self.place] == "disables"
         except (Fault, TooManyFaults):
             return False
         finally:
-            self.place, self._possible, self._depth = begin, possible, len(self._lists)
+            self.place, self._possible, self._depth, self._faults = begin, possible, len(self._lists), faults
             del self.diagnostics[found:]
 
     def _communications(self) -> tuple[syntax.Name, ...]:

@@ -71,28 +71,28 @@ class Deployment(StrEnum):
     LAYER = "layer"
 
 
-class Property(msgspec.Struct, frozen=True):
+class Property(msgspec.Struct, frozen=True, gc=False):
     """A named part of an object."""
 
     name: Name
     type: Type
 
 
-class ObjectDefinition(msgspec.Struct, frozen=True):
+class ObjectDefinition(msgspec.Struct, frozen=True, gc=False):
     """A record type of the robot (`Twist`) or of a library (`Library.Twist`)."""
 
     name: ScopedName
     properties: tuple[Property, ...]
 
 
-class EnumRule(msgspec.Struct, frozen=True):
+class EnumRule(msgspec.Struct, frozen=True, gc=False):
     """If `condition` (over `Received` data of the source type) is true, the enum has `value`."""
 
     condition: Expression
     value: Name
 
 
-class EnumDefinition(msgspec.Struct, frozen=True):
+class EnumDefinition(msgspec.Struct, frozen=True, gc=False):
     """How a received datum becomes one of finitely many names: the first true rule, else `default`."""
 
     name: ScopedName
@@ -102,7 +102,7 @@ class EnumDefinition(msgspec.Struct, frozen=True):
     default: Name
 
 
-class Interface(msgspec.Struct, frozen=True):
+class Interface(msgspec.Struct, frozen=True, gc=False):
     """A middleware type: `Twist` from the ROS package `geometry_msgs`."""
 
     type: Name
@@ -113,7 +113,7 @@ Quality = Literal["reliable", "best_effort", "sensor", "latched"]
 """How a message travels: delivery guaranteed; the newest only; as sensors do; also to who comes later."""
 
 
-class Communication(msgspec.Struct, frozen=True, omit_defaults=True):
+class Communication(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     """A message, service or action.
 
     Attributes:
@@ -175,7 +175,7 @@ class Communication(msgspec.Struct, frozen=True, omit_defaults=True):
         return {EventKind.RESPONSE: self.response, EventKind.FEEDBACK: self.feedback}.get(kind)
 
 
-class Variable(msgspec.Struct, frozen=True):
+class Variable(msgspec.Struct, frozen=True, gc=False):
     """A variable of a behaviour.
 
     Attributes:
@@ -191,7 +191,7 @@ class Variable(msgspec.Struct, frozen=True):
     is_synthesis: bool
 
 
-class State(msgspec.Struct, frozen=True):
+class State(msgspec.Struct, frozen=True, gc=False):
     """A state of a behaviour: a location of the component's automaton."""
 
     name: Name
@@ -199,14 +199,14 @@ class State(msgspec.Struct, frozen=True):
     is_marked: bool
 
 
-class Update(msgspec.Struct, frozen=True):
+class Update(msgspec.Struct, frozen=True, gc=False):
     """`variable := expression`, reading the state before the event."""
 
     variable: Name
     expression: Expression
 
 
-class Transition(msgspec.Struct, frozen=True):
+class Transition(msgspec.Struct, frozen=True, gc=False):
     """A transition of a behaviour.
 
     Attributes:
@@ -224,7 +224,7 @@ class Transition(msgspec.Struct, frozen=True):
     target: Name | None
 
 
-class Behaviour(msgspec.Struct, frozen=True):
+class Behaviour(msgspec.Struct, frozen=True, gc=False):
     """The automaton of a component as written."""
 
     variables: tuple[Variable, ...]
@@ -237,7 +237,7 @@ class Behaviour(msgspec.Struct, frozen=True):
         return next(state.name for state in self.states if state.is_initial)
 
 
-class Component(msgspec.Struct, frozen=True):
+class Component(msgspec.Struct, frozen=True, gc=False):
     """A part of the robot; imported ones carry their local name."""
 
     name: Name
@@ -251,7 +251,7 @@ class RequirementForm(StrEnum):
     DISABLES = "disables"
 
 
-class Requirement(msgspec.Struct, frozen=True):
+class Requirement(msgspec.Struct, frozen=True, gc=False):
     """A state-event requirement on the requests of some communications, as written."""
 
     communications: tuple[Name, ...]
@@ -264,7 +264,7 @@ class Requirement(msgspec.Struct, frozen=True):
         return self.expression if self.form is RequirementForm.NEEDS else Unary("not", self.expression)
 
 
-class Invariant(msgspec.Struct, frozen=True):
+class Invariant(msgspec.Struct, frozen=True, gc=False):
     """A state invariant: `requirement always expression`, or `requirement never expression`."""
 
     is_never: bool
@@ -276,7 +276,7 @@ class Invariant(msgspec.Struct, frozen=True):
         return Unary("not", self.expression) if self.is_never else self.expression
 
 
-class ObjectValue(msgspec.Struct, frozen=True, tag_field="node", tag="object"):
+class ObjectValue(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="object"):
     """Data given property by property; a missing property keeps the middleware's default."""
 
     properties: tuple[tuple[Name, "ProvidedValue"], ...]
@@ -285,7 +285,7 @@ class ObjectValue(msgspec.Struct, frozen=True, tag_field="node", tag="object"):
 ProvidedValue = ObjectValue | Expression
 
 
-class Provide(msgspec.Struct, frozen=True):
+class Provide(msgspec.Struct, frozen=True, gc=False):
     """Data for a request: the first statement of a communication whose condition is true."""
 
     communication: Name
@@ -293,7 +293,7 @@ class Provide(msgspec.Struct, frozen=True):
     condition: Expression | None
 
 
-class Model(msgspec.Struct, frozen=True):
+class Model(msgspec.Struct, frozen=True, gc=False):
     """A checked robot."""
 
     name: Name

@@ -34,6 +34,7 @@ _SAMPLES: dict[str, tuple[str, ...]] = {
     "IntegerToken": _NUMBERS,
     "StringToken": _STRINGS,
     "Minus": ("-",),
+    "Slash": ("/",),
     "NotSign": ("!",),
     "Equals": ("=",),
     "Colon": (":",),
@@ -64,17 +65,23 @@ def grammar_tokens(random: Random, size: int) -> list[str]:
 def joined(tokens: Sequence[str], random: Random) -> str:
     """A text of tokens: with blanks, with comments, or with as little as possible between them."""
     (style,) = random.choices(("blanks", "comments", "tight", "glued"), (4, 3, 4, 1))
-    between = {
-        "blanks": lambda: random.choice(_BLANKS),
-        "comments": lambda: "".join(random.choices(_COMMENTS + _BLANKS, k=random.randint(1, 3))),
-        "tight": lambda: "",
-        "glued": lambda: random.choice(("", "", " ")),
-    }[style]
-    text, before = between(), ""
+    text, before = _between(style, random), ""
     for token in tokens:
-        text += (" " if style == "tight" and _would_merge(before, token) else "") + token + between()
+        text += (" " if style == "tight" and _would_merge(before, token) else "") + token + _between(style, random)
         before = token
     return text
+
+
+def _between(style: str, random: Random) -> str:
+    match style:
+        case "blanks":
+            return random.choice(_BLANKS)
+        case "comments":
+            return "".join(random.choices(_COMMENTS + _BLANKS, k=random.randint(1, 3)))
+        case "glued":
+            return random.choice(("", "", " "))
+        case _:
+            return ""
 
 
 def damaged_tokens(tokens: Sequence[str], random: Random) -> list[str]:

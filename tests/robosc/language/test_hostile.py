@@ -122,9 +122,7 @@ def test_a_long_chain_of_imports() -> None:
 
 
 @pytest.mark.timeout(60)
-@pytest.mark.parametrize(
-    "piece", ["component {", "requirement ", "provide m with {", "state s {", "on ", "constant :"]
-)
+@pytest.mark.parametrize("piece", ["component {", "requirement ", "provide m with {", "state s {", "on ", "constant :"])
 def test_many_errors_are_told_up_to_a_limit(piece: str) -> None:
     found = codes("robot R {" + piece * 50_000 + "}")
     assert 1 <= len(found) <= 100

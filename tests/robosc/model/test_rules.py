@@ -3,8 +3,12 @@
 `§` stands where the finding must point.
 """
 
+import json
+from pathlib import Path
+
 import pytest
 
+from robosc.cli.main import main
 from robosc.errors import Severity
 from support.models import checked, marked_place
 
@@ -531,6 +535,20 @@ def test_rule(code: str, severity: str, broken: str, sound: str) -> None:
     assert found[0].mend.endswith(".")
     assert code not in {item.code for item in checked(sound).diagnostics}
     assert not checked(sound).has_errors, checked(sound).diagnostics
+
+
+@pytest.mark.parametrize(("code", "severity", "broken"), [rule[:3] for rule in (*RULES, *EXTENSION_RULES)])
+def test_the_command_prints_just_this_finding(
+    code: str, severity: str, broken: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text, line, column = marked_place(broken)
+    model = tmp_path / "model.rscd"
+    model.write_text(text, encoding="utf-8")
+    assert main(["check", "--json", str(model)]) == (1 if severity == "error" else 0)
+    assert main(["check", "--strict", str(model)]) == (0 if severity == "note" else 1)
+    document, _ = json.JSONDecoder().raw_decode(capsys.readouterr().out)
+    found = [(item["code"], item["severity"], item["line"], item["column"]) for item in document["diagnostics"]]
+    assert found == [(code, severity, line, column)]
 
 
 def test_services_without_a_link_have_no_type_that_could_conflict() -> None:

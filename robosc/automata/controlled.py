@@ -10,7 +10,7 @@ from robosc.errors import SynthesisCancelled
 Added = Mapping[str, Callable[[State], bool]]
 """What a supervisor adds to events; nothing for events that are not in it."""
 
-STOP_INTERVAL = 1024
+STOP_INTERVAL = 64
 """States handled between two questions whether to stop."""
 
 

@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+from robosc.formatting import format_text
 from robosc.language.words import RESERVED_WORDS
 from robosc.model import check
 from robosc.source import Bundle, SourceFile
@@ -37,6 +38,13 @@ def test_model_and_library_have_no_findings(name: str) -> None:
     found = check(bundle_of(starter))
     assert (found.model_or_raise().name, found.diagnostics) == (name, ())
     assert check(bundle_of(starter, f"{starter.stem}_parts.rscd")).diagnostics == ()
+
+
+@pytest.mark.parametrize("name", ["Courier", "_", "class"])
+def test_the_files_are_in_canonical_layout(name: str) -> None:
+    for file, text in make_starter(name).files.items():
+        if file.endswith(".rscd"):
+            assert format_text(text) == text
 
 
 @pytest.mark.parametrize("name", ["Courier", "_", "class", "X" * MAXIMUM_STEM])

@@ -180,8 +180,12 @@ def middleware_type(communication: Communication, types: Types) -> str:
     return f"std_msgs/{STANDARD_INTERFACES.get(type(crossing), 'Empty')}"
 
 
-def _transport(communication: Communication) -> tuple[str, int]:
-    return communication.effective_quality, communication.effective_depth
+def _agree(first: Communication, second: Communication) -> bool:
+    """Whether two messages on one topic travel alike; where the model is silent, each way has its own default."""
+    if all(item.quality is None and item.depth is None for item in (first, second)):
+        return True
+    transports = {(item.effective_quality, item.effective_depth) for item in (first, second)}
+    return len(transports) == 1
 
 
 def _quality_text(communication: Communication) -> str:
@@ -207,7 +211,7 @@ def check_topics(
                 "Use one middleware type on one identifier; nothing can be generated otherwise.",
                 RelatedPlace("the other type is used here", places[other.name]),
             )
-        elif other is not item and is_topic and _transport(other) != _transport(item):
+        elif other is not item and is_topic and not _agree(other, item):
             findings.warning(
                 "conflicting-topic",
                 f"'{item.identifier}' is '{_quality_text(other)}' for '{other.name}' and '{_quality_text(item)}' here",

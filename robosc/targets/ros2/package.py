@@ -121,6 +121,8 @@ def _environment() -> jinja2.Environment:
         "json": json.dumps,
         "literal": ascii,
         "names": lambda communications: tuple(item.name for item in communications),
+        "printable": printable,
+        "quality": lambda quality: f"{quality[0].replace('_', ' ')}, depth {quality[1]}",
         "pretty": lambda value: pprint.pformat(value, width=110, sort_dicts=False),
         "split_lines": str.splitlines,
     }

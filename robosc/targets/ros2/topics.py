@@ -69,9 +69,23 @@ class Topic:
     received: tuple[Communication, ...]
 
     @property
-    def is_sensor(self) -> bool:
-        """Whether it is received best effort, as sensor drivers send."""
-        return self.interface.package == "sensor_msgs"
+    def frames(self) -> dict[str, str]:
+        """The frame of each published message whose header is filled in."""
+        return {item.name: item.frame for item in self.published if item.frame is not None}
+
+    @property
+    def publisher_quality(self) -> tuple[str, int] | None:
+        """Quality of service and depth of what is published, if anything is."""
+        return _quality(self.published)
+
+    @property
+    def subscription_quality(self) -> tuple[str, int] | None:
+        """Quality of service and depth of what is received, if anything is."""
+        return _quality(self.received)
+
+
+def _quality(items: tuple[Communication, ...]) -> tuple[str, int] | None:
+    return (items[0].effective_quality, items[0].effective_depth) if items else None
 
 
 def topics(supervisor: Supervisor) -> tuple[Topic, ...]:
@@ -154,12 +168,28 @@ def _topic(model: Model, identifier: str, items: list[Communication]) -> Topic:
                 f"target ros2: the topic {identifier} has two types: {interface.package}/{interface.type} for "
                 f"'{items[0].name}' and {other.package}/{other.type} for '{item.name}'"
             )
-    return Topic(
+    topic = Topic(
         identifier,
         interface,
         tuple(item for item in items if item.kind is CommunicationKind.INCOMING_MESSAGE),
         tuple(item for item in items if item.kind is CommunicationKind.OUTGOING_MESSAGE),
     )
+    _require_one_quality(identifier, items)
+    return topic
+
+
+def _require_one_quality(identifier: str, items: list[Communication]) -> None:
+    """All messages on a topic travel alike; where the model says nothing of any, each way has a default of its own."""
+    if all(item.quality is None and item.depth is None for item in items):
+        return
+    first = items[0]
+    for item in items[1:]:
+        if _quality((item,)) != _quality((first,)):
+            raise UnsupportedModelError(
+                f"target ros2: the topic {identifier} has two qualities of service: {first.effective_quality} with "
+                f"depth {first.effective_depth} for '{first.name}' and {item.effective_quality} with depth "
+                f"{item.effective_depth} for '{item.name}'"
+            )
 
 
 def shape_of(model: Model, communication: Communication) -> Shape:

@@ -174,15 +174,29 @@ def test_the_parameter_file_holds_every_default(files: GeneratedFiles) -> None:
 def test_the_readme_names_every_topic_and_parameter(files: GeneratedFiles) -> None:
     readme = files["README.md"]
     for row in (
-        "| `/scan` | `sensor_msgs/msg/LaserScan` | received (best effort) | scan |",
-        "| `/line/correction` | `std_msgs/msg/Float32` | received | correction |",
-        "| `/cmd_vel` | `geometry_msgs/msg/Twist` | published | move, halt |",
+        "| `/scan` | `sensor_msgs/msg/LaserScan` | received | sensor, depth 5 | scan |",
+        "| `/line/correction` | `std_msgs/msg/Float32` | received | reliable, depth 10 | correction |",
+        "| `/cmd_vel` | `geometry_msgs/msg/Twist` | published | reliable, depth 10 | move, halt |",
         "| safe | no message is sent against a requirement, and no bad state is reached | passed |",
     ):
         assert row in readme
     assert "requirement move needs LineDetector.line_found" in readme
     for parameter in declarations(()):
         assert f"| `{parameter.name}` |" in readme
+
+
+def test_the_readme_tells_how_messages_travel() -> None:
+    model = robot(
+        "interface t use TwistStamped from geometry_msgs interface s use LaserScan from sensor_msgs "
+        "component C { "
+        'incoming message go with identifier: "/cmd", type: none, stamped: "base | `x`", qos: best_effort links t '
+        'outgoing message scan with identifier: "/scan", type: none, depth: 3, max_age: 30.0 links s }'
+    )
+    readme = generate(model, "ros2")["README.md"]
+    assert "| `/cmd` | `geometry_msgs/msg/TwistStamped` | published | best effort, depth 10 | go |" in readme
+    assert "| `/scan` | `sensor_msgs/msg/LaserScan` | received | sensor, depth 3 | scan |" in readme
+    assert "\n- `go` on `/cmd` is stamped with the current time" in readme
+    assert "\n- `scan` on `/scan` is stale after 30.0 s without a message" in readme
 
 
 @pytest.mark.parametrize("name", [FOLLOWER, MAZE])

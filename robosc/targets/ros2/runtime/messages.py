@@ -36,6 +36,9 @@ class Topic(NamedTuple):
         type: Name of its message type.
         published: Messages of the model that go out on it.
         received: Messages of the model that come in on it.
+        publisher: Quality of service and depth of what goes out.
+        subscription: Quality of service and depth of what comes in.
+        frames: Frame of each message that goes out with its header filled in.
     """
 
     identifier: str
@@ -43,6 +46,9 @@ class Topic(NamedTuple):
     type: str
     published: tuple[str, ...]
     received: tuple[str, ...]
+    publisher: Any
+    subscription: Any
+    frames: dict[str, str]
 
 
 class SetupError(Exception):
@@ -61,6 +67,18 @@ def load_message(package: str, name: str) -> Any:
         raise SetupError(
             f"the message type {package}/msg/{name} is not installed; build {package} and source its workspace"
         ) from error
+
+
+def require_header(message_class: Any, subject: str) -> None:
+    """Do nothing if a message has a header that can be stamped.
+
+    Raises:
+        SetupError: It has none.
+    """
+    if message_class.get_fields_and_field_types().get("header") != "std_msgs/Header":
+        raise SetupError(
+            f"{subject}: it is stamped, but {message_name(message_class)} has no header of type std_msgs/Header"
+        )
 
 
 def message_name(message_class: Any) -> str:

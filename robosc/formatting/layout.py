@@ -82,10 +82,9 @@ class _Measures:
             can_break = breaks[index + 1] or forced[index + 1]
             self.stops[index] = index + 1 if can_break else self.stops[index + 1]
 
-    def must_break(self, first: int, last: int, *, with_gap: bool) -> bool:
-        """Whether a break between these tokens, or also before the first, must be taken."""
-        begin = first - 1 if with_gap else first
-        return self.forced[last] > self.forced[begin]
+    def must_break(self, first: int, last: int) -> bool:
+        """Whether a break between these tokens must be taken."""
+        return self.forced[last] > self.forced[first]
 
     def width(self, first: int, last: int, *, with_gap: bool) -> int:
         """Columns of these tokens, perhaps with the gap before them, and of what cannot be broken off behind them."""
@@ -198,7 +197,7 @@ class _Writer:
         around = stack[-1]
         first, last = group.first - offset, group.last - offset
         is_broken = around.is_broken and (
-            measures.must_break(first, last, with_gap=group.is_clause)
+            measures.must_break(first, last)
             or self._column + measures.width(first, last, with_gap=group.is_clause) > WIDTH
         )
         # A bracket at the end of a statement's first line closes under the begin of that line.

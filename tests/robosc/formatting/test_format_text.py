@@ -257,6 +257,57 @@ def test_what_is_exactly_as_wide_as_a_line_stays_on_it() -> None:
     assert formatted_item(f"{start}{fits}b") == f"requirement x needs a\n    and {fits}b"
 
 
+def test_a_list_that_is_exactly_as_wide_as_a_line_stays_on_it() -> None:
+    start = "service x with request: none, response: "
+    name = "b" * (WIDTH - 8 - len(start))
+    assert formatted_item(f"component C {{ {start}{name} }}") == f"component C {{\n    {start}{name}\n}}"
+    assert formatted_item(f"component C {{ {start}{name}b }}") == (
+        f"component C {{\n    service x with\n        request: none,\n        response: {name}b\n}}"
+    )
+
+
+def test_what_cannot_be_broken_off_counts() -> None:
+    name = "b" * (WIDTH - 8 - len("a: f(c, )"))
+    entry = f"a: f(c, {name})"
+    assert formatted_item(f"provide x with {{ {entry} }}") == f"provide x with {{\n    {entry}\n}}"
+    # The comma makes it too wide.
+    assert formatted_item(f"provide x with {{ {entry}, d: 1 }}") == (
+        f"provide x with {{\n    a: f(\n        c,\n        {name}\n    ),\n    d: 1\n}}"
+    )
+
+
+def test_the_blank_before_a_clause_counts() -> None:
+    start = "provide x with { a: 1 } if "
+    name = "b" * (WIDTH - 4 - len(start))
+    assert formatted_item(start + name) == start + name
+    assert formatted_item(f"{start}{name}b") == f"provide x with {{ a: 1 }}\n    if {name}b"
+
+
+def test_a_clause_behind_a_comment_is_broken_too_if_it_is_too_wide() -> None:
+    name = "b" * 70
+    assert formatted_item(f"provide x with a // c\nif {name} and {name}") == (
+        f"provide x with a  // c\n    if {name}\n        and {name}"
+    )
+
+
+def test_a_bracket_around_one_word_is_not_broken() -> None:
+    name = "b" * 150
+    assert formatted_item(f"requirement x needs a[{name}]") == f"requirement x needs a[{name}]"
+
+
+def test_a_line_goes_on_behind_a_text_of_several_lines() -> None:
+    text = f"provide x with '{'a' * 90}\n{'b' * 40}' if f(c, {'d' * 60})"
+    assert format_text(f"robot R {{ {text} }}") == f"robot R {{\n    {text}\n}}\n"
+
+
+def test_what_ends_a_statement_goes_behind_a_lone_bracket_only() -> None:
+    inner = " and ".join(["b" * 30] * 4)
+    broken = inner.replace(" and", "\n        and")
+    assert formatted_item(f"requirement (a) and ({inner}) disables x") == (
+        f"requirement (a)\n    and (\n        {broken}\n    )\n    disables x"
+    )
+
+
 def test_a_comment_at_the_end_of_a_line_does_not_count() -> None:
     text = "requirement x needs a and " + "b" * 90
     assert formatted_item(f"{text} // {'c' * 50}") == f"{text}  // {'c' * 50}"
@@ -312,6 +363,14 @@ def test_indentation_ends_somewhere() -> None:
         ("component C // a\n{\n// b\n}", "component C {  // a\n    // b\n}"),
         ("component C // a\n{\n\n// b\n}", "component C {  // a\n    // b\n}"),
         ("provide x with { a: 1 // b\n\n,\nc: 2 }", "provide x with {\n    a: 1,  // b\n    c: 2\n}"),
+        (
+            "provide x with { a: 1 // b\n,\n// c\nd: 2 }",
+            "provide x with {\n    a: 1,  // b\n    // c\n    d: 2\n}",
+        ),
+        (
+            "provide x with { a: 1 // b\n/* c */,\nd: 2 }",
+            "provide x with {\n    a: 1,  // b\n    /* c */ d: 2\n}",
+        ),
         ("component C { /* a */ }", "component C { /* a */ }"),
         ("component C {\n/* a */ }", "component C { /* a */ }"),
         ("component C {\n\n// a\n\n}", "component C {\n    // a\n}"),

@@ -186,29 +186,24 @@ class Cursor:
 
     def items[Item](self, parsers: Mapping[str, Callable[[], Item]], *expected: str) -> tuple[Item, ...]:
         """Read items in braces, each known by its first word, and go on behind those that are broken."""
-        found: list[Item] = []
-        self._enter(parsers)
-        while True:
-            begin = self.place
-            parser = parsers.get(self.texts[begin])
-            if parser is None:
-                if self._ends(expected):
-                    break
-                continue
-            try:
-                found.append(parser())
-            except Fault:
-                self._recover(begin)
-        self._leave()
-        return tuple(found)
+        return self._in_braces(parsers, lambda: parsers.get(self.texts[self.place]), expected)
 
     def entries[Item](self, parser: Callable[[], Item], begins: Callable[[], bool], *expected: str) -> tuple[Item, ...]:
         """Read items in braces that begin with anything for which `begins` is true."""
+        return self._in_braces({}, lambda: parser if begins() else None, expected)
+
+    def _in_braces[Item](
+        self,
+        words: Mapping[str, object],
+        parser_here: Callable[[], Callable[[], Item] | None],
+        expected: tuple[str, ...],
+    ) -> tuple[Item, ...]:
         found: list[Item] = []
-        self._enter({})
+        self._enter(words)
         while True:
             begin = self.place
-            if not begins():
+            parser = parser_here()
+            if parser is None:
                 if self._ends(expected):
                     break
                 continue

@@ -23,6 +23,18 @@ EXAMPLE_DEPLOYMENTS = tuple(
     if (name, deployment) != ("line_follower/line_follower", Deployment.LAYER)
 )
 
+# A robot for which there is no supervisor: nothing controllable leads back from where a message leads to.
+EMPTY = """robot R {
+    component C {
+        outgoing message broken with type: none
+        behaviour {
+            initial marked state fine { on response from broken goto lost }
+            state lost { transition if value_seen goto fine }
+            variable value_seen: boolean
+        }
+    }
+}"""
+
 
 def bundle_of(text: str, **libraries: str) -> Bundle:
     """A bundle of a model's text and libraries by file name (without the ending)."""

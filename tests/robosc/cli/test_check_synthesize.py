@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from robosc.cli.main import main
-from support.models import EXAMPLES
+from support.models import EMPTY, EXAMPLES
 
 LINE_FOLLOWER = str(EXAMPLES / "line_follower" / "line_follower.rscd")
 
@@ -23,17 +23,6 @@ LIGHTS = """robot R {
     }
     requirement green needs Lights.lit
     requirement red needs Lights.dark or Lights.lit
-}"""
-
-EMPTY = """robot R {
-    component C {
-        outgoing message broken with type: none
-        behaviour {
-            initial marked state fine { on response from broken goto lost }
-            state lost { transition if value_seen goto fine }
-            variable value_seen: boolean
-        }
-    }
 }"""
 
 UNSUPPORTED = """robot R {

@@ -11,21 +11,10 @@ import pytest
 
 from robosc.cli.main import main
 from robosc.supervisor import decode
-from support.models import EXAMPLES
+from support.models import EMPTY, EXAMPLES
 
 LINE_FOLLOWER = str(EXAMPLES / "line_follower" / "line_follower.rscd")
 NAVIGATION = str(EXAMPLES / "navigation" / "navigation.rscd")
-
-EMPTY = """robot R {
-    component C {
-        outgoing message broken with type: none
-        behaviour {
-            initial marked state fine { on response from broken goto lost }
-            state lost { transition if value_seen goto fine }
-            variable value_seen: boolean
-        }
-    }
-}"""
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 
-from robosc.source import Bundle, Location
+from robosc.source import Bundle, Location, visible
 
 
 class Severity(StrEnum):
@@ -56,13 +56,13 @@ class Diagnostic:
 
     def __str__(self) -> str:
         place = f"{self.location}: " if self.location else ""
-        return f"{place}{self.severity}: {self.message} [{self.code}]"
+        return visible(f"{place}{self.severity}: {self.message} [{self.code}]")
 
     def render(self, bundle: Bundle | None = None) -> str:
         """The finding for a terminal: text, source line, caret, how to mend it, related places."""
-        lines = [str(self), *_excerpt(self.location, bundle), f"  = mend: {self.mend}"]
+        lines = [str(self), *_excerpt(self.location, bundle), visible(f"  = mend: {self.mend}")]
         for place in self.related:
-            lines.append(f"{place.location}: note: {place.message}")
+            lines.append(visible(f"{place.location}: note: {place.message}"))
             lines.extend(_excerpt(place.location, bundle))
         return "\n".join(lines)
 

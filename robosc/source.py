@@ -2,6 +2,7 @@
 
 import hashlib
 from dataclasses import dataclass
+from functools import lru_cache
 
 import msgspec
 
@@ -25,8 +26,21 @@ class SourceFile:
 
     def line(self, number: int) -> str:
         """The text of line `number` (from 1) without its line end; empty past the end."""
-        lines = self.text.split("\n", number)
+        lines = _lines(self.text)
         return lines[number - 1].rstrip("\r") if 0 < number <= len(lines) else ""
+
+
+def visible(text: str) -> str:
+    r"""A text on one line of a terminal: what would move the cursor or forge a line is shown as `\xNN`."""
+    if text.isprintable():
+        return text
+    return "".join(char if char.isprintable() else char.encode("unicode_escape").decode("ascii") for char in text)
+
+
+@lru_cache(maxsize=4)
+def _lines(text: str) -> list[str]:
+    """The lines of a text, kept for the next finding in it."""
+    return text.split("\n")
 
 
 class Location(msgspec.Struct, frozen=True, order=True, gc=False):

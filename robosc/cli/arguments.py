@@ -64,15 +64,15 @@ def read_bundle(arguments: argparse.Namespace) -> Bundle:
     from robosc.language.interfaces import interface_folders
 
     model: Path = arguments.model
-    if model.is_dir():
-        raise UsageError(f"{model} is a folder, not a model's file")
-    if not model.exists():
-        raise UsageError(f"there is no file {model}")
-    for what, folders in (("library", arguments.library_path), ("interface", arguments.interface_path)):
-        for folder in folders:
-            if not folder.is_dir():
-                raise UsageError(f"there is no {what} folder {folder}")
     try:
+        if model.is_dir():
+            raise UsageError(f"{model} is a folder, not a model's file")
+        if not model.exists():
+            raise UsageError(f"there is no file {model}")
+        for what, folders in (("library", arguments.library_path), ("interface", arguments.interface_path)):
+            for folder in folders:
+                if not folder.is_dir():
+                    raise UsageError(f"there is no {what} folder {folder}")
         interface_paths = (*arguments.interface_path, *interface_folders())
         return load_bundle(model, arguments.library_path, interface_paths)
     except OSError as error:

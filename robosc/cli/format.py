@@ -109,6 +109,8 @@ def _paths(names: Sequence[str]) -> tuple[Path, ...]:
     """
     found: dict[str, Path] = {}
     for name in names:
+        if not name:
+            raise UsageError("the name of a file is empty")
         try:
             for path in _files(Path(name)):
                 found.setdefault(os.path.realpath(path), path)

@@ -11,8 +11,9 @@ from collections.abc import Callable, Sequence
 from robosc._version import __version__
 from robosc.cli import check, doc, explain, explore, generate, new, synth
 from robosc.cli import format as format_
-from robosc.cli.output import ExitCode, UsageError, print_diagnostics
+from robosc.cli.output import ExitCode, UsageError, prepare_streams, print_diagnostics
 from robosc.errors import LanguageError, RoboscError
+from robosc.source import visible
 
 _EPILOG = """\
 exit status:
@@ -45,6 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def guarded(program: str, run: Callable[[], int]) -> int:
     """Run a command and turn every error into one clear message and an exit status."""
+    prepare_streams()
     try:
         status = run()
         sys.stdout.flush()
@@ -53,10 +55,10 @@ def guarded(program: str, run: Callable[[], int]) -> int:
         print_diagnostics(error.diagnostics, None)
         return ExitCode.FAILED
     except UsageError as error:
-        sys.stderr.write(f"{program}: {error}\n")
+        _complain(program, error)
         return ExitCode.USAGE
     except RoboscError as error:
-        sys.stderr.write(f"{program}: {error}\n")
+        _complain(program, error)
         # An engine or target that nobody has, or a folder that cannot be written, is no fault of the model.
         return ExitCode.USAGE if isinstance(error, LookupError | OSError) else ExitCode.FAILED
     except KeyboardInterrupt:
@@ -66,6 +68,15 @@ def guarded(program: str, run: Callable[[], int]) -> int:
         # The reader (head, less) left: that is no fault, but the interpreter must not flush into it at exit.
         sys.stdout = None
         return ExitCode.OK
+    except OSError as error:
+        place = error.filename or "the results"
+        _complain(program, f"cannot write {place}: {error.strerror or error}")
+        sys.stdout = None
+        return ExitCode.USAGE
+
+
+def _complain(program: str, problem: object) -> None:
+    sys.stderr.write(f"{program}: {visible(str(problem))}\n")
 
 
 if __name__ == "__main__":

@@ -4,6 +4,9 @@ Results go to standard output, findings and progress to standard error; with `--
 goes to standard output and holds the findings too.
 """
 
+import codecs
+import errno
+import io
 import json
 import os
 import sys
@@ -34,9 +37,22 @@ class UsageError(Exception):
     """Wrong use of a command that the argument parser cannot see, such as a folder that cannot be written."""
 
 
+def prepare_streams() -> None:
+    """Make standard output and error take any text: one that is closed swallows it, and no character is too foreign."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115  # as long as the process
+        elif isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
 def print_json(document: Mapping[str, object]) -> None:
     """One JSON document on standard output, keys in the order given."""
-    sys.stdout.write(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    # What cannot be encoded is escaped, and in JSON by JSON's own rules.
+    is_unicode = codecs.lookup(sys.stdout.encoding or "ascii").name.startswith("utf")
+    text = json.dumps(document, indent=2, ensure_ascii=not is_unicode, allow_nan=False)
+    sys.stdout.write(text + "\n")
 
 
 def print_diagnostics(diagnostics: Sequence[Diagnostic], bundle: Bundle | None) -> None:
@@ -81,7 +97,9 @@ def write_bytes(path: Path, content: bytes) -> None:
     """
     temporary: Path | None = None
     try:
-        target = path.resolve()
+        target = Path(os.path.realpath(path))
+        if target.is_symlink():
+            raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
         if target.exists() and not target.is_file():
             with target.open("wb") as place:
                 place.write(content)

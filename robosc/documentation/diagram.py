@@ -8,9 +8,9 @@ Mermaid's reference by number, `#59;` for a semicolon.
 import re
 from dataclasses import dataclass
 
-from robosc.documentation.markdown import visible
 from robosc.expressions.text import expression_text
 from robosc.model.structure import Behaviour, Transition
+from robosc.source import visible
 
 MAXIMUM_TRANSITIONS = 100
 """Transitions in a diagram; with more of them nobody can read it (and viewers refuse 500)."""

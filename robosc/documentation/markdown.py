@@ -6,19 +6,13 @@ Written for CommonMark with the tables of GitHub (https://github.github.com/gfm)
 import re
 from collections.abc import Iterable, Sequence
 
+from robosc.source import visible
+
 _PLAIN_CODE = re.compile(r"[^`|\\ ](?:[^`|\\]*[^`|\\ ])?")
 """What stands in a code span just as it is, also in a cell of a table."""
 
 _PLAIN_TEXT = re.compile(r"[A-Za-z0-9 ,;()'/-]")
 """Characters that mean nothing to Markdown wherever they stand inside a line."""
-
-
-def visible(text: str) -> str:
-    """Text on one line: what cannot be seen (line ends, marks that turn the direction) is written as an escape."""
-    return "".join(
-        character if character.isprintable() else character.encode("unicode_escape").decode("ascii")
-        for character in text
-    )
 
 
 def quoted(text: str) -> str:

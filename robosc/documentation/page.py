@@ -95,11 +95,14 @@ def _kind_counts(kinds: Sequence[CommunicationKind]) -> list[str]:
 def _components(model: Model) -> str:
     if not model.components:
         return ""
-    return blocks(heading(2, "Components"), *(_component(model, component) for component in model.components))
+    own: dict[str, list[str]] = {component.name: [] for component in model.components}
+    for item in model.communications:
+        own[item.component].append(item.name)
+    pages = (_component(component, own[component.name]) for component in model.components)
+    return blocks(heading(2, "Components"), *pages)
 
 
-def _component(model: Model, component: Component) -> str:
-    own = [item.name for item in model.communications if item.component == component.name]
+def _component(component: Component, own: Sequence[str]) -> str:
     speaks = f"Communications: {codes(own)}." if own else "It has no communications."
     if component.behaviour is None:
         return blocks(heading(3, code(component.name)), speaks, "It has no behaviour: it reacts to nothing.")

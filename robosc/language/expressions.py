@@ -32,12 +32,23 @@ class ExpressionParser(Cursor):
         """An expression, the whole of it."""
         begin = self.place
         tree = self._run()
+        return self._too_deep(begin) if self._is_deep(tree, begin) else tree
+
+    def require_shallow(self, tree: syntax.Expression, begin: int) -> None:
+        """Raise the fault that a tree from token `begin` on has too many levels, if it has."""
+        if self._is_deep(tree, begin):
+            self._too_deep(begin)
+            raise self.told()
+
+    def _is_deep(self, tree: syntax.Expression, begin: int) -> bool:
         # Fewer tokens than levels that are allowed cannot nest too deeply.
-        if self.place - begin > MAXIMUM_NESTING and precedence.depth_of(tree) > MAXIMUM_NESTING:
-            message = f"the expression has more than {MAXIMUM_NESTING} levels"
-            self.report("nesting-too-deep", message, self.since(begin), "Split the expression.")
-            return syntax.Literal(False, self.at(begin))
-        return tree
+        return self.place - begin > MAXIMUM_NESTING and precedence.depth_of(tree) > MAXIMUM_NESTING
+
+    def _too_deep(self, begin: int) -> syntax.Literal:
+        """Report the expression from token `begin` on; what stands for it."""
+        message = f"the expression has more than {MAXIMUM_NESTING} levels"
+        self.report("nesting-too-deep", message, self.since(begin), "Split the expression.")
+        return syntax.Literal(False, self.at(begin))
 
     def begins_expression(self) -> bool:
         """Whether the next token can begin an expression."""
@@ -48,6 +59,7 @@ class ExpressionParser(Cursor):
     def _run(self) -> syntax.Expression:
         """Operands and operators in turns; parentheses are matched with a stack, so their depth costs no recursion."""
         texts = self.texts
+        begin = self.place
         outer: list[_Group] = []
         group = _Group(-1, [], [], [])
         while True:
@@ -68,7 +80,7 @@ class ExpressionParser(Cursor):
             while outer and texts[self.place] == ")":
                 self.place += 1
                 self.shallower()
-                tree = precedence.build(group.operands, group.operators, self.report)
+                tree = self._tree(group, group.opening)
                 group = outer.pop()
                 group.operands.append(self._signed(group, tree))
             token = texts[self.place]
@@ -80,7 +92,13 @@ class ExpressionParser(Cursor):
             if outer:
                 self.possible("')'")
                 raise self._unclosed(group.opening)
+            return self._tree(group, begin)
+
+    def _tree(self, group: _Group, begin: int) -> syntax.Expression:
+        try:
             return precedence.build(group.operands, group.operators, self.report)
+        except precedence.TooDeepError:
+            return self._too_deep(begin)
 
     def _signed(self, group: "_Group", tree: syntax.Expression) -> syntax.Expression:
         """An operand behind the signs that stand before it."""
@@ -211,7 +229,9 @@ class ExpressionParser(Cursor):
                 "value",
             ):
                 raise self.fault("a name", "a number", "'true'", "'false'")
-            return self._primary() if self.kinds[index] != _NAME else self.access()
+            tree = self._primary() if self.kinds[index] != _NAME else self.access()
+            self.require_shallow(tree, index)
+            return tree
         sign = self.at(self.take("-"))
         if self.kinds[self.place] != _NUMBER:
             raise self.fault("a number")

@@ -6,14 +6,16 @@ in `tests/support/robosc.tx`, read by textX, is its opponent in the tests.
 """
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 
-from robosc.errors import Diagnostic, Severity, sorted_diagnostics
+from robosc.errors import Diagnostic, sorted_diagnostics
 from robosc.language import syntax
 from robosc.language.cursor import Fault, TooManyFaults
 from robosc.language.expressions import ExpressionParser
-from robosc.language.limits import MAXIMUM_NESTING
+from robosc.language.limits import FRAMES_PER_LEVEL, MAXIMUM_NESTING
 from robosc.language.tokens import Kind, Places, Tokens, obstacle, tokenize
+from robosc.recursion import allow_depth
 from robosc.source import SourceFile
 
 _NAME, _NUMBER, _END = int(Kind.NAME), int(Kind.NUMBER), int(Kind.END)
@@ -40,19 +42,12 @@ def parse(file: SourceFile) -> Parsed:
     hidden = obstacle(file, tokens, places)
     if hidden is not None:
         return Parsed(None, (hidden,))
+    # Whoever works with the tree walks it recursively too.
+    allow_depth(MAXIMUM_NESTING, FRAMES_PER_LEVEL)
     parser = _Parser(file, tokens, places)
     tree = None
-    try:
+    with suppress(Fault, TooManyFaults):
         tree = parser.file()
-    except (Fault, TooManyFaults):
-        pass
-    except RecursionError:
-        # The limits are far below what the interpreter stands, unless its caller has used up most of that.
-        message = f"this is nested too deeply (at most {MAXIMUM_NESTING} levels)"
-        mend = "Nest the expressions and objects less deeply."
-        parser.diagnostics.append(
-            Diagnostic(Severity.ERROR, "nesting-too-deep", message, parser.at(parser.place), mend)
-        )
     diagnostics = sorted_diagnostics(parser.diagnostics)
     return Parsed(None if diagnostics else tree, diagnostics)
 
@@ -283,7 +278,9 @@ class _Parser(ExpressionParser):
         return syntax.CommunicationTransition(kind, name, communication, tuple(updates), target, self.since(begin))
 
     def _update(self) -> syntax.Update:
+        begin = self.place
         target = self.access()
+        self.require_shallow(target, begin)
         self.take(":=")
         return syntax.Update(target, self.expression())
 

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 from robosc.language import syntax
+from robosc.language.limits import MAXIMUM_NESTING
 from robosc.source import Location
 
 LEVELS: tuple[frozenset[str], ...] = (
@@ -31,6 +32,10 @@ Operator = tuple[str, Location]
 _BALANCED_FROM = 16
 
 
+class TooDeepError(Exception):
+    """A chain of operators would become a tree with too many levels."""
+
+
 def build(operands: Sequence[syntax.Expression], operators: Sequence[Operator], report: Report) -> syntax.Expression:
     """The tree of `operands` with one operator between each two.
 
@@ -38,6 +43,9 @@ def build(operands: Sequence[syntax.Expression], operators: Sequence[Operator], 
         operands: At least one.
         operators: One less, each with its place.
         report: Takes what is wrong: a mixed `=>`.
+
+    Raises:
+        TooDeepError: A chain that cannot be balanced has more than `MAXIMUM_NESTING` operands.
     """
     if len(operands) == 1:
         return operands[0]
@@ -62,6 +70,9 @@ def _climb(operands: Sequence[syntax.Expression], operators: Sequence[Operator],
     chain = [operators[cut] for cut in cuts]
     if level < 2 and len(parts) > _BALANCED_FROM:
         return _balanced(parts, chain)
+    if len(parts) > MAXIMUM_NESTING:
+        # Not even built: the interpreter would take such a tree apart level by level on its own stack.
+        raise TooDeepError
     tree = parts[0]
     for (text, location), part in zip(chain, parts[1:], strict=True):
         tree = syntax.Binary(text, tree, part, location)
@@ -115,6 +126,12 @@ def depth_of(expression: syntax.Expression) -> int:
                 stack += [(part, depth + 1) for part in (condition, then, otherwise)]
             case syntax.Call(arguments=arguments):
                 stack += [(argument, depth + 1) for argument in arguments]
-            case syntax.Quantifier(condition=condition):
-                stack.append((condition, depth + 1))
+            case syntax.Quantifier(array=array, condition=condition):
+                stack += [(array, depth + 1), (condition, depth + 1)]
+            case syntax.Access(steps=steps):
+                for step in steps:
+                    if isinstance(step, syntax.Index):
+                        stack.append((step.value, depth + 1))
+                    elif isinstance(step, syntax.Slice):
+                        stack += [(step.low, depth + 1), (step.high, depth + 1)]
     return deepest

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import islice
 
 from robosc.errors import RelatedPlace
 from robosc.expressions import (
@@ -375,10 +376,12 @@ class BehaviourBuilder:
 
     def _check_graph(self, behaviour: Behaviour) -> None:
         """From every reachable state a marked state must be reachable."""
-        steps: dict[str, set[str]] = {state.name: set() for state in behaviour.states}
+        # What can happen in every state leaves from one more place, which every state leads to.
+        everywhere = ""
+        steps: dict[str, set[str]] = {everywhere: set(), **{state.name: {everywhere} for state in behaviour.states}}
         for transition in behaviour.transitions:
-            for source in steps if transition.source is None else (transition.source,):
-                steps[source].add(transition.target or source)
+            if transition.target is not None:
+                steps[transition.source or everywhere].add(transition.target)
         initial = [state.name for state in behaviour.states if state.is_initial]
         reachable = closure(initial[:1], steps)
         backwards: dict[str, set[str]] = {name: set() for name in steps}
@@ -446,22 +449,22 @@ def closure(start: list[str], steps: Mapping[str, set[str]]) -> set[str]:
 def partial_updates(tree: BehaviourTree, behaviour: Behaviour, findings: Findings) -> None:
     """Note code-only variables that a communication updates in some states but not in others."""
     code_only = {variable.name for variable in behaviour.variables if not variable.is_synthesis}
-    states = {state.name for state in behaviour.states}
-    updated: dict[tuple[str, str], set[str]] = {}
+    updated: dict[tuple[str, str], set[str | None]] = {}
     for transition in behaviour.transitions:
         if is_tau(transition.event):
             continue
         for update in transition.updates:
             if update.variable in code_only:
-                sources = states if transition.source is None else {transition.source}
-                updated.setdefault((update.variable, transition.event), set()).update(sources)
+                updated.setdefault((update.variable, transition.event), set()).add(transition.source)
     places = {variable.name.text: variable.name.location for variable in tree.variables}
     for (variable, event), sources in updated.items():
-        missing = sorted(states - sources)
-        if missing:
+        if None not in sources and len(sources) < len(behaviour.states):
+            # Only as many as are shown are looked for: there may be thousands of states, and of events.
+            missing = islice((state.name for state in behaviour.states if state.name not in sources), _MAXIMUM_SHOWN)
+            shown = [*missing, *(["..."] if len(behaviour.states) - len(sources) > _MAXIMUM_SHOWN else [])]
             findings.note(
                 "partial-update",
-                f"'{variable}' is updated on {event} only in some states, not in {', '.join(missing)}: it can be stale",
+                f"'{variable}' is updated on {event} only in some states, not in {', '.join(shown)}: it can be stale",
                 places[variable],
                 "Write the update in the behaviour itself, outside the states, if it should always happen.",
             )

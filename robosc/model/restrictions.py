@@ -1,6 +1,8 @@
 """Requirements, invariants and provided data of a robot, its own and those that imports bring (language B.7)."""
 
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 from robosc.errors import RelatedPlace
 from robosc.language import syntax
@@ -14,6 +16,41 @@ from robosc.model.types import Types
 from robosc.model.units import Libraries, Part, Unit
 
 _Item = syntax.Requirement | syntax.Invariant | syntax.Provide
+
+
+@dataclass(frozen=True, slots=True)
+class _Offer:
+    """What a library may bring, by what a component must have for it; with each item its place in the text.
+
+    Attributes:
+        by_communication: Requirements by their first communication, provide statements by theirs.
+        by_component: State invariants by each component that they read.
+        read: The components that each invariant reads, by its place.
+    """
+
+    by_communication: defaultdict[str, list[tuple[int, syntax.Requirement | syntax.Provide]]] = field(
+        default_factory=lambda: defaultdict(list)
+    )
+    by_component: defaultdict[str, list[tuple[int, syntax.Invariant]]] = field(
+        default_factory=lambda: defaultdict(list)
+    )
+    read: dict[int, frozenset[str]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, unit: Unit) -> "_Offer":
+        """What a library may bring."""
+        offer = cls()
+        for place, item in enumerate(unit.tree.items):
+            match item:
+                case syntax.Requirement(communications=names) if names:
+                    offer.by_communication[names[0].text].append((place, item))
+                case syntax.Provide(communication=name):
+                    offer.by_communication[name.text].append((place, item))
+                case syntax.Invariant(expression=expression):
+                    offer.read[place] = frozenset(_roots(expression) & unit.components.keys())
+                    for component in offer.read[place]:
+                        offer.by_component[component].append((place, item))
+        return offer
 
 
 class Restrictions:
@@ -48,6 +85,7 @@ class Restrictions:
         self._scopes = scopes
         self._types = types
         self._findings = findings
+        self._offers: dict[Unit, _Offer] = {}
         self._builders: dict[Unit, tuple[ExpressionChecker, ProvideBuilder]] = {}
         self.requirements: list[Requirement] = []
         self.invariants: list[Invariant] = []
@@ -56,36 +94,35 @@ class Restrictions:
     def build(self, communications: Mapping[str, Communication], places: Places) -> None:
         """Build all of them and note where they stand."""
         brought = set[int]()
+        own: defaultdict[str, list[str]] = defaultdict(list)
+        for communication in communications.values():
+            own[communication.component].append(communication.name)
         for item in self._unit.tree.items:
             if isinstance(item, syntax.Component):
                 part = self._parts.get(item.name.text)
                 if item.imported is None or part is None:
                     continue
-                for unit, tree in self._brought_by(part, item, communications):
+                for unit, tree in self._brought_by(item, own[part.name]):
                     if id(tree) not in brought and self._is_readable(tree, unit, part):
                         brought.add(id(tree))
                         self._add(tree, unit, communications, places)
             elif isinstance(item, _Item):
                 self._add(item, self._unit, communications, places)
 
-    def _brought_by(
-        self, part: Part, component: syntax.Component, communications: Mapping[str, Communication]
-    ) -> Iterator[tuple[Unit, _Item]]:
-        """What importing a component brings from each library on the way to its definition."""
-        own = {name for name, item in communications.items() if item.component == part.name}
+    def _brought_by(self, component: syntax.Component, own: Sequence[str]) -> Iterator[tuple[Unit, _Item]]:
+        """What importing a component with some communications brings from each library on the way to its definition."""
+        names = set(own)
         for unit, name in self._libraries.chain(component):
-            for item in unit.tree.items:
-                match item:
-                    case syntax.Requirement(communications=names):
-                        if names and all(each.text in own for each in names):
-                            yield unit, item
-                    case syntax.Provide(communication=each):
-                        if each.text in own:
-                            yield unit, item
-                    case syntax.Invariant(expression=expression):
-                        read = _roots(expression) & unit.components.keys()
-                        if name in read and read <= self._scopes.of(unit).components.keys():
-                            yield unit, item
+            offer = self._offers.get(unit) or self._offers.setdefault(unit, _Offer.of(unit))
+            found: dict[int, _Item] = {}
+            for each in own:
+                for place, item in offer.by_communication.get(each, ()):
+                    if isinstance(item, syntax.Provide) or all(other.text in names for other in item.communications):
+                        found[place] = item
+            imported = self._scopes.of(unit).components.keys()
+            found |= {place: item for place, item in offer.by_component.get(name, ()) if offer.read[place] <= imported}
+            for place in sorted(found):
+                yield unit, found[place]
 
     def _is_readable(self, tree: _Item, unit: Unit, part: Part) -> bool:
         """Whether every component that it reads has been imported; else it is an error of the import."""
@@ -157,6 +194,6 @@ def _roots(expression: syntax.Expression) -> set[str]:
                 stack += [condition, then, otherwise]
             case syntax.Call(arguments=arguments):
                 stack += arguments
-            case syntax.Quantifier(condition=condition):
-                stack.append(condition)
+            case syntax.Quantifier(array=array, condition=condition):
+                stack += [array, condition]
     return found

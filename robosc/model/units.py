@@ -7,7 +7,10 @@ from robosc.errors import RelatedPlace
 from robosc.language import parse, syntax
 from robosc.language.scan import declared_libraries
 from robosc.model.findings import Findings
-from robosc.source import Bundle, Location
+from robosc.source import Bundle, Location, SourceFile
+
+_MAXIMUM_SHOWN = 6
+"""Imports of a cycle that are told."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,6 +102,11 @@ class Libraries:
         self._units: dict[str, Unit] = {main.tree.name.text: main} if main.tree.is_library else {}
         self._broken = set[str]()
         self._parsed: dict[str, syntax.File | None] = {}
+        self._origins: dict[tuple[Unit, str], tuple[Unit, str]] = {}
+        self._declaring: dict[str, list[SourceFile]] = {}
+        for file in bundle.libraries:
+            for library in declared_libraries(file.text):
+                self._declaring.setdefault(library, []).append(file)
 
     def unit(self, name: syntax.Name) -> Unit | None:
         """The library called `name`, or None after reporting why there is none."""
@@ -116,10 +124,14 @@ class Libraries:
         seen = set[tuple[Unit, str]]()
         here: Unit | None = unit
         while here is not None and (here, component) not in seen and component in here.components:
+            found = self._origins.get((here, component))
             seen.add((here, component))
             source = here.components[component].imported
-            if source is None:
-                return here, component
+            if source is None or found is not None:
+                found = found or (here, component)
+                # Libraries are never given up again, so what is found once stays true; one that is missing may come.
+                self._origins.update(dict.fromkeys(seen, found))
+                return found
             here, component = self._units.get(source.library.text), source.component.text
         return None
 
@@ -138,10 +150,8 @@ class Libraries:
 
     def _find(self, name: syntax.Name) -> Unit | None:
         found: dict[str, syntax.File] = {}
-        for file in self._bundle.libraries:
-            # A broken library that nothing imports is nobody's error, so only those that are asked for are parsed.
-            if name.text not in declared_libraries(file.text):
-                continue
+        # A broken library that nothing imports is nobody's error, so only those that are asked for are parsed.
+        for file in self._declaring.get(name.text, ()):
             if file.name not in self._parsed:
                 parsed = parse(file)
                 self._parsed[file.name] = parsed.tree
@@ -151,7 +161,7 @@ class Libraries:
                 self._broken.add(name.text)
             elif tree.is_library and tree.name.text == name.text:
                 found[file.name] = tree
-        if len({file.text for file in self._bundle.libraries if file.name in found}) > 1:
+        if len({file.text for file in self._declaring.get(name.text, ()) if file.name in found}) > 1:
             self._broken.add(name.text)
             self._findings.error(
                 "ambiguous-library",
@@ -168,9 +178,8 @@ class Libraries:
 
     def _unknown(self, name: syntax.Name) -> None:
         looked = ", ".join(self._bundle.searched) or "the files that came with the model"
-        known = sorted(set[str]().union(*(declared_libraries(file.text) for file in self._bundle.libraries)))
         mend = f"Put the library into one of the folders looked at ({looked}) or name its folder with -L."
-        self._findings.unknown("library", name.text, name.location, known, mend)
+        self._findings.unknown("library", name.text, name.location, self._declaring, mend)
 
 
 def parts_of(unit: Unit, libraries: Libraries, findings: Findings) -> tuple[Part, ...]:
@@ -199,22 +208,32 @@ def parts_of(unit: Unit, libraries: Libraries, findings: Findings) -> tuple[Part
     return tuple(parts)
 
 
+def _cycle_text(followed: list[tuple[Unit, str]], again: tuple[Unit, str]) -> str:
+    """The imports that lead back to where they began; of a long way its begin."""
+    cycle = followed[followed.index(again) :]
+    names = [f"'{name}' of '{unit.tree.name.text}'" for unit, name in (*cycle, again)]
+    if len(names) > _MAXIMUM_SHOWN:
+        names = [*names[: _MAXIMUM_SHOWN - 1], "...", names[-1]]
+    return " from ".join(names)
+
+
 def _follow(
     unit: Unit, component: syntax.Component, libraries: Libraries, findings: Findings
 ) -> tuple[Unit, syntax.Component] | None:
     """The unit and definition that a chain of imports ends at, or None after reporting why it does not."""
-    seen: list[tuple[Unit, str]] = []
+    wanted_name = component.name.text
+    seen: dict[tuple[Unit, str], None] = {}
     while component.imported is not None:
         if (unit, component.name.text) in seen:
-            chain = " from ".join(name for _, name in [*seen, (unit, component.name.text)])
+            chain = _cycle_text(list(seen), (unit, component.name.text))
             findings.error(
                 "import-cycle",
-                f"the import never ends: {chain}",
+                f"the import of '{wanted_name}' never ends: {chain}",
                 component.imported.component.location,
                 "Define the component in one of the libraries.",
             )
             return None
-        seen.append((unit, component.name.text))
+        seen[unit, component.name.text] = None
         library = libraries.unit(component.imported.library)
         if library is None:
             return None

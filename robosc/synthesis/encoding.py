@@ -14,8 +14,12 @@ from typing import Any
 from robosc.automata.state import Subject, initial_state, subject_domain, subject_type, subjects
 from robosc.automata.structure import InputVariable, System
 from robosc.expressions import IntegerType, PathStep, Type, Value, domain
-from robosc.synthesis.engines import Manager, allow_depth
+from robosc.recursion import allow_depth
+from robosc.synthesis.engines import Manager
 from robosc.synthesis.order import input_targets, subject_order
+
+_FRAMES_PER_LEVEL = 4
+"""The plain engine and the walks of `nodes` and `diagrams` go down a level at a time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +65,8 @@ class Encoding:
         self._choices = 0
         self._declare()
         # Twice the bits of a state, for the next one; choices are few.
-        allow_depth(2 * len(self.state_names) + sum(len(_names(bits)) for _, bits in self.inputs))
+        levels = 2 * len(self.state_names) + sum(len(_names(bits)) for _, bits in self.inputs)
+        allow_depth(levels, _FRAMES_PER_LEVEL)
 
     def _type(self, subject: Subject) -> Type | None:
         return None if subject.variable is None else subject_type(self.system, subject)

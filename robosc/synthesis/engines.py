@@ -5,7 +5,6 @@ what the two do differently (counting, restricting, complemented edges) is not u
 """
 
 import importlib
-import sys
 from collections.abc import Callable, Iterable, Mapping
 from importlib.metadata import entry_points
 from typing import Any, Protocol
@@ -13,11 +12,6 @@ from typing import Any, Protocol
 from robosc.errors import RoboscError
 
 ENTRY_POINTS = "robosc.bdd_engines"
-
-_FRAMES = 1000
-"""Frames for everything but the walk through a diagram: Python's own limit when it starts."""
-
-_FRAMES_PER_LEVEL = 4
 
 
 class Manager(Protocol):
@@ -105,17 +99,6 @@ def make_manager(name: str) -> Manager:
     except (ImportError, AttributeError) as error:
         raise UnknownEngineError(f"the engine '{name}' cannot be loaded from {point.value}: {error}") from error
     return factory()
-
-
-def allow_depth(levels: int) -> None:
-    """Let Python recurse through diagrams of so many levels.
-
-    The plain engine and the walks of `nodes` and `diagrams` go down a level at a time. The limit belongs to the whole
-    interpreter, so it is raised and never lowered: another thread may be deep in a diagram of its own.
-    """
-    needed = _FRAMES + _FRAMES_PER_LEVEL * levels
-    if sys.getrecursionlimit() < needed:
-        sys.setrecursionlimit(needed)
 
 
 def _has_cudd() -> bool:

@@ -8,14 +8,14 @@ from hypothesis import given, settings
 
 from robosc.documentation import page
 from robosc.documentation.diagram import MAXIMUM_LABEL, MAXIMUM_TRANSITIONS, label
-from robosc.documentation.markdown import quoted, visible
+from robosc.documentation.markdown import quoted
 from robosc.errors import Diagnostic, LanguageError, Severity
 from robosc.expressions import Constant, EnumType
 from robosc.expressions.text import expression_text
 from robosc.language import load_bundle
 from robosc.model import check
 from robosc.model.structure import Behaviour, Model, Variable
-from robosc.source import Location
+from robosc.source import Location, visible
 from support.corpus import bundle_of_case, cases
 from support.models import EXAMPLE_NAMES, EXAMPLES, example_model, model_of
 from support.pages import Diagram, Section, read_page, read_text

@@ -7,6 +7,7 @@ sec. 4.8): it skips to a word that can begin an item of one of the lists that ar
 the innermost one.
 """
 
+import difflib
 from collections.abc import Callable, Mapping
 
 from robosc.errors import Diagnostic, RelatedPlace, Severity
@@ -20,6 +21,8 @@ _NAME, _WORD, _NUMBER, _STRING, _END = (
     int(kind) for kind in (Kind.NAME, Kind.WORD, Kind.NUMBER, Kind.STRING, Kind.END)
 )
 _MAXIMUM_SHOWN = 40
+_NEAR = 0.75
+"""How much a misspelt word must share with the one that was meant."""
 
 
 class Fault(Exception):
@@ -71,11 +74,12 @@ class Cursor:
         """An error that does not keep the parser from reading on."""
         self.diagnostics.append(Diagnostic(Severity.ERROR, code, message, location, mend, related))
 
-    def possible(self, *words: str) -> None:
-        """Remember what could have stood here too, for the error that the next token may become."""
-        if self._possible[0] == self.place:
+    def possible(self, *words: str, ahead: int = 0) -> None:
+        """Remember what could have stood here, or some tokens ahead, for the error that the token may become."""
+        index = self.place + ahead
+        if self._possible[0] == index:
             words = (*self._possible[1], *words)
-        self._possible = (self.place, words)
+        self._possible = (index, words)
 
     def fault(self, *expected: str, related: tuple[RelatedPlace, ...] = ()) -> Fault:
         """The error that the next token is not what was expected; raise it.
@@ -198,8 +202,23 @@ class Cursor:
         parser_here: Callable[[], Callable[[], Item] | None],
         expected: tuple[str, ...],
     ) -> tuple[Item, ...]:
+        return self._list(self._brace(words), words, parser_here, expected)
+
+    def go_on[Item](self, parsers: Mapping[str, Callable[[], Item]], *expected: str) -> None:
+        """Read on behind a brace that should not have closed the outermost list, for the errors alone."""
+        self._list(self.place - 1, parsers, lambda: parsers.get(self.texts[self.place]), expected)
+
+    def _list[Item](
+        self,
+        opening: int,
+        words: Mapping[str, object],
+        parser_here: Callable[[], Callable[[], Item] | None],
+        expected: tuple[str, ...],
+    ) -> tuple[Item, ...]:
         found: list[Item] = []
-        self._enter(words)
+        self._braces.append(opening)
+        self._lists.append(words)
+        self._depth += 1
         while True:
             begin = self.place
             parser = parser_here()
@@ -211,18 +230,23 @@ class Cursor:
                 found.append(parser())
             except Fault:
                 self._recover(begin)
-        self._leave()
-        return tuple(found)
-
-    def _enter(self, parsers: Mapping[str, object]) -> None:
-        self._braces.append(self.take("{"))
-        self._lists.append(parsers)
-        self._depth += 1
-
-    def _leave(self) -> None:
         self._braces.pop()
         self._lists.pop()
         self._depth -= 1
+        return tuple(found)
+
+    def _brace(self, words: Mapping[str, object]) -> int:
+        """Read the `{` of a list; its index."""
+        index = self.place
+        if self.texts[index] == "{":
+            self.place += 1
+            return index
+        fault = self.fault("'{'")
+        # With more ends than begins in the text, it is the '{' that was forgotten and not the whole list.
+        is_forgotten = self.texts.count("{") < self.texts.count("}")
+        if is_forgotten and (self.texts[index] in words or self.texts[index] == "}"):
+            return index
+        raise fault
 
     def _ends(self, expected: tuple[str, ...]) -> bool:
         """Whether the list ends at a token that begins none of its items; reports one that should not be there."""
@@ -230,7 +254,9 @@ class Cursor:
         if self.texts[index] == "}":
             self.place += 1
             return True
-        if index != self._resumed:
+        # Behind a brace too many nothing is left to close.
+        is_at_end = self.kinds[index] == _END and self.texts[self._braces[-1]] == "}"
+        if index != self._resumed and not is_at_end:
             related: tuple[RelatedPlace, ...] = ()
             if self.kinds[index] == _END or self._begins_item(index):
                 related = (RelatedPlace("this '{' is not closed", self.at(self._braces[-1])),)
@@ -252,6 +278,20 @@ class Cursor:
             self.kinds[index + 1] == _NAME if follow == "a name" else follow is True or self.texts[index + 1] in follow
         )
 
+    def _reads_body(self, begin: int, opening: int) -> bool:
+        """Read the list that a broken item still has, if its first word tells what it is a list of."""
+        words = difflib.get_close_matches(self.texts[begin][:MAXIMUM_NAME], self._lists[-1], n=1, cutoff=_NEAR)
+        reader = self.body_of(words[0], self.texts[begin + 1]) if words else None
+        if reader is None:
+            return False
+        self.place = opening
+        reader()
+        return True
+
+    def body_of(self, word: str, following: str) -> Callable[[], object] | None:
+        """What reads the list in braces of an item that begins with these words, or None if it has none."""
+        raise NotImplementedError
+
     def _recover(self, begin: int) -> None:
         """Skip to where an open list can go on, knowing that the item at token `begin` is broken."""
         index = self.place
@@ -262,6 +302,9 @@ class Cursor:
         while self.kinds[index] != _END:
             token = self.texts[index]
             if token == "{":
+                if depth == 0 and self._reads_body(begin, index):
+                    index = self.place
+                    continue
                 depth += 1
             elif token == "}":
                 if depth <= 0:

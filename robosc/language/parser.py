@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 
-from robosc.errors import Diagnostic, sorted_diagnostics
+from robosc.errors import Diagnostic, RelatedPlace, sorted_diagnostics
 from robosc.language import syntax
 from robosc.language.cursor import Fault, TooManyFaults
 from robosc.language.expressions import ExpressionParser
@@ -89,11 +89,30 @@ class _Parser(ExpressionParser):
             raise self.fault("'robot'", "'library'")
         self.place += 1
         name = self.name()
-        words = (f"'{word}'" for word in self._library_items)
+        words = [f"'{word}'" for word in self._library_items]
         items = self.items(self._library_items, *words)
         if self.kinds[self.place] != _END and self.is_whole:
-            raise self.fault("the end of the file")
+            closing = RelatedPlace(f"this '}}' ends the {self.texts[index]}", self.at(self.place - 1))
+            self.fault("the end of the file", related=(closing,))
+        while self.texts[self.place] in ("}", *self._library_items):
+            self.go_on(self._library_items, *words)
         return syntax.File(self.texts[index] == "library", name, items)
+
+    def body_of(self, word: str, following: str) -> Callable[[], object] | None:
+        """What reads the list in braces of an item that begins with these words, or None if it has none."""
+        match word, following:
+            case "component", _:
+                return self._component_list
+            case "behaviour", _:
+                return self._behaviour_list
+            case "initial" | "marked" | "state", _:
+                return self._state_list
+            case "datatype", "object":
+                return self._object_list
+            case "datatype", "enum":
+                return self._enum_list
+            case _:
+                return None
 
     # Definitions
 
@@ -117,15 +136,20 @@ class _Parser(ExpressionParser):
         self.take("datatype")
         if self.takes("object"):
             name = self.name()
-            return syntax.ObjectDefinition(name, self.entries(self._property, self._begins_name, "a name"))
+            return syntax.ObjectDefinition(name, self._object_list())
         if not self.takes("enum"):
             raise self.fault()
         name = self.name()
         self.take("from")
         source = self.type()
         self.take("to")
-        rules = self.entries(self._rule, self._begins_rule, "an expression", "'default'")
-        return syntax.EnumDefinition(name, source, rules)
+        return syntax.EnumDefinition(name, source, self._enum_list())
+
+    def _object_list(self) -> tuple[syntax.Property, ...]:
+        return self.entries(self._property, self._begins_name, "a name")
+
+    def _enum_list(self) -> tuple[syntax.EnumRule, ...]:
+        return self.entries(self._rule, self._begins_rule, "an expression", "'default'")
 
     def _begins_name(self) -> bool:
         return self.kinds[self.place] == _NAME
@@ -154,8 +178,10 @@ class _Parser(ExpressionParser):
             library = self.name()
             self.take("import")
             return syntax.Component(name, (), syntax.Import(library, self.name()))
-        words = (f"'{word}'" for word in self._component_items)
-        return syntax.Component(name, self.items(self._component_items, *words), None)
+        return syntax.Component(name, self._component_list(), None)
+
+    def _component_list(self) -> tuple[syntax.Communication | syntax.Behaviour, ...]:
+        return self.items(self._component_items, *(f"'{word}'" for word in self._component_items))
 
     def _message(self) -> syntax.Message:
         direction = syntax.Direction(self.texts[self.place])
@@ -238,8 +264,10 @@ class _Parser(ExpressionParser):
 
     def _behaviour(self) -> syntax.Behaviour:
         place = self.at(self.take("behaviour"))
-        words = (f"'{word}'" for word in self._behaviour_items)
-        return syntax.Behaviour(self.items(self._behaviour_items, *words), place)
+        return syntax.Behaviour(self._behaviour_list(), place)
+
+    def _behaviour_list(self) -> tuple[syntax.Variable | syntax.State | syntax.Transition, ...]:
+        return self.items(self._behaviour_items, *(f"'{word}'" for word in self._behaviour_items))
 
     def _variable(self) -> syntax.Variable:
         self.take("variable")
@@ -253,8 +281,10 @@ class _Parser(ExpressionParser):
         is_marked = self.takes("marked")
         self.take("state")
         name = self.name()
-        transitions = self.items(self._transitions, "'on'", "'transition'")
-        return syntax.State(name, is_initial, is_marked, transitions)
+        return syntax.State(name, is_initial, is_marked, self._state_list())
+
+    def _state_list(self) -> tuple[syntax.Transition, ...]:
+        return self.items(self._transitions, "'on'", "'transition'")
 
     def _on(self) -> syntax.CommunicationTransition:
         begin = self.take("on")
@@ -303,6 +333,8 @@ class _Parser(ExpressionParser):
             names = self._communications()
             self.take("needs")
             return syntax.Requirement(names, False, self.expression(), place)
+        if self.kinds[self.place] == _NAME:
+            self.possible("'needs'", ahead=1)
         expression = self.expression()
         self.take("disables")
         return syntax.Requirement(self._communications(), True, expression, place)

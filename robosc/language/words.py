@@ -45,6 +45,13 @@ _GROUPS: tuple[tuple[str, frozenset[str]], ...] = (
 )
 """Words that are told in one, the larger groups before the smaller ones that they contain."""
 
+_WORDS_OF: dict[str, tuple[str, ...]] = {
+    "an operator": ("and", "or"),
+    "an expression": ("true", "false", "value", "if"),
+    "a type": ("boolean", "integer", "double", "string", "array", "none"),
+}
+"""The words among what is expected under a common name."""
+
 _MAXIMUM_WORDS = 8
 
 _MAXIMUM_MEANT = 40
@@ -68,6 +75,17 @@ def expected_words(expected: Iterable[str]) -> str:
     if len(shown) > _MAXIMUM_WORDS:
         shown = [*shown[:_MAXIMUM_WORDS], "..."]
     return " or ".join([", ".join(shown[:-1]), shown[-1]]) if len(shown) > 1 else "".join(shown)
+
+
+def _near_word(token: str, expected: Iterable[str]) -> str | None:
+    """The word that a misspelt one was meant to be, if one of those expected is near."""
+    words: list[str] = []
+    for word in expected:
+        words += [word.strip("'")] if word[0] == "'" else _WORDS_OF.get(word, ())
+    near = difflib.get_close_matches(token[:_MAXIMUM_MEANT], words, n=1, cutoff=0.75)
+    # Of a short word two letters that changed places are half.
+    turned = [word for word in words if len(word) < 5 and sorted(word) == sorted(token)]
+    return next(iter([*near, *turned]), None)
 
 
 def unescape(token: str) -> str:
@@ -100,8 +118,11 @@ def mend_syntax(before: str, token: str, expected: Sequence[str]) -> str:
         return "Remove it, or open it with '('."
     if token in RESERVED_WORDS and any(word in expected for word in ("a name", "an expression", "a type")):
         return f"If '{token}' is meant as a name, write '^{token}'."
-    words = [word.strip("'") for word in expected if word[0] == "'"]
-    near = difflib.get_close_matches(token[:_MAXIMUM_MEANT], words, n=1, cutoff=0.75)
+    near = _near_word(token, expected)
     if near:
-        return f"Did you mean '{near[0]}'?"
+        return f"Did you mean '{near}'?"
+    if token == "}" and "the end of the file" in expected:
+        return "Remove it: there is one '}' too many, here or before."
+    if len(set(expected)) == 1 and expected[0][0] == "'":
+        return f"Write {expected[0]} before it, or look for a bracket or comma missing before."
     return "Write one of the expected words here, or look for a bracket or comma missing before."

@@ -387,7 +387,8 @@ class ExpressionChecker:
                 f"Write '{own.name}.{name}'.",
             )
         elif name not in self._scope.absent:
-            self._findings.unknown("name", name, tree.root.location, self._scope.known_names())
+            known = [*self._scope.known_names(), "true", "false", "value", "default"]
+            self._findings.unknown("name", name, tree.root.location, known)
         return None
 
     def _component_part(self, tree: syntax.Access, component: ComponentNames) -> Typed | None:

@@ -28,6 +28,19 @@ _BASIC: dict[syntax.BasicTypeName, Type] = {
     syntax.BasicTypeName.NONE: NoneType(),
 }
 
+_FOREIGN_TYPES = {
+    "bool": "boolean",
+    "char": "string",
+    "float": "double",
+    "float32": "double",
+    "float64": "double",
+    "int": "integer",
+    **{f"{sign}int{width}": "integer" for sign in ("", "u") for width in (8, 16, 32, 64)},
+    "str": "string",
+    "void": "none",
+}
+"""What other languages and ROS call the basic types."""
+
 
 class Types:
     """The data types that a model uses, in the order in which they were first asked for.
@@ -82,7 +95,9 @@ class Types:
         """The type that a name means in a unit, or None after reporting an unknown name."""
         definition = unit.types.get(name.text)
         if definition is None:
-            self._findings.unknown("data type", name.text, name.location, unit.types)
+            meant = _FOREIGN_TYPES.get(name.text)
+            mend = f"Write '{meant}'." if meant else ""
+            self._findings.unknown("data type", name.text, name.location, [*unit.types, *syntax.BasicTypeName], mend)
             return None
         key = unit.type_name(name.text)
         if key in self._open:

@@ -194,12 +194,18 @@ def test_generate_writes_a_package_and_keeps_what_a_user_changed(
         (["check", LINE_FOLLOWER, "-L", "{folder}/nowhere"], "there is no library folder"),
         (["synth", LINE_FOLLOWER, "-o", "{folder}/no/such/place.rsup"], "cannot write"),
         (["synth", LINE_FOLLOWER, "-o", "{folder}"], "cannot write"),
+        (["check", "{folder}/" + "a" * 300], "cannot read"),
+        (["check", LINE_FOLLOWER, "-L", "{folder}/" + "a" * 300], "cannot read"),
+        (["check", LINE_FOLLOWER, "-I", "{folder}/" + "a" * 300], "cannot read"),
+        (["synth", LINE_FOLLOWER, "-o", "{folder}/loop"], "Too many levels of symbolic links"),
+        (["format", ""], "the name of a file is empty"),
         (["generate", LINE_FOLLOWER, "--target", "python", "-o", LINE_FOLLOWER], "cannot write"),
     ],
 )
 def test_wrong_use_is_one_line_and_status_2(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, arguments: list[str], words: str
 ) -> None:
+    (tmp_path / "loop").symlink_to("loop")
     assert main([part.format(folder=tmp_path) for part in arguments]) == 2
     error = capsys.readouterr().err.splitlines()[-1]
     assert error.startswith("robosc: ")
@@ -257,6 +263,66 @@ def test_the_installed_command_and_a_closed_pipe(tmp_path: Path) -> None:
         os.close(write)
     assert "Traceback" not in result.stderr
     assert "BrokenPipe" not in result.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["check", LINE_FOLLOWER], ["check", "--json", LINE_FOLLOWER], ["doc", LINE_FOLLOWER], ["explain", "--all"]],
+)
+def test_results_that_cannot_be_written_are_an_error(arguments: list[str]) -> None:
+    robosc = Path(sys.executable).with_name("robosc")
+    with Path("/dev/full").open("w") as full:
+        result = subprocess.run(
+            [str(robosc), *arguments], stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, check=False
+        )
+    assert result.returncode == 2
+    assert result.stderr == "robosc: cannot write the results: No space left on device\n"
+
+
+def test_a_closed_standard_output_is_nobodys_error() -> None:
+    robosc = Path(sys.executable).with_name("robosc")
+    result = subprocess.run(
+        ["sh", "-c", '"$0" check "$1" >&-', str(robosc), LINE_FOLLOWER], capture_output=True, timeout=60, check=False
+    )
+    assert (result.returncode, result.stderr) == (0, b"")
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8:strict"])
+def test_any_text_can_be_printed_in_any_encoding(encoding: str, tmp_path: Path) -> None:
+    path = tmp_path / "nam\udcffe.rscd"
+    path.write_text(
+        "robot R { component C { incoming message m with identifier: '/\u00e9\u6f22\U0001f916', type: x } }", "utf-8"
+    )
+    robosc = Path(sys.executable).with_name("robosc")
+
+    def output(*arguments: str) -> bytes:
+        result = subprocess.run(
+            [str(robosc), *arguments, str(path)],
+            capture_output=True,
+            env=os.environ | {"PYTHONIOENCODING": encoding},
+            timeout=60,
+            check=False,
+        )
+        assert b"Traceback" not in result.stderr
+        assert result.returncode == 1
+        return result.stdout
+
+    output("check")
+    found = json.loads(output("check", "--json").decode(encoding.partition(":")[0]))
+    assert {item["code"] for item in found["diagnostics"]} >= {"unknown-name"}
+
+
+def test_nothing_forges_a_line_or_moves_the_cursor(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "model.rscd"
+    path.write_text(
+        'robot R { component C { incoming message m with identifier: "a\nerror: fake\x1b[2J", type: none } }'
+    )
+    assert main(["check", str(path)]) == 0
+    assert main(["explain", "\x1b[2J\nfake"]) == 2
+    assert main(["check", "\x1b[2J\nfake"]) == 2
+    error = capsys.readouterr().err
+    assert "\x1b" not in error
+    assert not [line for line in error.splitlines() if line.startswith(("error: fake", "fake"))]
 
 
 def test_what_check_does_not_need_is_not_imported() -> None:

@@ -32,6 +32,11 @@ def test_what_is_no_text(content: bytes, code: str) -> None:
     assert [item.code for item in raised.value.diagnostics] == [code]
 
 
+def both(times: int, before: str, after: str) -> str:
+    """A name with so much before and behind it."""
+    return before * times + "a" + after * times
+
+
 @pytest.mark.parametrize(
     ("text", "code"),
     [
@@ -48,6 +53,14 @@ def test_what_is_no_text(content: bytes, code: str) -> None:
         ("robot R { requirement r needs " + "any(x in y: " * 201 + "a" + ")" * 201 + " }", "nesting-too-deep"),
         ("robot R { requirement r needs " + "!" * 201 + "a }", "nesting-too-deep"),
         ("robot R { requirement r needs a" + " + a" * 201 + " }", "nesting-too-deep"),
+        ("robot R { requirement r needs 1" + "-1" * 200_000 + " }", "nesting-too-deep"),
+        ("robot R { requirement r needs " + both(199, "a[" + "!" * 200, "-a" * 199 + "]") + " }", "nesting-too-deep"),
+        (
+            "robot R { component C { behaviour { on request to r do "
+            + both(190, "a[" + "!" * 200, "-a" * 199 + "]")
+            + " := 1 } } }",
+            "nesting-too-deep",
+        ),
         ("robot R { provide r with " + "{ a: " * 201 + "1" + " }" * 201 + " }", "nesting-too-deep"),
         ("robot R { datatype object O { x: " + "array(" * 201 + "double" + ")" * 201 + " } }", "nesting-too-deep"),
         ("robot " + "r" * 1_000_000 + " { }", "name-too-long"),
@@ -119,6 +132,71 @@ def test_a_long_chain_of_imports() -> None:
     libraries = {f"l{i}": f"library L{i} {{ component C from L{i + 1} import C }}" for i in range(500)}
     libraries["l500"] = "library L500 { component C { incoming message m with type: none } }"
     assert codes("robot R { component C from L0 import C }", **libraries) == []
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize(
+    "condition",
+    [both(190, "if ", " then C.s else C.s"), both(190, "if C.s then ", " else C.s"), "!" * 190 + "C.s"],
+    ids=["conditions", "branches", "signs"],
+)
+def test_what_is_just_not_too_deep_goes_all_the_way(tmp_path: Path, condition: str) -> None:
+    condition = condition.replace(" a ", " C.s ")
+    path = tmp_path / "model.rscd"
+    path.write_text(
+        "robot R { component C { incoming message m with type: none behaviour { initial marked state s { } } }"
+        f" requirement m needs {condition} }}"
+    )
+    for command in (
+        ["check", "--synthesize"],
+        ["synth", "-o", str(tmp_path / "r.rsup")],
+        ["doc"],
+        ["format"],
+        ["generate", "--target", "python", "-o", str(tmp_path / "out")],
+    ):
+        assert main([command[0], str(path), *command[1:]]) == 0
+
+
+FOUND: dict[str, Callable[[int], str]] = {
+    "nondeterministic-event": lambda n: (
+        "robot R { component C { outgoing message m with type: none behaviour {"
+        + "on response from m\n" * n
+        + "initial marked state s { }"
+        + "".join(f"state s{i} {{ on response from m goto s }}\n" for i in range(n))
+        + "} } }"
+    ),
+    "partial-update": lambda n: (
+        "robot R { component C {"
+        + "".join(f"outgoing message m{i} with type: double\n" for i in range(n))
+        + "behaviour { variable v: double initial marked state s {"
+        + "".join(f"on response from m{i} do v := value\n" for i in range(n))
+        + "}"
+        + "".join(f"state s{i} {{ transition goto s }}\n" for i in range(n))
+        + "} } }"
+    ),
+}
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("code", FOUND)
+def test_many_findings_are_found_and_shown(code: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "model.rscd"
+    path.write_text(FOUND[code](SIZES))
+    assert main(["check", str(path)]) == 0
+    assert capsys.readouterr().err.count(f"[{code}]") >= SIZES
+
+
+@pytest.mark.timeout(60)
+def test_many_imports_from_one_library_and_from_many() -> None:
+    count = 10_000
+    components = "".join(f"component C{i} {{ incoming message m{i} with type: none }}\n" for i in range(count))
+    imports = "".join(f"component C{i} from L import C{i}\n" for i in range(count))
+    assert codes(f"robot R {{ {imports} }}", lib=f"library L {{ {components} }}") == []
+    libraries = {
+        f"l{i}": f"library L{i} {{ component C{i} {{ incoming message m{i} with type: none }} }}" for i in range(2000)
+    }
+    imports = "".join(f"component C{i} from L{i} import C{i}\n" for i in range(2000))
+    assert codes(f"robot R {{ {imports} }}", **libraries) == []
 
 
 @pytest.mark.timeout(60)

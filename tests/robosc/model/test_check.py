@@ -194,7 +194,7 @@ def test_import_chains_are_followed() -> None:
             "robot R { component C from A import X }",
             {"a": "library A { component X from B import X }", "b": "library B { component X from A import X }"},
             "import-cycle",
-            "never ends",
+            "the import of 'C' never ends: 'X' of 'A' from 'X' of 'B' from 'X' of 'A'",
         ),
         (
             "robot R { component C from Lib import Platfrom }",
@@ -493,13 +493,14 @@ HOME = """robot R {{
 
 
 def writable(expression: Expression) -> bool:
-    """Whether an expression can be written in part A at all."""
+    """Whether an expression can be written in part A at all, and in one way only."""
     match expression:
-        case Unary(operator="holds") | Constant(value=int() | float()):
-            return expression != Unary("holds", expression) and (
-                not isinstance(expression, Unary)
-                and (isinstance(expression.value, bool) or 0 <= expression.value <= 2**31 - 1)  # type: ignore[operator]
-            )
+        case Unary(operator="holds"):
+            return False
+        case Unary(operator="-", operand=Constant(value=0)):
+            return False  # `-0` is read as the number 0.
+        case Constant(value=int(value)) if not isinstance(value, bool):
+            return 0 <= value <= 2**31 - 1
     return all(writable(child) for child in children(expression))
 
 
@@ -516,3 +517,20 @@ def test_a_printed_expression_reads_back_as_itself(condition: Expression) -> Non
     assert behaviour is not None
     read_back = expression_text(behaviour.transitions[0].updates[0].expression).replace("A.on_", "A.on")
     assert read_back == expression_text(condition)
+
+
+@pytest.mark.parametrize(
+    ("text", "meant"),
+    [
+        ("datatype object O { x: bool }", "boolean"),
+        ("datatype object O { x: int }", "integer"),
+        ("datatype object O { x: float64 }", "double"),
+        ("datatype object O { x: boolen }", "boolean"),
+        ("component C { behaviour { variable v: boolean = flase initial marked state s { } } }", "false"),
+        ("datatype enum E from boolean to { vlaue -> a default -> b }", "value"),
+        ("datatype enum E from boolean to { value -> a defualt -> b }", "default"),
+    ],
+)
+def test_words_of_the_language_that_are_misspelt(text: str, meant: str) -> None:
+    found = checked(f"robot R {{ {text} component Z {{ incoming message m with type: none }} }}").diagnostics
+    assert any(f"'{meant}'" in item.mend for item in found if item.code == "unknown-name")

@@ -50,11 +50,11 @@ def add_generate_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Synthesize, generate and write; 0 if files were written."""
-    from robosc.targets import generate, require_target
+    from robosc.targets import generate, judged_for, require_target
 
     require_target(arguments.target)
     bundle = read_bundle(arguments)
-    made = synth.make(arguments, bundle)
+    made = judged_for(synth.make(arguments, bundle), arguments.target)
     files = generate(made.supervisor, arguments.target) if made.supervisor else None
     return report_generated(arguments, made, files, bundle)
 

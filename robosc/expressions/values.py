@@ -273,6 +273,29 @@ def read_element(values: Any, index: int) -> Any:
         return None
 
 
+class Absent:
+    """What stands for a part of received data that has no place: beyond the end of an array, and below that."""
+
+
+ABSENT = Absent()
+
+
+def received_part(value: Any, step: Any) -> Any:
+    """A part of received data: an element (`step` is an index) or a property; `ABSENT` outside an array.
+
+    An element that is there but does not fit is something else: an enum is made of it by its rules, while one of an
+    element that is absent is unknown.
+    """
+    if value is ABSENT:
+        return ABSENT
+    try:
+        if isinstance(step, str):
+            return read_property(value, step)
+        return value[step] if 0 <= step < len(value) else ABSENT
+    except Exception:  # Foreign objects may do anything when they are asked for a part.
+        return None if isinstance(step, str) else ABSENT
+
+
 def read_property(value: Any, name: str) -> Any:
     """A property of received data, whether a mapping or an object with attributes; None if it has none."""
     if isinstance(value, dict):

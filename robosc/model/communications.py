@@ -87,10 +87,10 @@ def build_communication(item: CommunicationTree, types: Types, findings: Finding
     if any(type_ is None for type_ in resolved.values()):
         return None
     identifier = tree.identifier.value if tree.identifier else tree.name.text
-    if not 0 < len(identifier) <= 255:
+    if len(identifier) > 255:
         findings.error(
-            "name-too-long" if identifier else "invalid-identifier",
-            "the identifier is empty" if not identifier else "the identifier has more than 255 characters",
+            "name-too-long",
+            "the identifier has more than 255 characters",
             tree.identifier.location if tree.identifier else tree.name.location,
             "Write the name of the topic, service or action.",
         )

@@ -11,6 +11,8 @@ _TOKEN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 
 def identifier_fault(identifier: str) -> str | None:
     """Why ROS refuses a name, in words; None for one that it takes."""
+    if not identifier:
+        return "it is empty"
     if not identifier.isascii() or re.search(r"[^A-Za-z0-9_/~]", identifier):
         return "it may hold letters, digits, '_', '/' and '~' only"
     name = identifier.removeprefix("~/") if identifier.startswith("~") else identifier.removeprefix("/")

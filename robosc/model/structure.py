@@ -12,7 +12,7 @@ import msgspec
 
 from robosc.expressions import Expression, Name, ScopedName, Type, Unary, Value
 
-Identifier = Annotated[str, msgspec.Meta(min_length=1, max_length=255)]
+Identifier = Annotated[str, msgspec.Meta(max_length=255)]
 """The name of a topic, service or action; any text that fits, escaped wherever it is printed."""
 
 MAXIMUM_DEPTH = 100_000

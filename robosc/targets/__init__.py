@@ -5,6 +5,7 @@ that writes them. Same supervisor, same bytes: no time, no machine path, everyth
 """
 
 from robosc.targets.files import GeneratedFiles, OverwriteError, write_files
+from robosc.targets.judgement import judged_for
 from robosc.targets.registry import (
     GenerateOptions,
     TargetInfo,
@@ -23,6 +24,7 @@ __all__ = [
     "UnknownTargetError",
     "available_targets",
     "generate",
+    "judged_for",
     "register",
     "require_target",
     "write_files",

@@ -36,6 +36,10 @@ class TargetInfo:
     description: str
 
 
+GENERAL_ERRORS = frozenset({"conflicting-topic"})
+"""Codes of the check's warnings that are errors wherever something is generated."""
+
+
 @dataclass(frozen=True, slots=True)
 class Target:
     """A target: what it is, and its generator.
@@ -43,10 +47,12 @@ class Target:
     Attributes:
         info: Name and description.
         generate: Makes the files; raises UnsupportedModelError for a model outside what it handles.
+        errors: Codes of the check's warnings that are errors for this target.
     """
 
     info: TargetInfo
     generate: Callable[[Supervisor, GenerateOptions], GeneratedFiles]
+    errors: frozenset[str] = GENERAL_ERRORS
 
 
 class UnknownTargetError(RoboscError, LookupError):
@@ -105,6 +111,16 @@ def generate(supervisor: Supervisor, target: str, options: GenerateOptions | Non
     """
     require_target(target)
     return _load(target).generate(supervisor, options or GenerateOptions())
+
+
+def errors_for(target: str) -> frozenset[str]:
+    """Codes of the check's warnings that are errors for a target.
+
+    Raises:
+        UnknownTargetError: There is no such target.
+    """
+    require_target(target)
+    return _load(target).errors
 
 
 def _load(name: str) -> Target:

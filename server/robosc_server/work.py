@@ -207,7 +207,7 @@ def _figures(supervisor: "Supervisor") -> Figures:
 
 
 def _generate(job: GenerateJob, on_report: Callable[[Report], None]) -> GenerateOutcome | Refused:
-    from robosc.targets import UnknownTargetError, generate, require_target
+    from robosc.targets import UnknownTargetError, generate, judged_for, require_target
 
     try:
         require_target(job.target)
@@ -216,7 +216,10 @@ def _generate(job: GenerateJob, on_report: Callable[[Report], None]) -> Generate
     made = _made(job.synthesis, on_report)
     if isinstance(made, Refused):
         return made
-    if isinstance(made, SynthesizeOutcome) or made.supervisor is None:
+    if isinstance(made, SynthesizeOutcome):
+        return GenerateOutcome(str(made.status), made.diagnostics, made.reason)
+    made = judged_for(made, job.target)
+    if made.supervisor is None:
         return GenerateOutcome(str(made.status), made.diagnostics, made.reason)
     try:
         files = generate(made.supervisor, job.target)

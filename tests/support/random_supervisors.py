@@ -129,6 +129,11 @@ _PATHS: dict[Type, list[tuple[tuple[str | int, ...], Type]]] = {
         (("inner", "class"), DOUBLE),
         (("inner", "self"), INTEGER),
         (("kind",), KIND),
+        (("kinds", 0), KIND),
+        (("kinds", 2), KIND),
+        (("items", 1, "mood"), KIND),
+        (("items", 0, "self"), INTEGER),
+        (("levels", 1), RANGE),
     ],
 }
 
@@ -238,12 +243,16 @@ def _constant(dice: Random, type_: Type) -> Expression:
 def _expression(dice: Random, world: _World, type_: Type, depth: int) -> Expression:
     """A well-typed expression."""
     leaves = _leaves(world, type_)
-    if depth == 0 or dice.random() < 0.2 or not isinstance(type_, BooleanType | IntegerType | DoubleType):
+    if depth == 0 or dice.random() < 0.2:
         return dice.choice(leaves) if leaves and dice.random() < 0.7 else _constant(dice, type_)
 
     def below(inner: Type) -> Expression:
         return _expression(dice, world, inner, depth - 1)
 
+    if not isinstance(type_, BooleanType | IntegerType | DoubleType):
+        if dice.random() < 0.6:
+            return _expression(dice, world, type_, 0)
+        return Conditional(below(BOOLEAN), below(type_), below(type_))
     if isinstance(type_, BooleanType):
         quantified = _quantified(dice, world) if dice.random() < 0.3 else None
         return quantified or _condition(dice, world, below)

@@ -95,7 +95,7 @@ class _Datum:
         if path not in self._known:
             raw, type_ = self._raw, self._root
             for step in path:
-                raw, type_ = _part(raw, step), self._reader.step(type_, step)
+                raw, type_ = values.received_part(raw, step), self._reader.step(type_, step)
             self._known[path] = self._convert(raw, type_, path)
         return self._known[path]
 
@@ -107,6 +107,8 @@ class _Datum:
         return isinstance(type_, ArrayType)
 
     def _convert(self, raw: Any, type_: Type | None, path: Path) -> Any:
+        if raw is values.ABSENT:
+            return None
         match type_:
             case ArrayType(element=element):
                 elements = whole_array(raw)
@@ -115,7 +117,10 @@ class _Datum:
                 return [self._convert(item, element, (*path, index)) for index, item in enumerate(elements)]
             case ObjectType(name=name):
                 parts = self._reader.properties(name)
-                return {part: self._convert(_part(raw, part), inner, (*path, part)) for part, inner in parts.items()}
+                return {
+                    part: self._convert(values.received_part(raw, part), inner, (*path, part))
+                    for part, inner in parts.items()
+                }
             case BooleanType():
                 return values.read_boolean(raw)
             case IntegerType(low=int(low), high=int(high)):
@@ -161,14 +166,6 @@ def whole_array(raw: Any) -> list[Any] | None:
     """The elements of a received array; None where something else came."""
     try:
         return values.array_part(raw)  # type: ignore[no-any-return]
-    except Exception:
-        # As below.
-        return None
-
-
-def _part(raw: Any, step: str | int) -> Any:
-    try:
-        return values.read_element(raw, step) if isinstance(step, int) else values.read_property(raw, step)
     except Exception:
         # Foreign objects may do anything when they are asked for a part; to us it is then unknown.
         return None

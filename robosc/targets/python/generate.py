@@ -17,8 +17,8 @@ from robosc.targets.python.writer import Writer, make_writer
 
 _READING_FUNCTIONS = frozenset(
     """
-    clamped element elements flag_of integer known member moved noted_enum noted_integer number number_at
-    plain_elements stays_in_range whole words_of
+    clamped elements flag_of integer known moved noted_enum noted_integer number number_at plain_elements
+    stays_in_range whole words_of
     """.split()
 )
 

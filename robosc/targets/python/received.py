@@ -65,6 +65,17 @@ def path_type(model: Model, root: Type, path: Path) -> Type:
     return type_
 
 
+def received_unknown(type_: Type, path: Path) -> Unknown:
+    """How received data of a type, at a path, is unknown."""
+    match type_:
+        case DoubleType() | IntegerType():
+            return Unknown.NAN
+        case EnumType() if not any(isinstance(step, int) for step in path):
+            return Unknown.NEVER  # Whatever came, the rules make a value of it; an element may be absent.
+        case _:
+            return Unknown.NONE
+
+
 @dataclass(slots=True)
 class Reader:
     """Writes statements that read paths of one received datum into local variables.
@@ -137,8 +148,7 @@ class Reader:
         """Text of the raw datum at a path."""
         if not path:
             return "data"
-        function = "element" if isinstance(path[-1], int) else "member"
-        return self._call(function, self._source(path[:-1]), repr(path[-1]))
+        return self._call("received_part", self._source(path[:-1]), repr(path[-1]))
 
     def _read(self, path: Path, type_: Type) -> Code:
         match type_:
@@ -194,7 +204,10 @@ class Reader:
                 parts = [
                     f"{item.name!r}: "
                     + self._element(
-                        item.type, self._call("member", raw, repr(item.name)), f"{path} + {f'.{item.name}'!r}", depth
+                        item.type,
+                        self._call("received_part", raw, repr(item.name)),
+                        f"{path} + {f'.{item.name}'!r}",
+                        depth,
                     )
                     for item in self.layout.model.object(name).properties
                 ]
@@ -213,7 +226,7 @@ class Reader:
         self._lines.append(f"{name}, {words}, {flag} = {call}")
         self.words.append(words)
         self.enum_flags.append(flag)
-        return code_for(name, type_)
+        return code_for(name, type_, received_unknown(type_, path))
 
     def _assign(self, path: Path, type_: Type, text: str, unknown: Unknown) -> Code:
         name = self._local(path)
@@ -225,7 +238,8 @@ def converter(layout: Layout, enum: EnumDefinition, used: set[str]) -> list[str]
     """The function that makes an enum out of received data, as a readable chain of conditions."""
     reader = Reader(layout, enum.source, used)
     scope = Scope(_no_variable, _no_location, reader.read, used.add, reader.type_at, reader.type_below)
-    body: list[str] = []
+    used.add("ABSENT")
+    body = ["if data is ABSENT:", "    return None, (), False"]
     all_false = TRUE_CODE
     for rule in enum.rules:
         fires = truth(rule.condition, scope)
@@ -278,4 +292,4 @@ def _no_location(automaton: str) -> str:
     raise InternalError(f"an enum rule reads the state of {automaton}")
 
 
-__all__ = ["Path", "Reader", "converter", "path_text", "path_type"]
+__all__ = ["Path", "Reader", "converter", "path_text", "path_type", "received_unknown"]

@@ -11,13 +11,11 @@ from robosc.expressions import (
     MAXIMUM_INTEGER,
     MINIMUM_INTEGER,
     ArrayType,
-    BooleanType,
     DoubleType,
     Expression,
     IntegerType,
     PathStep,
     StateTest,
-    StringType,
     Type,
     VariableRead,
     leaves,
@@ -29,7 +27,7 @@ from robosc.targets.python.allow import accepted
 from robosc.targets.python.expressions import TRUE_CODE, Code, Scope, Sort, Unknown, code_for, negated, value
 from robosc.targets.python.layout import has_plant_location, is_controllable, plant_step, split
 from robosc.targets.python.naming import Namer
-from robosc.targets.python.received import Path, Reader, path_text, path_type
+from robosc.targets.python.received import Path, Reader, path_text, path_type, received_unknown
 from robosc.targets.python.text import comment, docstring, indent
 from robosc.targets.python.writer import Writer
 
@@ -112,7 +110,7 @@ class _StepWriter:
         for path in self.paths:
             name = self.namer.name("_".join(["value", *map(str, path)]))
             type_ = path_type(self.writer.model, root, path)
-            self.received[path] = code_for(name, type_, received_unknown(type_))
+            self.received[path] = code_for(name, type_, received_unknown(type_, path))
 
     def _unpacked(self) -> list[str]:
         names = [code.text for code in self.received.values()]
@@ -259,10 +257,8 @@ class _StepWriter:
                     return code.text, False
                 self.writer.used.add("assignable_integer")
                 return f"assignable_integer({code.text}, {low}, {high})", True
-            case BooleanType() | StringType():
-                return code.text, code.unknown is not Unknown.NEVER
             case _:
-                return code.text, False
+                return code.text, code.unknown is not Unknown.NEVER
 
     def _assigned_double(self, code: Code) -> tuple[str, bool]:
         if code.unknown is not Unknown.NEVER:
@@ -281,14 +277,3 @@ def _protocol(writer: Writer, event: str) -> tuple[str, tuple[str, ...], str | N
         return None
     sources, target = plant_step(communication, EventKind(kind))
     return writer.scope.location(communication_plant_name(communication)), sources, target
-
-
-def received_unknown(type_: Type) -> Unknown:
-    """How received data of a type is unknown."""
-    match type_:
-        case DoubleType() | IntegerType():
-            return Unknown.NAN
-        case BooleanType() | StringType() | ArrayType():
-            return Unknown.NONE
-        case _:
-            return Unknown.NEVER

@@ -12,27 +12,11 @@ from robosc.expressions import values
 NAN = float("nan")
 
 
-def member(value: Any, name: str) -> Any:
-    """A property of received data; None if it has none."""
-    try:
-        return values.read_property(value, name)
-    except Exception:  # Foreign objects may do anything when they are asked for a part.
-        return None
-
-
-def element(array: Any, index: int) -> Any:
-    """An element of a received array; None outside the array."""
-    try:
-        return values.read_element(array, index)
-    except Exception:  # As above.
-        return None
-
-
 def array(value: Any) -> Any:
     """The elements of a received array; None where something else came."""
     try:
         return values.array_part(value)
-    except Exception:  # As above.
+    except Exception:  # Foreign objects may do anything when they are asked for a part.
         return None
 
 

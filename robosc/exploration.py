@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from robosc.automata.compile import State
-from robosc.automata.controlled import Added, ControlledGraph, controlled_graph
+from robosc.automata.controlled import TRANSITIONS_PER_STATE, Added, ControlledGraph, controlled_graph
 from robosc.automata.plants import communication_plant_name
 from robosc.automata.semantics import Semantics
 from robosc.automata.state import Subject, subjects
@@ -79,7 +79,8 @@ def explore(
     graph = controlled_graph(Semantics(system), added, limit=limit, should_stop=should_stop)
     if graph is None:
         raise UnsupportedModelError(
-            f"the controlled system of {model.name} has more than {limit} states: too many to list; raise the limit"
+            f"the controlled system of {model.name} has more than {limit} states, or "
+            f"{TRANSITIONS_PER_STATE * limit} transitions: too many to list; raise the limit"
         )
     return Graph(
         name=model.name,

@@ -4,11 +4,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from robosc.automata.compile import State
-from robosc.automata.semantics import Semantics
+from robosc.automata.semantics import Semantics, TooManyChoicesError
 from robosc.errors import SynthesisCancelled
 
 Added = Mapping[str, Callable[[State], bool]]
 """What a supervisor adds to events; nothing for events that are not in it."""
+
+TRANSITIONS_PER_STATE = 20
+"""Transitions for each allowed state beyond which a search is given up too: one wide integer has millions of them."""
 
 STOP_INTERVAL = 64
 """States handled between two questions whether to stop."""
@@ -61,11 +64,11 @@ def controlled_graph(
     Args:
         semantics: The uncontrolled system.
         added: The supervisor's added conditions.
-        limit: Number of states beyond which to give up.
+        limit: Number of states, and of `TRANSITIONS_PER_STATE` transitions, beyond which to give up.
         should_stop: Asked now and then; once true, the work ends.
 
     Returns:
-        The graph, or None if it has more than `limit` states.
+        The graph, or None if it is larger than `limit` allows.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.
@@ -75,18 +78,23 @@ def controlled_graph(
     states = [semantics.initial]
     parents: list[tuple[int, str] | None] = [None]
     steps: list[tuple[tuple[str, tuple[int, ...]], ...]] = []
+    transitions = 0
     while len(steps) < len(states):
         if len(steps) % STOP_INTERVAL == 0 and should_stop():
             raise SynthesisCancelled("the search of the controlled system was stopped")
         state = states[len(steps)]
         found: list[tuple[str, tuple[int, ...]]] = []
         for event in events:
-            if event.is_controllable and not semantics.condition(state, event.name):
-                continue
-            targets = semantics.targets(state, event.name)
+            try:
+                if event.is_controllable and not semantics.condition(state, event.name):
+                    continue
+                targets = semantics.targets(state, event.name)
+            except TooManyChoicesError:
+                return None
             condition = added.get(event.name)
             if not targets or (condition is not None and not condition(state)):
                 continue
+            transitions += len(targets)
             ordered = sorted(targets) if len(targets) > 1 else targets
             for target in ordered:
                 if target not in numbers:
@@ -95,6 +103,6 @@ def controlled_graph(
                     parents.append((len(steps), event.name))
             found.append((event.name, tuple(numbers[target] for target in ordered)))
         steps.append(tuple(found))
-        if len(states) > limit:
+        if len(states) > limit or transitions > TRANSITIONS_PER_STATE * limit:
             return None
     return ControlledGraph(tuple(states), tuple(steps), tuple(parents))

@@ -12,14 +12,24 @@ systems modeled as extended finite automata", IEEE T-ASE 8(3), 2011, pp. 560-569
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from itertools import product
+from math import prod
 from operator import itemgetter
 
 from robosc.automata.compile import NO_DATA, Function, State, compile_expression, paths_read, subjects_read
 from robosc.automata.inputs import connected_inputs, valuations
 from robosc.automata.state import Subject, initial_state, subject_type, subjects
 from robosc.automata.structure import Assignment, Automaton, Edge, Event, InputVariable, System
-from robosc.expressions import TRUE, IntegerType, Type, Value
+from robosc.errors import RoboscError
+from robosc.expressions import TRUE, IntegerType, Type, Value, domain
 from robosc.expressions.text import expression_text
+
+MAXIMUM_CHOICES = 500_000
+"""Choices of received data for one step beyond which it is not worked out."""
+
+
+class TooManyChoicesError(RoboscError):
+    """A step has too many choices of received data to go through them one by one."""
+
 
 _Writes = tuple[tuple[int, Value], ...]
 """What a step puts where in a state tuple."""
@@ -118,7 +128,19 @@ def _joint_step(arcs: tuple[_Arc, ...], state: State) -> tuple[bool, list[_Write
         leaves, results = _updates_together(updates, state)
         leaves_range = leaves_range or leaves
         parts.append(results)
+    _require_few(len(part) for part in parts)
     return leaves_range, [tuple(write for part in choice for write in part) for choice in product(*parts)]
+
+
+def _require_few(counts: Iterable[int]) -> None:
+    """Do nothing if the combinations of so many choices each can be gone through.
+
+    Raises:
+        TooManyChoicesError: There are too many.
+    """
+    combinations = prod(counts)
+    if combinations > MAXIMUM_CHOICES:
+        raise TooManyChoicesError(f"a step has {combinations} choices of received data: too many to go through them")
 
 
 def _updates_together(updates: list[_Update], state: State) -> tuple[bool, list[_Writes]]:
@@ -126,6 +148,7 @@ def _updates_together(updates: list[_Update], state: State) -> tuple[bool, list[
     leaves_range = False
     results: dict[_Writes, None] = {}
     inputs = dict.fromkeys(item for update in updates for item in update.inputs)
+    _require_few(len(domain(item.type)) + item.may_be_unknown for item in inputs)
     for data in valuations(inputs):
         values = [(update, update.function(state, data)) for update in updates]
         known = [(update, value) for update, value in values if value is not None]
@@ -154,7 +177,8 @@ def _independent_updates(updates: list[_Update]) -> list[list[_Update]]:
 class Semantics:
     """The uncontrolled system, state by state.
 
-    States are tuples in the order of `subjects(system)`.
+    States are tuples in the order of `subjects(system)`. What asks for the steps of a state raises
+    `TooManyChoicesError` where received data has more than `MAXIMUM_CHOICES` values that matter together.
 
     Attributes:
         system: The system.

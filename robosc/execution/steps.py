@@ -95,11 +95,13 @@ class Steps:
         """
         reading = self._system.read(event, data)
         if reading.unknown:
-            self._recorder.unknown(event, reading.unknown)
+            # A part that is read alone and with its array is told once.
+            unknown = tuple(dict.fromkeys(reading.unknown))
+            self._recorder.unknown(event, unknown)
             if reading.enum_unknown:
                 if may_keep and self._on_unknown == "keep":
                     return False
-                self._judge_unknown(event, reading.unknown)
+                self._judge_unknown(event, unknown)
         self.happen(event, reading, reading.data)
         return True
 

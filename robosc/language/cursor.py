@@ -117,7 +117,7 @@ class Cursor:
         """Count brackets that are opened; the innermost construct calls `shallower` behind their end."""
         self._depth += levels
         if self._depth > MAXIMUM_NESTING:
-            message = f"brackets are nested deeper than {MAXIMUM_NESTING}"
+            message = f"brackets and conditions are nested deeper than {MAXIMUM_NESTING}"
             self.report("nesting-too-deep", message, self.at(opening), "Split the expression or definition.")
             raise self.told()
 

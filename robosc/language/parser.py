@@ -250,6 +250,9 @@ class _Parser(ExpressionParser):
         if self.kinds[index] == _NUMBER and "." in self.texts[index]:
             self.place += 1
             return syntax.Literal(float(self.texts[index]), self.at(index))
+        if self.texts[index] == "-" and "." in self.texts[index + 1]:
+            self.place += 1
+            raise self.fault("a number that is not negative")
         return syntax.Literal(self.integer(), self.since(index))
 
     _options: Mapping[str, Callable[["_Parser"], syntax.Name | syntax.Text | syntax.Expression]] = {

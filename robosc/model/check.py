@@ -4,7 +4,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from robosc.errors import Diagnostic, InternalError, LanguageError, RelatedPlace, Severity, sorted_diagnostics
-from robosc.expressions import StateTest, conjuncts
 from robosc.language import parse, syntax
 from robosc.model.behaviour import (
     BehaviourBuilder,
@@ -24,6 +23,7 @@ from robosc.model.constants import Constants
 from robosc.model.expressions import ExpressionChecker
 from robosc.model.findings import Findings
 from robosc.model.interfaces import check_fields
+from robosc.model.own_requests import breaks_its_requirement
 from robosc.model.places import Places
 from robosc.model.restrictions import Restrictions
 from robosc.model.scope import Scopes
@@ -229,11 +229,12 @@ class _RobotChecker:
         for place, requirement in zip(self.places.requirements, requirements, strict=True):
             for name in requirement.communications:
                 if communications[name].kind is CommunicationKind.ACTION:
-                    left = _left_by_request(name, requirement, behaviours)
-                    if left is not None:
+                    component = breaks_its_requirement(name, requirement.condition, behaviours)
+                    if component is not None:
                         self._findings.note(
                             "request-leaves-requirement",
-                            f"the request of '{name}' itself leaves {left}, so this requirement never cancels it",
+                            f"the request of '{name}' makes this requirement false in '{component}', so it never "
+                            "cancels it",
                             place,
                             "Nothing needs mending if that is meant.",
                         )
@@ -275,16 +276,3 @@ class _Unknown:
             f"Import the component of '{self.part.unit.tree.name.text}' that has '{name.text}' too.",
             RelatedPlace(f"'{name.text}' is named here", name.location),
         )
-
-
-def _left_by_request(action: str, requirement: Requirement, behaviours: Mapping[str, Behaviour]) -> str | None:
-    """The state that a requirement names as a conjunct and that the action's own request leaves."""
-    for conjunct in conjuncts(requirement.condition):
-        if not isinstance(conjunct, StateTest) or conjunct.component not in behaviours:
-            continue
-        for transition in behaviours[conjunct.component].transitions:
-            leaves_it = transition.target not in (None, conjunct.state)
-            stands_there = transition.source in (None, conjunct.state)
-            if transition.event == f"{action}.request" and stands_there and leaves_it:
-                return f"'{conjunct.component}.{conjunct.state}'"
-    return None

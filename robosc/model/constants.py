@@ -20,12 +20,9 @@ from robosc.expressions import (
 from robosc.language import syntax
 from robosc.model.expressions import ExpressionChecker, Typed, constant_value, may_leave
 from robosc.model.findings import Findings
-from robosc.model.scope import Scope, Scopes
+from robosc.model.scope import Scopes
 from robosc.model.types import Types
 from robosc.model.units import Unit
-
-_MAXIMUM_CHAIN = 50
-"""Constants that are worked out because an earlier one needs them, one inside the other."""
 
 _MAXIMUM_CHAIN = 50
 """Constants that are worked out because an earlier one needs them, one inside the other."""
@@ -42,74 +39,72 @@ class Constants:
     def __init__(self, types: Types, findings: Findings) -> None:
         self._types = types
         self._findings = findings
-        self._resolved: dict[Unit, dict[str, Typed | None]] = {}
-
-    def visible_in(self, unit: Unit, scopes: Scopes) -> Mapping[str, Typed | None]:
-        """The constants that a file can name: its own, then those of the libraries that it imports from.
-
-        A name that several of these libraries define means nothing unless the file defines it itself.
-        """
-        imported: dict[str, list[Typed | None]] = {}
-        for other in scopes.units_of(unit):
-            for name, found in self._of(other, scopes).items():
-                imported.setdefault(name, []).append(found)
-        unique = {name: found[0] for name, found in imported.items() if len(found) == 1}
-        return unique | self._of(unit, scopes)
-
-    def _of(self, unit: Unit, scopes: Scopes) -> dict[str, Typed | None]:
-        if unit not in self._resolved:
-            self._resolved[unit] = _Resolution(unit, scopes.of_constants(unit), self._types, self._findings).all()
-        return self._resolved[unit]
-
-
-class _Resolution(Mapping[str, Typed | None]):
-    """The constants of one file as a mapping that resolves what it is asked for."""
-
-    def __init__(self, unit: Unit, scope: Scope, types: Types, findings: Findings) -> None:
-        self._unit = unit
-        self._types = types
-        self._findings = findings
-        self._found: dict[str, Typed | None] = {}
-        self._open: list[str] = []
+        self._found: dict[tuple[Unit, str], Typed | None] = {}
+        self._checkers: dict[Unit, ExpressionChecker] = {}
+        self._open: list[tuple[Unit, str]] = []
         self._has_told_depth = False
-        self._checker = ExpressionChecker(replace(scope, constants=self), findings)
 
-    def __getitem__(self, name: str) -> Typed | None:
-        tree = self._unit.constants[name]
-        if name in self._open:
-            chain = " needs ".join(f"'{item}'" for item in [*self._open[self._open.index(name) :], name])
+    def visible_in(self, unit: Unit, scopes: Scopes) -> "VisibleConstants":
+        """The constants that a file can name; reports what is wrong with those of the file and of its libraries."""
+        visible = self._names(unit, scopes)
+        for home in dict.fromkeys((unit, *scopes.libraries_of(unit))):
+            for name in dict.fromkeys(item.name.text for item in home.tree.items if isinstance(item, syntax.Constant)):
+                self.resolve(home, name, scopes)
+        return visible
+
+    def _names(self, unit: Unit, scopes: Scopes) -> "VisibleConstants":
+        """The nearest definition of each name: the file's own, then its libraries', then those they import from.
+
+        A name that several equally near libraries define means nothing.
+        """
+        homes: dict[str, Unit] = {}
+        ambiguous: dict[str, tuple[str, ...]] = {}
+        for units in ((unit,), *scopes.tiers_of(unit)):
+            near: dict[str, list[Unit]] = {}
+            for home in units:
+                for name in home.constants:
+                    near.setdefault(name, []).append(home)
+            for name, found in near.items():
+                if name in homes or name in ambiguous:
+                    continue
+                if len(found) == 1:
+                    homes[name] = found[0]
+                else:
+                    ambiguous[name] = tuple(sorted(home.tree.name.text for home in found))
+        return VisibleConstants(self, scopes, homes, ambiguous)
+
+    def resolve(self, unit: Unit, name: str, scopes: Scopes) -> Typed | None:
+        """The value of a constant, or None where it has none, which has been reported."""
+        key = (unit, name)
+        tree = unit.constants[name]
+        if key in self._open:
+            names = [item for _, item in self._open[self._open.index(key) :]]
+            chain = " needs ".join(f"'{item}'" for item in [*names, name])
             message = f"the constant depends on itself: {chain}"
             self._findings.error("constant-cycle", message, tree.name.location, "Write one of them as a value.")
-            self._found[name] = None
-        elif len(self._open) >= _MAXIMUM_CHAIN and name not in self._found:
+            self._found[key] = None
+        elif len(self._open) >= _MAXIMUM_CHAIN and key not in self._found:
             if not self._has_told_depth:
                 message = f"constants need each other in a chain of more than {_MAXIMUM_CHAIN}"
                 mend = "Define them before they are used."
                 self._findings.error("nesting-too-deep", message, tree.name.location, mend)
             self._has_told_depth = True
-            self._found[name] = None
-        if name not in self._found:
-            self._open.append(name)
-            found = self._resolve(tree)
+            self._found[key] = None
+        if key not in self._found:
+            self._open.append(key)
+            found = self._resolve(unit, tree, self._checker(unit, scopes))
             self._open.pop()
-            self._found.setdefault(name, found)
-        return self._found[name]
+            self._found.setdefault(key, found)
+        return self._found[key]
 
-    def __contains__(self, name: object) -> bool:
-        return name in self._unit.constants  # Asking whether there is one must not resolve it.
+    def _checker(self, unit: Unit, scopes: Scopes) -> ExpressionChecker:
+        if unit not in self._checkers:
+            scope = replace(scopes.of_constants(unit), constants=self._names(unit, scopes))
+            self._checkers[unit] = ExpressionChecker(scope, self._findings)
+        return self._checkers[unit]
 
-    def __iter__(self) -> Iterator[str]:
-        return iter(dict.fromkeys(i.name.text for i in self._unit.tree.items if isinstance(i, syntax.Constant)))
-
-    def __len__(self) -> int:
-        return len(self._unit.constants)
-
-    def all(self) -> dict[str, Typed | None]:
-        """Every constant of the file."""
-        return {name: self[name] for name in self}
-
-    def _resolve(self, tree: syntax.Constant) -> Typed | None:
-        type_ = self._types.resolve(tree.type, self._unit)
+    def _resolve(self, unit: Unit, tree: syntax.Constant, checker: ExpressionChecker) -> Typed | None:
+        type_ = self._types.resolve(tree.type, unit)
         if isinstance(type_, ObjectType | ArrayType | NoneType):
             self._findings.error(
                 "object-variable",
@@ -121,7 +116,7 @@ class _Resolution(Mapping[str, Typed | None]):
         found = (
             None
             if type_ is None
-            else self._checker.fitting(
+            else checker.fitting(
                 tree.value,
                 type_,
                 RelatedPlace(f"'{tree.name.text}' is declared as {type_text(type_)} here", tree.type.location),
@@ -159,3 +154,35 @@ class _Resolution(Mapping[str, Typed | None]):
                 return Typed(Constant(value), exact)
             case _:
                 return Typed(Constant(value), type_)
+
+
+class VisibleConstants(Mapping[str, Typed | None]):
+    """The constants that a file can name; each is worked out when it is asked for.
+
+    Attributes:
+        ambiguous: Names that several libraries define, with the libraries' names.
+    """
+
+    def __init__(
+        self,
+        constants: Constants,
+        scopes: Scopes,
+        homes: Mapping[str, Unit],
+        ambiguous: Mapping[str, tuple[str, ...]],
+    ) -> None:
+        self._constants = constants
+        self._scopes = scopes
+        self._homes = homes
+        self.ambiguous = ambiguous
+
+    def __getitem__(self, name: str) -> Typed | None:
+        return self._constants.resolve(self._homes[name], name, self._scopes)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._homes  # Asking whether there is one must not resolve it.
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._homes)
+
+    def __len__(self) -> int:
+        return len(self._homes)

@@ -187,7 +187,7 @@ class ExpressionChecker:
 
     def _equality(self, tree: syntax.Binary) -> Typed | None:
         """One type on both sides; the side with a type of its own decides what a bare enum value means."""
-        if self._is_bare_value(tree.left):
+        if self._is_open(tree.left):
             right = self.infer(tree.right)
             left = self.infer(tree.left, right.type if right else None)
         else:
@@ -209,18 +209,22 @@ class ExpressionChecker:
             return None
         return Typed(Binary(tree.operator, left.expression, right.expression), _BOOLEAN)  # type: ignore[arg-type]
 
-    def _is_bare_value(self, tree: syntax.Expression) -> bool:
-        """Whether a tree is a single name that can only be an enum value."""
+    def _is_open(self, tree: syntax.Expression) -> bool:
+        """Whether what is wanted decides what a tree means: a bare enum value, or a choice between such."""
+        if isinstance(tree, syntax.Conditional):
+            return self._is_open(tree.then) and self._is_open(tree.otherwise)
         if not isinstance(tree, syntax.Access) or tree.root is None or tree.steps:
             return False
         name = tree.root.text
-        if any(variable == name for variable, _ in self._elements) or name in self._scope.constants:
+        if any(variable == name for variable, _ in self._elements):
+            return False
+        if name in self._scope.constants and not self._scope.enums_with(name):
             return False
         return not (self._scope.own and name in self._scope.own.variables)
 
     def _conditional(self, tree: syntax.Conditional, wanted: Type | None) -> Typed | None:
         condition = self.condition(tree.condition)
-        if self._is_bare_value(tree.then):
+        if self._is_open(tree.then):
             otherwise = self.infer(tree.otherwise, wanted)
             then = self.infer(tree.then, wanted or (otherwise.type if otherwise else None))
         else:
@@ -385,6 +389,14 @@ class ExpressionChecker:
                 f"a state is named with its component: '{own.name}.{name}'",
                 tree.root.location,
                 f"Write '{own.name}.{name}'.",
+            )
+        elif name in self._scope.ambiguous:
+            libraries = " and ".join(f"'{library}'" for library in self._scope.ambiguous[name])
+            self._findings.error(
+                "ambiguous-name",
+                f"'{name}' is defined by the libraries {libraries}",
+                tree.root.location,
+                "Define it in this file, or rename one of the two.",
             )
         elif name not in self._scope.absent:
             known = [*self._scope.known_names(), "true", "false", "value", "default"]

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from robosc.expressions import EnumType, Type
+from robosc.language import syntax
 from robosc.model.types import Types
 from robosc.model.units import Libraries, Part, Unit
 from robosc.source import Location
@@ -43,6 +44,7 @@ class Scope:
         received: Type of `value`, or None where there is no received data.
         absent: Components whose import has failed, which has been reported.
         constants: Constants by name; None for one that is broken, which has been reported.
+        ambiguous: Names of constants and enums that several libraries define, with the libraries' names.
     """
 
     types: Types
@@ -52,6 +54,7 @@ class Scope:
     received: Type | None = None
     absent: frozenset[str] = frozenset()
     constants: Mapping[str, "Typed | None"] = field(default_factory=dict)
+    ambiguous: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     _values: dict[str, tuple[EnumType, ...]] = field(default_factory=dict)
 
     def with_received(self, received: Type | None) -> "Scope":
@@ -112,17 +115,38 @@ class Scopes:
             components = self._components(unit)
             absent = frozenset(unit.components.keys() - components) if unit is self._main else frozenset()
             scope = Scope(self._types, components, self._enums(unit), absent=absent)
-            self._scopes[unit] = replace(scope, constants=self._constants.visible_in(unit, self))
+            constants = self._constants.visible_in(unit, self)
+            shared = {**self._shared_types(unit), **constants.ambiguous}
+            self._scopes[unit] = replace(scope, constants=constants, ambiguous=shared)
         return self._scopes[unit]
 
     def of_constants(self, unit: Unit) -> Scope:
         """The names in the constants of a file, other constants aside."""
         return Scope(self._types, {}, self._enums(unit))
 
-    def units_of(self, unit: Unit) -> frozenset[Unit]:
-        """The files that the imported components of a file come from."""
-        origins = (self._libraries.origin(unit, name) for name in unit.components)
-        return frozenset(origin[0] for origin in origins if origin is not None) - {unit}
+    def tiers_of(self, unit: Unit) -> tuple[tuple[Unit, ...], tuple[Unit, ...]]:
+        """The libraries that a file imports from, and those that they in turn have the components from."""
+        nearest: dict[Unit, None] = {}
+        further: dict[Unit, None] = {}
+        for component in unit.components.values():
+            for place, (library, _) in enumerate(self._libraries.chain(component)):
+                (further if place else nearest)[library] = None
+        direct = tuple(library for library in nearest if library is not unit)
+        return direct, tuple(library for library in further if library is not unit and library not in nearest)
+
+    def libraries_of(self, unit: Unit) -> tuple[Unit, ...]:
+        """Every library that the imported components of a file come from or through."""
+        direct, further = self.tiers_of(unit)
+        return (*direct, *further)
+
+    def _shared_types(self, unit: Unit) -> dict[str, tuple[str, ...]]:
+        """Names of enums that several libraries define, with the libraries' names; the file itself defines none."""
+        homes: dict[str, list[str]] = {}
+        for home in self.libraries_of(unit):
+            for name, tree in home.types.items():
+                if isinstance(tree, syntax.EnumDefinition) and name not in unit.types:
+                    homes.setdefault(name, []).append(home.tree.name.text)
+        return {name: tuple(sorted(found)) for name, found in homes.items() if len(found) > 1}
 
     def inside(self, part: Part) -> Scope:
         """The names in the behaviour of a component."""

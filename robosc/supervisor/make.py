@@ -10,6 +10,7 @@ from enum import StrEnum
 
 from robosc._version import __version__
 from robosc.automata import System, to_automata
+from robosc.automata.controlled import TRANSITIONS_PER_STATE
 from robosc.errors import Diagnostic, InternalError, sorted_diagnostics
 from robosc.model import check
 from robosc.model.layers import layer_findings
@@ -131,8 +132,7 @@ def _certify(
     should_stop: Callable[[], bool],
 ) -> Certificate:
     """Let the independent verifier judge the result; a fault it finds is ours."""
-    searched = result.statistics.states <= VERIFICATION_LIMIT
-    if not searched:
+    if result.statistics.states > VERIFICATION_LIMIT:
         on_limit = f"not searched: more than {VERIFICATION_LIMIT} states"
         return _certificate(result, bundle, deployment, on_limit, ("not checked",) * 4, None)
     verification = verify(
@@ -142,19 +142,25 @@ def _certify(
         permissive_limit=PERMISSIVENESS_LIMIT,
         should_stop=should_stop,
     )
+    if verification.states is None:
+        on_limit = (
+            f"not searched: more than {TRANSITIONS_PER_STATE * VERIFICATION_LIMIT} transitions, or too many in one step"
+        )
+        return _certificate(result, bundle, deployment, on_limit, ("not checked",) * 4, None)
     outcomes = (
         verification.safe,
         verification.controllable,
         verification.nonblocking,
         verification.maximally_permissive,
     )
-    if "failed" in outcomes or (verification.states not in (None, result.statistics.states)):
+    if "failed" in outcomes or verification.states != result.statistics.states:
         raise InternalError(
             f"the verifier refuses the supervisor: {verification.message or 'another number of states'}"
             + (f" after {', '.join(verification.trace)}" if verification.trace else "")
         )
     recomputed = (
-        f"permissiveness not recomputed: more than {PERMISSIVENESS_LIMIT} states"
+        f"permissiveness not recomputed: more than {PERMISSIVENESS_LIMIT} states, or "
+        f"{TRANSITIONS_PER_STATE * PERMISSIVENESS_LIMIT} transitions"
         if verification.maximally_permissive == "not checked"
         else "permissiveness by explicit recomputation"
     )

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from robosc.automata.compile import State
-from robosc.automata.controlled import STOP_INTERVAL
-from robosc.automata.semantics import Semantics
+from robosc.automata.controlled import STOP_INTERVAL, TRANSITIONS_PER_STATE
+from robosc.automata.semantics import Semantics, TooManyChoicesError
 from robosc.automata.structure import System
 from robosc.errors import SynthesisCancelled
 
@@ -68,16 +68,19 @@ def synthesize_explicit(
 
     Args:
         system: Plants and event conditions.
-        limit: Number of states beyond which to give up.
+        limit: Number of states, and of `TRANSITIONS_PER_STATE` transitions, beyond which to give up.
         should_stop: Asked now and then; once true, the work ends.
 
     Returns:
-        The supervisor (which may be empty), or None if more than `limit` states are reachable.
+        The supervisor (which may be empty), or None if what is reachable is larger than `limit` allows.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.
     """
-    graph = _explore(system, limit, should_stop)
+    try:
+        graph = _explore(system, limit, should_stop)
+    except TooManyChoicesError:
+        graph = None
     if graph is None:
         return None
     good = _good_states(graph, should_stop)
@@ -103,6 +106,7 @@ def _explore(system: System, limit: int, should_stop: Callable[[], bool]) -> _Gr
     states = [semantics.initial]
     steps: list[tuple[_Step, ...]] = []
     bad = set[int]()
+    transitions = 0
     while len(steps) < len(states):
         if len(steps) % STOP_INTERVAL == 0 and should_stop():
             raise SynthesisCancelled("explicit synthesis was stopped")
@@ -116,6 +120,7 @@ def _explore(system: System, limit: int, should_stop: Callable[[], bool]) -> _Gr
             if event.is_controllable and not semantics.condition(state, event.name):
                 continue
             targets = semantics.targets(state, event.name)
+            transitions += len(targets)
             for target in targets:
                 if target not in numbers:
                     numbers[target] = len(states)
@@ -123,7 +128,7 @@ def _explore(system: System, limit: int, should_stop: Callable[[], bool]) -> _Gr
             if targets:
                 found.append(_Step(event.name, event.is_controllable, tuple(numbers[target] for target in targets)))
         steps.append(tuple(found))
-        if len(states) > limit:
+        if len(states) > limit or transitions > TRANSITIONS_PER_STATE * limit:
             return None
     marked = frozenset(number for number, state in enumerate(states) if semantics.is_marked(state))
     return _Graph(tuple(states), tuple(steps), frozenset(bad), marked)

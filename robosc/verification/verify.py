@@ -96,7 +96,7 @@ def verify(
         added: For each event to which the supervisor adds a condition, that condition over states.
         limit: Number of states of the controlled system beyond which nothing is checked.
         permissive_limit: Number of states that the plants reach under the event conditions beyond which
-            permissiveness is not checked.
+            permissiveness is not checked. Both count `TRANSITIONS_PER_STATE` transitions as a state, too.
         should_stop: Asked now and then; once true, the work ends.
 
     Raises:

@@ -221,6 +221,39 @@ def test_the_parser_refuses_with_status_2(capsys: pytest.CaptureFixture[str], ar
 
 
 @pytest.mark.parametrize(
+    ("target", "messages", "code"),
+    [
+        ("python", 'incoming message a with identifier: "/x", type: double', "conflicting-topic"),
+        ("ros2", 'incoming message a with identifier: "/x", type: double', "conflicting-topic"),
+        ("python", 'outgoing message a with identifier: "/x", type: boolean, depth: 3', "conflicting-topic"),
+        ("ros2", 'incoming message a with identifier: "/1x", type: double', "invalid-identifier"),
+        ("ros2", 'incoming message a with identifier: "", type: double', "invalid-identifier"),
+    ],
+)
+def test_what_is_only_a_warning_of_the_check_stops_a_target_at_its_place(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, target: str, messages: str, code: str
+) -> None:
+    path = tmp_path / "model.rscd"
+    path.write_text(
+        f'robot R {{ component C {{ outgoing message m with identifier: "/x", type: boolean\n{messages} }} }}'
+    )
+    assert main(["check", str(path)]) == 0
+    assert "model.rscd:2:" in capsys.readouterr().err
+    assert main(["generate", str(path), "--target", target, "-o", str(tmp_path / "out")]) == 1
+    error = capsys.readouterr().err
+    assert "model.rscd:2:" in error
+    assert "error: " in error
+    assert f"[{code}]" in error
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_ros_cannot_name_others_can(tmp_path: Path) -> None:
+    path = tmp_path / "model.rscd"
+    path.write_text('robot R { component C { incoming message a with identifier: "", type: double } }')
+    assert main(["generate", str(path), "--target", "python", "-o", str(tmp_path / "out")]) == 0
+
+
+@pytest.mark.parametrize(
     ("status", "arguments", "words"),
     [
         (2, ["synth", LINE_FOLLOWER, "--engine", "magic"], "unknown engine 'magic'"),

@@ -75,6 +75,8 @@ def test_what_stands_in_or_behind_a_broken_definition_is_read(broken: str) -> No
         ("interface i ues T from p", "Did you mean 'use'?"),
         ("datatype enum E form boolean to { value -> a default -> b }", "Did you mean 'from'?"),
         ("datatype enum E from boolean to { value -> a default => b }", "Write '->' before it"),
+        ("requirement m needs any(value.a: true)", "'any(x in array: condition)'"),
+        ("requirement m needs any(value in value.a: true)", "'any(x in array: condition)'"),
         ("component C { behaviour { variable v: integer(0..1) initial state s { transition fi v goto s } } }", "'if'?"),
     ],
 )

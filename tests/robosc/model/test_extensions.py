@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from robosc.execution.interpreter import InterpretedSystem
+from robosc.expressions.text import expression_text
 from robosc.model.structure import Deployment
 from robosc.supervisor import make_supervisor
 from robosc.supervisor.make import MadeStatus
@@ -324,3 +325,107 @@ def test_equal_values_of_two_enums_and_a_state() -> None:
         system.step("b.response", system.read("b.response", 3.0))
         assert not system.enabled("go.request")
         assert same(system.state()["C"]["variables"], {"x": "near", "y": "near"})
+
+
+LIB = "library Lib {{ constant IN: integer = {value} component Base {{ outgoing message seen with type: boolean }} }}"
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        "constant J: integer = IN requirement go needs J = 1",
+        "requirement go needs IN = 1",
+        "component V { behaviour { variable z: integer(0..3) = IN initial marked state s { } } }",
+    ],
+)
+@pytest.mark.parametrize("library", ["Lib", "Chain"])
+def test_constants_of_libraries_can_be_used_wherever_constants_can(use: str, library: str) -> None:
+    chain = "library Chain { constant OUT: integer = 2 component Base from Lib import Base }"
+    text = f"robot R {{ component B from {library} import Base component G {{ incoming message go with type: none }} {use} }}"
+    found = checked(text, lib=LIB.format(value=1), chain=chain)
+    assert not found.has_errors, [str(item) for item in found.diagnostics]
+    out = checked(text.replace("IN", "OUT"), lib=LIB.format(value=1), chain=chain)
+    assert out.has_errors == (library == "Lib")
+
+
+def test_the_nearest_library_defines_a_constant() -> None:
+    chain = "library Chain { constant IN: integer = 7 component Base from Lib import Base }"
+    model = model_of(
+        "robot R { component B from Chain import Base component G { incoming message go with type: none }"
+        " requirement go needs IN = 1 }",
+        lib=LIB.format(value=1),
+        chain=chain,
+    )
+    assert expression_text(model.requirements[0].condition) == "7 = 1"
+
+
+@pytest.mark.parametrize(
+    ("extra", "use"),
+    [
+        ("constant X: integer = 1", "X = 1"),
+        ("datatype enum M from boolean to { value -> run default -> no }", "M.run = M.run"),
+    ],
+)
+def test_a_name_of_two_libraries_is_ambiguous(extra: str, use: str) -> None:
+    libraries = {
+        name: f"library {name.upper()} {{ {extra} component {name} {{ outgoing message m{name} with type: none }} }}"
+        for name in ("a", "b")
+    }
+    text = (
+        "robot R { component A from A import a component B from B import b"
+        f" component G {{ incoming message go with type: none }} requirement go needs {use} }}"
+    )
+    found = [item for item in checked(text, **libraries).diagnostics if item.code != "unused-definition"]
+    assert {item.code for item in found} == {"ambiguous-name"}
+    assert "is defined by the libraries 'A' and 'B'" in found[0].message
+    assert not checked(text.replace("robot R {", f"robot R {{ {extra}"), **libraries).has_errors
+
+
+def test_constants_of_two_libraries_that_need_each_other() -> None:
+    a = "library A { constant X: integer = Y component P { outgoing message p with type: none } component Q from B import Q }"
+    b = "library B { constant Y: integer = X component Q { outgoing message q with type: none } component P from A import P }"
+    found = checked("robot R { component P from A import P component Q from B import Q }", a=a, b=b).diagnostics
+    assert [item.code for item in found if item.severity == "error"] == ["constant-cycle"]
+
+
+@pytest.mark.parametrize(
+    "condition",
+    ["e = open", "open = e", "(if c then open else shut) = e", "e = (if c then open else shut)", "open = c"],
+)
+def test_the_expected_type_decides_on_either_side(condition: str) -> None:
+    text = (
+        "robot R { constant open: boolean = true datatype enum E from boolean to { value -> open default -> shut }"
+        " datatype enum F from boolean to { value -> open default -> shut }"
+        " component S { outgoing message m with type: E behaviour { variable e: E variable c: boolean"
+        " initial marked state s { on response from m do e := value } } } component G { incoming message go with type: none }"
+        f" requirement go needs {condition} }}"
+    ).replace(condition, condition.replace("e =", "S.e =").replace("= e", "= S.e").replace(" c", " S.c"))
+    found = checked(text)
+    assert not found.has_errors, [str(item) for item in found.diagnostics]
+
+
+@pytest.mark.parametrize(
+    ("requirement", "is_noted"),
+    [
+        ("ac needs C.idle", True),
+        ("C.busy disables ac", True),
+        ("ac needs !C.busy", True),
+        ("ac needs !C.b", True),
+        ("ac needs C.c < 2", True),
+        ("ac needs C.idle and D.idle", True),
+        ("ac needs C.c < 3", False),
+        ("ac needs D.idle", False),
+        ("ac needs C.idle or D.idle", False),
+        ("D.idle disables ac", False),
+    ],
+)
+def test_a_request_that_makes_its_own_requirement_false(requirement: str, is_noted: bool) -> None:
+    found = checked(
+        "robot R { interface i use T from p component C { action ac with request: none, response: none, feedback: none"
+        " links i behaviour { variable b: boolean variable c: integer(0..3)"
+        " initial marked state idle { on request to ac do b := true, c := 2 goto busy }"
+        " state busy { on response from ac goto idle } } } component D { outgoing message o with type: none"
+        f" behaviour {{ initial marked state idle {{ on response from o }} }} }} requirement {requirement} }}"
+    )
+    assert not found.has_errors
+    assert ("request-leaves-requirement" in [item.code for item in found.diagnostics]) == is_noted

@@ -235,7 +235,6 @@ INCONSISTENT = [
     ("model.communications.2.kind", "service", "data is not that"),
     ("model.communications.1.response", {"type": "array", "element": {"type": "double"}}, "array stands outside"),
     ("model.communications.1.response", {"type": "object", "name": "Missing"}, "no object type Missing"),
-    ("model.communications.2.identifier", "", "malformed"),
     ("model.communications.2.identifier", "x" * 256, "malformed"),
     ("model.communications.2.name", "a b", "malformed"),
     ("model.communications.2.name", "os\n", "malformed"),

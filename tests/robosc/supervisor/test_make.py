@@ -104,3 +104,21 @@ def test_progress_and_cancellation() -> None:
     assert list(dict.fromkeys(item.stage for item in told)) == ["check", "synthesis", "verification"]
     with pytest.raises(SynthesisCancelled):
         make_supervisor(bundle_of(COUNTER), should_stop=lambda: True)
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("inputs", ["x := value.a", "x := value.a, y := value.b", "b := value.a < value.b"])
+def test_wide_integers_are_synthesized_and_honestly_not_searched(inputs: str) -> None:
+    text = (
+        "robot R { interface i use T from p datatype object P { a: integer(0..10000) b: integer(0..10000) }"
+        " component S { outgoing message m with type: P links i behaviour { variable x: integer(0..10000)"
+        " variable y: integer(0..10000) variable b: boolean"
+        f" initial marked state s {{ on response from m do {inputs} }} }} }}"
+        " component G { incoming message go with type: none }"
+        " requirement go needs S.x < 5000 and S.y < S.x or S.b }"
+    )
+    made = make_supervisor(bundle_of(text))
+    assert made.supervisor is not None
+    certificate = made.supervisor.certificate
+    assert certificate.method.startswith("not searched: more than ")
+    assert certificate.safe == certificate.maximally_permissive == "not checked"

@@ -1,0 +1,65 @@
+"""What the request of an action does to its own requirements (semantics 3.4)."""
+
+from collections.abc import Mapping
+
+from robosc.expressions import Expression, Unary, Value, children
+from robosc.expressions.evaluate import evaluate
+from robosc.model.structure import Behaviour, EventKind, State, Transition
+
+
+class _Anywhere:
+    """A location of which nothing is known: whether it is a given one is unknown."""
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __eq__(self, other: object) -> None:  # type: ignore[override]  # neither true nor false
+        return None
+
+
+_ANYWHERE = _Anywhere()
+
+
+def breaks_its_requirement(action: str, requirement: Expression, behaviours: Mapping[str, Behaviour]) -> str | None:
+    """A component in which the request of an action makes a requirement false, whatever the others do.
+
+    Judged by what a component alone tells: a requirement counts as false only if nothing else could make it true.
+    """
+    if _tests_knowledge(requirement):
+        return None
+    for component, behaviour in behaviours.items():
+        for transition in behaviour.transitions:
+            if transition.event == f"{action}.{EventKind.REQUEST}" and any(
+                _breaks(requirement, component, transition, state) for state in behaviour.states
+            ):
+                return component
+    return None
+
+
+def _breaks(requirement: Expression, component: str, transition: Transition, state: State) -> bool:
+    """Whether a requirement that may be true in a state is false after a transition from it."""
+    if transition.source not in (None, state.name):
+        return False
+    before = _judged(requirement, component, state.name, {})
+    assigned = {update.variable: _judged(update.expression, component, state.name, {}) for update in transition.updates}
+    after = _judged(requirement, component, transition.target or state.name, assigned)
+    return before is not False and after is False
+
+
+def _judged(expression: Expression, component: str, state: str, variables: Mapping[str, Value | None]) -> Value | None:
+    """The value of an expression as far as one component's state and variables tell; None if they do not."""
+    return evaluate(  # type: ignore[no-any-return]
+        expression,
+        lambda owner, variable: variables.get(variable) if owner == component else None,  # type: ignore[arg-type, return-value]
+        lambda owner: state if owner == component else _ANYWHERE,  # type: ignore[arg-type, return-value]  # compared only
+    )
+
+
+def _tests_knowledge(expression: Expression) -> bool:
+    """Whether an expression asks what is known: here, that something is not known means something else."""
+    stack = [expression]
+    while stack:
+        node = stack.pop()
+        if isinstance(node, Unary) and node.operator == "holds":
+            return True
+        stack += children(node)
+    return False

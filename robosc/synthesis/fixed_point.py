@@ -2,16 +2,16 @@
 
 Source: L. Ouedraogo, R. Kumar, R. Malik and K. Akesson, "Nonblocking and safe control of discrete-event systems
 modeled as extended finite automata", IEEE T-ASE 8(3), 2011, pp. 560-569, Algorithm 1, on predicates instead of
-guards. Predecessors are found by substitution, forward images with a relation for each event. Events are chained:
-each works on what the ones before it have found, backwards in the opposite order, since a system's events mostly
-follow each other in the order in which they are given.
+guards. Predecessors are found by substitution, forward images with a relation for each event; `closure` says in which
+order.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from robosc.expressions import Expression
+from robosc.synthesis.closure import Closure, Step
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.symbolic import Symbols
 from robosc.synthesis.transitions import Steps
@@ -52,10 +52,6 @@ def safe_states(encoding: Encoding, invariants: Iterable[Expression]) -> Any:
     return encoding.all_of([encoding.valid_states(), *(symbols.holds(item) for item in invariants)])
 
 
-Step = Callable[[Any], Any]
-"""What one event adds to a set of states."""
-
-
 class FixedPoint:
     """Works out good states and controlled systems.
 
@@ -80,18 +76,20 @@ class FixedPoint:
             good = good & ~steps.bad
             if self._is_lost(good):
                 return GoodStates(good, rounds, f"{steps.event.name} can do harm in the initial state already")
+        # A step with one target only stays in whatever it was found to lead into.
+        is_closed = all(steps.is_deterministic for steps in problem.steps if steps.event.is_controllable)
         while True:
             before = good
-            good = self._nonblocking(problem, good, known)
-            if self._is_lost(good):
-                return GoodStates(good, rounds, "from the initial state no marked state can be reached safely")
-            good = self._controllable(problem, good)
+            nonblocking = self._nonblocking(problem, good, known)
+            if self._is_lost(nonblocking):
+                return GoodStates(nonblocking, rounds, "from the initial state no marked state can be reached safely")
+            good = self._controllable(problem, nonblocking)
             if self._is_lost(good):
                 reason = "uncontrollable events can lead from the initial state into states to be avoided"
                 return GoodStates(good, rounds, reason)
             rounds += 1
             self._watch.tell("fixed point", rounds, good)
-            if good == before:
+            if good == before or (is_closed and good == nonblocking):
                 return GoodStates(good, rounds)
 
     def _is_lost(self, good: Any) -> bool:
@@ -99,41 +97,32 @@ class FixedPoint:
 
     def _nonblocking(self, problem: Problem, good: Any, known: Any) -> Any:
         """The states of `good` that reach a marked state through transitions that stay in `good`."""
-        steps = [self._towards(steps, allowed(steps, good)) for steps in self._each(problem)]
-        return self._closure((good & self._marked) | known, steps[::-1], "coreachability")
+        closure = self._closure(self._towards(steps, allowed(steps, good)) for steps in self._each(problem))
+        return closure.of((good & self._marked) | known, "coreachability")
 
     @staticmethod
     def _towards(steps: Steps, source: Any) -> Step:
-        return lambda states: source & steps.some(states)
+        return Step(lambda states: source & steps.some(states), steps.names)
 
     def _controllable(self, problem: Problem, good: Any) -> Any:
         """The states of `good` that no run of uncontrollable events leaves."""
-        steps = [steps.some for steps in self._each(problem) if not steps.event.is_controllable]
-        return ~self._closure(~good, steps[::-1], "controllability")
+        closure = self._closure(
+            Step(steps.some, steps.names) for steps in self._each(problem) if not steps.event.is_controllable
+        )
+        # Once the initial state is among them there is nothing left to find out.
+        return ~closure.of(~good, "controllability", lambda states: self._is_lost(~states))
 
     def reachable_states(self, problem: Problem, good: Any) -> Any:
         """Every state of the controlled system."""
-        steps = [self._onwards(steps, allowed(steps, good)) for steps in self._each(problem)]
-        return self._closure(self.initial, steps, "reachability")
+        closure = self._closure(self._onwards(steps, allowed(steps, good)) for steps in self._each(problem))
+        return closure.of(self.initial, "reachability")
 
     @staticmethod
     def _onwards(steps: Steps, source: Any) -> Step:
-        return lambda states: steps.image(states & source)
+        return Step(lambda states: steps.image(states & source), steps.names)
 
-    def _closure(self, states: Any, steps: Sequence[Step], phase: str) -> Any:
-        """`states` and all that steps from them add, one step after the other until none adds anything."""
-        rounds = unchanged = 0
-        while unchanged < len(steps):
-            for step in steps:
-                self._watch.check_stop()
-                grown = states | step(states)
-                unchanged = unchanged + 1 if grown == states else 0
-                states = grown
-                if unchanged == len(steps):
-                    break
-            rounds += 1
-            self._watch.tell(phase, rounds, states)
-        return states
+    def _closure(self, steps: Iterable[Step]) -> Closure:
+        return Closure(tuple(steps), self._encoding.state_names, self._watch)
 
     def _each(self, problem: Problem) -> Iterator[Steps]:
         for steps in problem.steps:

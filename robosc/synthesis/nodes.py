@@ -33,6 +33,20 @@ def node_count(manager: Manager, node: Any) -> int:
     return len(seen)
 
 
+def support(manager: Manager, node: Any) -> set[str]:
+    """The variables that a predicate depends on."""
+    found: set[str] = set()
+    seen: dict[int, Any] = {}
+    stack = [node]
+    while stack:
+        item = stack.pop()
+        if int(item) not in seen and not is_constant(manager, item):
+            seen[int(item)] = item
+            found.add(item.var)
+            stack += [item.low, item.high]
+    return found
+
+
 def count_models(manager: Manager, node: Any, variables: Sequence[str]) -> int:
     """Assignments of `variables` that make a predicate true, exactly.
 

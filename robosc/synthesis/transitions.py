@@ -13,6 +13,7 @@ from typing import Any, Self
 from robosc.automata.state import Subject
 from robosc.automata.structure import Automaton, Edge, Event, System
 from robosc.synthesis.encoding import Encoding, next_name
+from robosc.synthesis.nodes import support
 from robosc.synthesis.symbolic import Symbols
 
 
@@ -163,6 +164,13 @@ def _next_value(encoding: Encoding, arcs: Sequence[_Arc], name: str) -> Any:
     return result
 
 
+def _names(encoding: Encoding, transition: Transition) -> frozenset[str]:
+    """The current-state variables that a transition reads or changes."""
+    predicates = (transition.possible, transition.out_of_range, transition.condition, *transition.functions.values())
+    read = set().union(*(support(encoding.manager, predicate) for predicate in predicates))
+    return frozenset(encoding.state_names) & (read | transition.functions.keys())
+
+
 class Steps:
     """Predecessors and successors of predicates under one event.
 
@@ -184,6 +192,10 @@ class Steps:
         """Where the plant enables the event; a controllable one must stay in every range."""
         self.condition = transition.condition
         """Where its event conditions are true."""
+        self.is_deterministic = not transition.hidden
+        """Whether it leads to one state at most."""
+        self.names = _names(encoding, transition)
+        """The current-state variables that it reads or changes."""
         self._in_range = transition.possible & ~transition.out_of_range
         self._changed = tuple(transition.functions)
         self._relation: Any = None

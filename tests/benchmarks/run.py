@@ -1,6 +1,6 @@
 """Prints every benchmark table of the project, measured side by side in one run.
 
-Usage: run.py [cold-start] [execution] [language] [ros2]      (all of them without an argument)
+Usage: run.py [cold-start] [execution] [language] [ros2] [synthesis]      (all of them without an argument)
 """
 
 import sys
@@ -10,12 +10,14 @@ import cold_start
 import execution
 import language
 import ros2_cycle
+import synthesis
 
 TABLES: dict[str, Callable[[], str]] = {
     "cold-start": cold_start.table,
     "execution": execution.table,
     "language": language.table,
     "ros2": ros2_cycle.table,
+    "synthesis": synthesis.table,
 }
 
 

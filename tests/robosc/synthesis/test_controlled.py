@@ -199,6 +199,7 @@ def without_traces(answers: Answers) -> object:
     )
 
 
+@pytest.mark.timeout(300 + EXAMPLES)
 def test_random_systems(record_property: Callable[[str, object], None]) -> None:
     met: Counter[str] = Counter()
 

@@ -66,6 +66,7 @@ def agree(system: System) -> str:
     return "disables" if disables else "free"
 
 
+@pytest.mark.timeout(300 + EXAMPLES)
 def test_random_systems(record_property: Callable[[str, object], None]) -> None:
     shares: Counter[str] = Counter()
 

@@ -1,0 +1,89 @@
+"""Time, size and memory of synthesis on families of systems of growing size, both engines side by side.
+
+Each size runs in a process of its own with a limit of time; what does not end in it is told as such, and larger sizes
+of that family are left out for that engine.
+"""
+
+import json
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from figures import text_table
+
+LIMIT_S = 60.0
+
+SIZES: dict[str, tuple[int, ...]] = {
+    "dining philosophers": (5, 10, 20, 50, 100),
+    "transfer line": (1, 2, 4, 8, 12),
+    "token ring": (5, 20, 60, 200),
+    "cat and mouse, 1 pair": (1, 3, 5),
+    "cat and mouse, 2 pairs": (1, 2, 3, 4),
+    "counter": (100, 1_000, 10_000),
+    "random robot": (5, 20, 40, 60),
+}
+
+HEADER = ("family, size", "engine", "states", "rounds", "peak nodes", "adds to", "time, s", "memory, MB")
+
+
+def measured(family: str, size: int, engine: str) -> dict[str, object]:
+    """Figures of one synthesis, in this process; the system is built before the clock starts."""
+    from robosc.errors import SynthesisCancelled
+    from robosc.synthesis import synthesize
+    from support.families import FAMILIES
+
+    system = FAMILIES[family](size)
+    synthesize(FAMILIES["token ring"](2), engine=engine)  # What is imported on first use is no part of it.
+    begin = time.perf_counter()
+    try:
+        found = synthesize(system, engine=engine, should_stop=lambda: time.perf_counter() - begin > LIMIT_S)
+    except SynthesisCancelled:
+        return {}
+    return {
+        "seconds": time.perf_counter() - begin,
+        "states": str(found.statistics.states),
+        "rounds": found.statistics.iterations,
+        "peak_nodes": found.statistics.peak_nodes,
+        "added": len(found.added),
+        "memory_kib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss,
+    }
+
+
+def _row(family: str, size: int, engine: str) -> list[str] | None:
+    """One line of the table, or None where the limit has passed."""
+    done = subprocess.run(
+        [sys.executable, __file__, family, str(size), engine],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=Path(__file__).parent,
+    )
+    found = json.loads(done.stdout)
+    if not found:
+        return None
+    states = found["states"] if len(found["states"]) < 10 else f"{float(found['states']):.2e}"
+    figures = (states, f"{found['rounds']}", f"{found['peak_nodes']:,}", f"{found['added']}")
+    return [f"{family}, {size}", engine, *figures, f"{found['seconds']:.3f}", f"{found['memory_kib'] / 1024:.0f}"]
+
+
+def table() -> str:
+    """One line a size and engine."""
+    rows = []
+    for family, sizes in SIZES.items():
+        engines = ["cudd", "autoref"]
+        for size in sizes:
+            for engine in tuple(engines):
+                row = _row(family, size, engine)
+                if row is None:
+                    engines.remove(engine)
+                    row = [f"{family}, {size}", engine, *[""] * 4, f"> {LIMIT_S:.0f}", ""]
+                rows.append(row)
+    return text_table("synthesis: families of growing size, whole process's memory", HEADER, rows)
+
+
+if __name__ == "__main__":
+    print(json.dumps(measured(sys.argv[1], int(sys.argv[2]), sys.argv[3])))

@@ -164,7 +164,7 @@ class _RobotChecker:
                 found[communication.name] = communication
                 self.places.communications[communication.name] = item.location
                 self.places.identifiers[communication.name] = item.identifier_location
-        self._broken = {item.tree.name.text for item in trees} - found.keys()
+        self._findings.communications_are_broken({item.tree.name.text for item in trees} - found.keys())
         check_topics(found.values(), self.places.communications, self._types, self._findings)
         return found
 
@@ -217,7 +217,7 @@ class _RobotChecker:
         self.places.transitions[name] = tuple(transition.location for _, transition in tree.transitions)
 
     def _unknown_communication(self, part: Part, communications: Mapping[str, Communication]) -> "_Unknown":
-        return _Unknown(part, self._unit, communications, self._broken, self._findings)
+        return _Unknown(part, self._unit, communications, self._findings)
 
     def _check_requests(
         self,
@@ -256,17 +256,14 @@ class _Unknown:
     part: Part
     robot: Unit
     communications: Mapping[str, Communication]
-    broken: set[str]
     findings: Findings
     told: set[str] = field(default_factory=set)
 
     def __call__(self, name: syntax.Name) -> None:
-        if name.text in self.broken:
-            return  # It exists, but what is wrong with it has been reported already.
         if self.part.unit is self.robot:
-            self.findings.unknown("communication", name.text, name.location, self.communications)
+            self.findings.unknown_communication(name.text, name.location, self.communications)
             return
-        if name.text in self.told:
+        if name.text in self.told or self.findings.explain(name.text):
             return  # Several transitions may react to it: the import is wrong once.
         self.told.add(name.text)
         self.findings.error(

@@ -19,6 +19,7 @@ class Findings:
     def __init__(self) -> None:
         self.diagnostics: list[Diagnostic] = []
         self._comparisons = _MAXIMUM_COMPARISONS
+        self._broken_communications: set[str] = set()
 
     def error(self, code: str, message: str, location: Location, mend: str, *related: RelatedPlace) -> None:
         """Add an error."""
@@ -41,6 +42,19 @@ class Findings:
             location,
             mend or (f"Write '{near}'." if near else f"Define the {what} '{name}' or use one that exists."),
         )
+
+    def communications_are_broken(self, names: Iterable[str]) -> None:
+        """Note communications that are there, but with faults that have been reported."""
+        self._broken_communications.update(names)
+
+    def explain(self, communication: str) -> bool:
+        """Whether an error that has been reported explains why a communication is not known."""
+        return communication in self._broken_communications
+
+    def unknown_communication(self, name: str, location: Location, known: Iterable[str]) -> None:
+        """Add an `unknown-name` error, unless another error explains it."""
+        if not self.explain(name):
+            self.unknown("communication", name, location, known)
 
     def _near(self, name: str, known: Iterable[str]) -> str | None:
         """The nearest known name, until so many names have been compared that more would take noticeable time."""

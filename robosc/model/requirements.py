@@ -49,7 +49,7 @@ def _restricted(
     for name in tree.communications:
         communication = communications.get(name.text)
         if communication is None:
-            findings.unknown("communication", name.text, name.location, communications)
+            findings.unknown_communication(name.text, name.location, communications)
         elif communication.kind is CommunicationKind.OUTGOING_MESSAGE:
             findings.error(
                 "requirement-on-outgoing",
@@ -86,7 +86,7 @@ class ProvideBuilder:
         condition = None if tree.condition is None else self._checker.condition(tree.condition)
         communication = communications.get(name.text)
         if communication is None:
-            self._findings.unknown("communication", name.text, name.location, communications)
+            self._findings.unknown_communication(name.text, name.location, communications)
             return None
         if communication.request is None:
             self._findings.error(

@@ -534,3 +534,11 @@ def test_a_printed_expression_reads_back_as_itself(condition: Expression) -> Non
 def test_words_of_the_language_that_are_misspelt(text: str, meant: str) -> None:
     found = checked(f"robot R {{ {text} component Z {{ incoming message m with type: none }} }}").diagnostics
     assert any(f"'{meant}'" in item.mend for item in found if item.code == "unknown-name")
+
+
+def test_a_communication_that_is_there_but_broken_is_not_unknown() -> None:
+    (found,) = checked(
+        "robot R { component C { incoming message m with type: zork behaviour { initial marked state s { on request to m } } }"
+        " requirement m needs C.s requirement C.s disables m provide m with 1 }"
+    ).diagnostics
+    assert found.message == "unknown data type 'zork'"

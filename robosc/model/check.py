@@ -23,7 +23,7 @@ from robosc.model.constants import Constants
 from robosc.model.expressions import ExpressionChecker
 from robosc.model.findings import Findings
 from robosc.model.interfaces import check_fields
-from robosc.model.own_requests import breaks_its_requirement
+from robosc.model.own_requests import OwnRequests
 from robosc.model.places import Places
 from robosc.model.restrictions import Restrictions
 from robosc.model.scope import Scopes
@@ -226,10 +226,11 @@ class _RobotChecker:
         requirements: Iterable[Requirement],
     ) -> None:
         """Note an action whose own request makes one of its requirements false."""
+        own = OwnRequests(behaviours)
         for place, requirement in zip(self.places.requirements, requirements, strict=True):
             for name in requirement.communications:
                 if communications[name].kind is CommunicationKind.ACTION:
-                    component = breaks_its_requirement(name, requirement.condition, behaviours)
+                    component = own.breaking(name, requirement.condition)
                     if component is not None:
                         self._findings.note(
                             "request-leaves-requirement",

@@ -1,5 +1,6 @@
 """What the request of an action does to its own requirements (semantics 3.4)."""
 
+from collections import defaultdict
 from collections.abc import Mapping
 
 from robosc.expressions import Expression, Unary, Value, children
@@ -19,20 +20,30 @@ class _Anywhere:
 _ANYWHERE = _Anywhere()
 
 
-def breaks_its_requirement(action: str, requirement: Expression, behaviours: Mapping[str, Behaviour]) -> str | None:
-    """A component in which the request of an action makes a requirement false, whatever the others do.
+class OwnRequests:
+    """The transitions of a robot that requests take.
 
-    Judged by what a component alone tells: a requirement counts as false only if nothing else could make it true.
+    Args:
+        behaviours: Behaviours by component.
     """
-    if _tests_knowledge(requirement):
-        return None
-    for component, behaviour in behaviours.items():
-        for transition in behaviour.transitions:
-            if transition.event == f"{action}.{EventKind.REQUEST}" and any(
-                _breaks(requirement, component, transition, state) for state in behaviour.states
-            ):
+
+    def __init__(self, behaviours: Mapping[str, Behaviour]) -> None:
+        self._taken: defaultdict[str, list[tuple[str, Behaviour, Transition]]] = defaultdict(list)
+        for component, behaviour in behaviours.items():
+            for transition in behaviour.transitions:
+                self._taken[transition.event].append((component, behaviour, transition))
+
+    def breaking(self, action: str, requirement: Expression) -> str | None:
+        """A component in which the request of an action makes a requirement false, whatever the others do.
+
+        Judged by what a component alone tells: a requirement counts as false only if nothing else could make it true.
+        """
+        if _tests_knowledge(requirement):
+            return None
+        for component, behaviour, transition in self._taken.get(f"{action}.{EventKind.REQUEST}", ()):
+            if any(_breaks(requirement, component, transition, state) for state in behaviour.states):
                 return component
-    return None
+        return None
 
 
 def _breaks(requirement: Expression, component: str, transition: Transition, state: State) -> bool:

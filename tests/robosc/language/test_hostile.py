@@ -106,6 +106,15 @@ LARGE: dict[str, Callable[[int], str]] = {
         "robot R { component C { incoming message m with type: none behaviour { initial marked state s { } } } "
         "requirement m needs C.s" + " and C.s" * n + " }"
     ),
+    "actions": lambda n: (
+        "robot R { interface i use T from p\n"
+        + "".join(
+            f"component C{i} {{ action a{i} with request: none, response: none, feedback: none links i behaviour {{ "
+            f"initial marked state s {{ on request to a{i} }} }} }}\nrequirement a{i} needs C{i}.s\n"
+            for i in range(n)
+        )
+        + "}"
+    ),
     "constants": lambda n: (
         "robot R { component C { incoming message m with type: none } constant K0: integer = 1\n"
         + "".join(f"constant K{i + 1}: integer = K{i}\n" for i in range(n))

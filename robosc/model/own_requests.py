@@ -1,11 +1,14 @@
 """What the request of an action does to its own requirements (semantics 3.4)."""
 
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from itertools import islice
 
-from robosc.expressions import Expression, Unary, Value, children
+from robosc.expressions import Expression, StateTest, Unary, Value, children, leaves
 from robosc.expressions.evaluate import evaluate
-from robosc.model.structure import Behaviour, EventKind, State, Transition
+from robosc.model.structure import Behaviour, EventKind, Transition
+
+_MAXIMUM_JUDGEMENTS = 20_000
 
 
 class _Anywhere:
@@ -28,6 +31,7 @@ class OwnRequests:
     """
 
     def __init__(self, behaviours: Mapping[str, Behaviour]) -> None:
+        self._judgements = 0
         self._taken: defaultdict[str, list[tuple[str, Behaviour, Transition]]] = defaultdict(list)
         for component, behaviour in behaviours.items():
             for transition in behaviour.transitions:
@@ -37,22 +41,36 @@ class OwnRequests:
         """A component in which the request of an action makes a requirement false, whatever the others do.
 
         Judged by what a component alone tells: a requirement counts as false only if nothing else could make it true.
+        After many thousand judgements no more are made: it is a note only, and all requirements with all transitions
+        of one request are the model's square.
         """
-        if _tests_knowledge(requirement):
+        if self._judgements > _MAXIMUM_JUDGEMENTS or _tests_knowledge(requirement):
             return None
         for component, behaviour, transition in self._taken.get(f"{action}.{EventKind.REQUEST}", ()):
-            if any(_breaks(requirement, component, transition, state) for state in behaviour.states):
-                return component
+            for state in _telling_states(requirement, component, behaviour, transition):
+                self._judgements += 1
+                if _breaks(requirement, component, transition, state):
+                    return component
         return None
 
 
-def _breaks(requirement: Expression, component: str, transition: Transition, state: State) -> bool:
+def _telling_states(
+    requirement: Expression, component: str, behaviour: Behaviour, transition: Transition
+) -> Iterator[str]:
+    """The states that a transition can be taken in, of those that a requirement does not tell apart only the first."""
+    if transition.source is not None:
+        yield transition.source
+        return
+    named = {leaf.state for leaf in leaves(requirement) if isinstance(leaf, StateTest) and leaf.component == component}
+    yield from (state.name for state in behaviour.states if state.name in named)
+    yield from islice((state.name for state in behaviour.states if state.name not in named), 1)
+
+
+def _breaks(requirement: Expression, component: str, transition: Transition, state: str) -> bool:
     """Whether a requirement that may be true in a state is false after a transition from it."""
-    if transition.source not in (None, state.name):
-        return False
-    before = _judged(requirement, component, state.name, {})
-    assigned = {update.variable: _judged(update.expression, component, state.name, {}) for update in transition.updates}
-    after = _judged(requirement, component, transition.target or state.name, assigned)
+    before = _judged(requirement, component, state, {})
+    assigned = {update.variable: _judged(update.expression, component, state, {}) for update in transition.updates}
+    after = _judged(requirement, component, transition.target or state, assigned)
     return before is not False and after is False
 
 

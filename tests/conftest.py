@@ -2,11 +2,6 @@
 
 import pytest
 
-from robosc.recursion import allow_depth
-
-# Hypothesis complains if the limit is first raised inside one of its tests.
-allow_depth(1000, 16)
-
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Print what tests recorded with `record_property`."""

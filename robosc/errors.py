@@ -141,6 +141,18 @@ class InvalidSupervisorError(RoboscError):
     """A supervisor file that is malformed, of an unknown version, or inconsistent."""
 
 
+class InvalidExpressionError(RoboscError):
+    """A resolved expression that names what is not there, or whose types do not fit."""
+
+
+class InvalidSystemError(RoboscError):
+    """Automata that do not fit together: see `robosc.automata.check_system`."""
+
+
+class NondeterministicEventError(InvalidSystemError):
+    """A controllable event that one automaton could take by several edges in one state."""
+
+
 class SynthesisCancelled(RoboscError):
     """The caller asked long work to stop."""
 

@@ -4,6 +4,8 @@ Between the checked model and synthesis: `to_automata` lowers a model, `Semantic
 means, one state at a time.
 """
 
+from robosc.automata.check import check_system
+from robosc.automata.environment import EnvironmentVariable, environment_variable
 from robosc.automata.lowering import to_automata
 from robosc.automata.semantics import Semantics
 from robosc.automata.structure import (
@@ -14,7 +16,9 @@ from robosc.automata.structure import (
     Event,
     EventCondition,
     InputVariable,
+    Role,
     System,
+    disables,
 )
 
 __all__ = [
@@ -22,10 +26,15 @@ __all__ = [
     "Automaton",
     "DiscreteVariable",
     "Edge",
+    "EnvironmentVariable",
     "Event",
     "EventCondition",
     "InputVariable",
+    "Role",
     "Semantics",
     "System",
+    "check_system",
+    "disables",
+    "environment_variable",
     "to_automata",
 ]

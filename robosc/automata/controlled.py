@@ -22,11 +22,11 @@ class ControlledGraph:
     """Every state of the controlled system; a state's number is its place in `states`.
 
     Attributes:
-        states: Reachable states, breadth-first, the initial one first.
+        states: Reachable states, breadth-first, initial ones first.
         steps: For each state the events that can happen, by name, each with the numbers of the states
             that it can lead to, in the order of the states' values.
         parents: For each state the number of the state it was found from and the event; None for the
-            initial one. Following them back gives a shortest run.
+            initial ones. Following them back gives a shortest run.
     """
 
     states: tuple[State, ...]
@@ -39,7 +39,7 @@ class ControlledGraph:
         return sum(len(targets) for steps in self.steps for _, targets in steps)
 
     def trace(self, number: int) -> tuple[str, ...]:
-        """Events of a shortest run from the initial state."""
+        """Events of a shortest run from an initial state."""
         events: list[str] = []
         parent = self.parents[number]
         while parent is not None:
@@ -54,6 +54,7 @@ def controlled_graph(
     added: Added,
     *,
     limit: int,
+    initial: Callable[[State], bool] = lambda state: True,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> ControlledGraph | None:
     """The graph of the controlled system, the same for the same input.
@@ -64,6 +65,7 @@ def controlled_graph(
     Args:
         semantics: The uncontrolled system.
         added: The supervisor's added conditions.
+        initial: The initial states in which the supervisor lets the system begin.
         limit: Number of states, and of `TRANSITIONS_PER_STATE` transitions, beyond which to give up.
         should_stop: Asked now and then; once true, the work ends.
 
@@ -74,9 +76,9 @@ def controlled_graph(
         SynthesisCancelled: `should_stop` became true.
     """
     events = sorted(semantics.system.events, key=lambda event: event.name)
-    numbers = {semantics.initial: 0}
-    states = [semantics.initial]
-    parents: list[tuple[int, str] | None] = [None]
+    states = [state for state in semantics.initial_states if initial(state)]
+    numbers = {state: number for number, state in enumerate(states)}
+    parents: list[tuple[int, str] | None] = [None] * len(states)
     steps: list[tuple[tuple[str, tuple[int, ...]], ...]] = []
     transitions = 0
     while len(steps) < len(states):

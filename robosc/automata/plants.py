@@ -35,7 +35,7 @@ def communication_plant(communication: Communication) -> Automaton:
     return Automaton(
         name=communication_plant_name(communication),
         locations=locations,
-        initial=_IDLE,
+        initial=(_IDLE,),
         marked=frozenset({_IDLE}),
         alphabet=frozenset(communication.events),
         edges=edges,
@@ -74,7 +74,7 @@ def component_plant(name: str, behaviour: Behaviour) -> Automaton:
     variables and their updates are left out.
     """
     variables = tuple(
-        DiscreteVariable(variable.name, variable.type, variable.initial)
+        DiscreteVariable(variable.name, variable.type, (variable.initial,))
         for variable in behaviour.variables
         if variable.is_synthesis
     )
@@ -85,7 +85,7 @@ def component_plant(name: str, behaviour: Behaviour) -> Automaton:
     return Automaton(
         name=name,
         locations=states,
-        initial=behaviour.initial,
+        initial=(behaviour.initial,),
         marked=frozenset(state.name for state in behaviour.states if state.is_marked),
         alphabet=frozenset(alphabet),
         edges=(*written, *_self_loops(states, alphabet, written)),

@@ -11,24 +11,25 @@ systems modeled as extended finite automata", IEEE T-ASE 8(3), 2011, pp. 560-569
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import product
 from math import prod
 from operator import itemgetter
 
 from robosc.automata.compile import NO_DATA, Function, State, compile_expression, paths_read, subjects_read
 from robosc.automata.inputs import connected_inputs, valuations
-from robosc.automata.state import Subject, initial_state, subject_type, subjects
-from robosc.automata.structure import Assignment, Automaton, Edge, Event, InputVariable, System
-from robosc.errors import RoboscError
+from robosc.automata.state import Subject, initial_values, subject_type, subjects
+from robosc.automata.structure import Assignment, Automaton, Edge, Event, InputVariable, Role, System
+from robosc.errors import NondeterministicEventError, RoboscError
 from robosc.expressions import TRUE, IntegerType, Type, Value, domain
 from robosc.expressions.text import expression_text
 
 MAXIMUM_CHOICES = 500_000
-"""Choices of received data for one step beyond which it is not worked out."""
+"""Choices of received data for one step beyond which it is not worked out; also ways to begin."""
 
 
 class TooManyChoicesError(RoboscError):
-    """A step has too many choices of received data to go through them one by one."""
+    """A step has too many choices of received data, or a system too many ways to begin, to go through them all."""
 
 
 _Writes = tuple[tuple[int, Value], ...]
@@ -65,9 +66,9 @@ class _Outcome:
     """What one event does in a state.
 
     Attributes:
-        is_possible: Whether every automaton has an edge for it whose guard is true.
+        is_possible: Whether every plant has an edge for it whose guard is true.
         may_leave_range: Whether some data or edge would take a variable out of its range.
-        meets_condition: Whether every event condition is true.
+        meets_condition: Whether every event condition is true and every requirement automaton has such an edge, too.
         writes: What each choice of data and edges that stays in range changes.
     """
 
@@ -77,6 +78,10 @@ class _Outcome:
     writes: tuple[_Writes, ...]
 
 
+_Participant = tuple[int, dict[Value, tuple[_Arc, ...]]]
+"""An automaton: place of its location, and its arcs by location."""
+
+
 @dataclass(frozen=True, slots=True)
 class _Rule:
     """Everything about one event.
@@ -84,14 +89,16 @@ class _Rule:
     Attributes:
         event: The event.
         reads: The part of a state that tells what it does.
-        participants: For each automaton that takes part: place of its location, arcs by location.
+        participants: For each plant that takes part: place of its location, arcs by location.
+        observers: The same for each requirement automaton.
         conditions: Its event conditions.
         outcomes: What was worked out already, by the values of `reads`.
     """
 
     event: Event
     reads: Callable[[State], object]
-    participants: tuple[tuple[int, dict[Value, tuple[_Arc, ...]]], ...]
+    participants: tuple[_Participant, ...]
+    observers: tuple[_Participant, ...]
     conditions: tuple[Function, ...]
     outcomes: dict[object, _Outcome] = field(default_factory=dict)
 
@@ -104,13 +111,14 @@ class _Rule:
 
     def _work_out(self, state: State) -> _Outcome:
         meets_condition = all(condition(state, NO_DATA) is True for condition in self.conditions)
-        choices = [
-            [arc for arc in arcs.get(state[place], ()) if arc.guard(state, NO_DATA) is True]
-            for place, arcs in self.participants
-        ]
-        # An event in no alphabet belongs to no plant, so it cannot happen.
+        choices = [self._taken(participant, state) for participant in self.participants]
+        watched = [self._taken(observer, state) for observer in self.observers]
+        # A requirement that has no edge forbids the event and stays where it is.
+        meets_condition = meets_condition and all(watched)
+        # An event in no plant's alphabet cannot happen.
         if not choices or not all(choices):
             return _Outcome(False, False, meets_condition, ())
+        choices += [arcs for arcs in watched if arcs]
         leaves_range = False
         writes: dict[_Writes, None] = {}
         for arcs in product(*choices):
@@ -118,6 +126,16 @@ class _Rule:
             leaves_range = leaves_range or leaves
             writes.update(dict.fromkeys(results))
         return _Outcome(True, leaves_range, meets_condition, tuple(writes))
+
+    def _taken(self, participant: _Participant, state: State) -> list[_Arc]:
+        """The arcs that an automaton may take."""
+        place, arcs = participant
+        taken = [arc for arc in arcs.get(state[place], ()) if arc.guard(state, NO_DATA) is True]
+        if self.event.is_controllable and len(taken) > 1:
+            raise NondeterministicEventError(
+                f"the controllable event {self.event.name} has {len(taken)} edges that can be taken in {state[place]}"
+            )
+        return taken
 
 
 def _joint_step(arcs: tuple[_Arc, ...], state: State) -> tuple[bool, list[_Writes]]:
@@ -140,7 +158,7 @@ def _require_few(counts: Iterable[int]) -> None:
     """
     combinations = prod(counts)
     if combinations > MAXIMUM_CHOICES:
-        raise TooManyChoicesError(f"a step has {combinations} choices of received data: too many to go through them")
+        raise TooManyChoicesError(f"{combinations} choices are too many to go through them")
 
 
 def _updates_together(updates: list[_Update], state: State) -> tuple[bool, list[_Writes]]:
@@ -178,21 +196,38 @@ class Semantics:
     """The uncontrolled system, state by state.
 
     States are tuples in the order of `subjects(system)`. What asks for the steps of a state raises
-    `TooManyChoicesError` where received data has more than `MAXIMUM_CHOICES` values that matter together.
+    `TooManyChoicesError` where received data has more than `MAXIMUM_CHOICES` values that matter together, and
+    `NondeterministicEventError` where a controllable event has several edges to take.
 
     Attributes:
         system: The system.
-        initial: The initial state.
     """
 
     def __init__(self, system: System) -> None:
         self.system = system
-        self.initial: State = initial_state(system)
         self._places = {subject: place for place, subject in enumerate(subjects(system))}
         self._marked = tuple((self._places[Subject(item.name)], item.marked) for item in system.automata)
         self._rules = {event.name: self._rule(event) for event in system.events}
         self._invariants = tuple(compile_expression(item, self._places) for item in system.invariants)
+        self._initial = compile_expression(system.initial, self._places)
+        self._marker = compile_expression(system.marker, self._places)
         self._uncontrollable = tuple(rule for rule in self._rules.values() if not rule.event.is_controllable)
+
+    @cached_property
+    def initial_states(self) -> tuple[State, ...]:
+        """Every initial state, whether it is bad or not, in the order of the values.
+
+        Raises:
+            TooManyChoicesError: Automata and variables have more than `MAXIMUM_CHOICES` ways to begin.
+        """
+        values = initial_values(self.system)
+        _require_few(len(places) for places in values)
+        return tuple(state for state in product(*values) if self._initial(state, NO_DATA) is True)
+
+    @property
+    def initial(self) -> State:
+        """The first initial state: of a RoboSC model the only one (IndexError where there is none)."""
+        return self.initial_states[0]
 
     def enabled(self, state: State, event: str) -> bool:
         """Whether the plant enables an event; a controllable one must also stay in every range."""
@@ -203,7 +238,7 @@ class Semantics:
     def condition(self, state: State, event: str) -> bool:
         """Whether every event condition on an event is true."""
         rule = self._rules[event]
-        return not rule.conditions or rule.outcome(state).meets_condition
+        return not (rule.conditions or rule.observers) or rule.outcome(state).meets_condition
 
     def targets(self, state: State, event: str) -> frozenset[State]:
         """The states that an event can lead to, over all received data and edges; none if it is not enabled.
@@ -240,8 +275,8 @@ class Semantics:
         return None
 
     def is_marked(self, state: State) -> bool:
-        """Whether every automaton is in a marked location."""
-        return all(state[place] in marked for place, marked in self._marked)
+        """Whether every automaton is in a marked location, and the marker condition is true."""
+        return all(state[place] in marked for place, marked in self._marked) and self._marker(state, NO_DATA) is True
 
     def _rule(self, event: Event) -> _Rule:
         automata = [item for item in self.system.automata if event.name in item.alphabet]
@@ -256,11 +291,15 @@ class Semantics:
         return _Rule(
             event=event,
             reads=_reader(sorted(self._places[subject] for subject in read)),
-            participants=tuple(self._participant(item, event.name) for item in automata),
+            participants=self._participants(automata, event.name, Role.PLANT),
+            observers=self._participants(automata, event.name, Role.REQUIREMENT),
             conditions=tuple(compile_expression(item, self._places) for item in conditions if item != TRUE),
         )
 
-    def _participant(self, automaton: Automaton, event: str) -> tuple[int, dict[Value, tuple[_Arc, ...]]]:
+    def _participants(self, automata: Iterable[Automaton], event: str, role: Role) -> tuple[_Participant, ...]:
+        return tuple(self._participant(item, event) for item in automata if item.role is role)
+
+    def _participant(self, automaton: Automaton, event: str) -> _Participant:
         place = self._places[Subject(automaton.name)]
         arcs: dict[Value, tuple[_Arc, ...]] = {}
         for edge in automaton.edges:

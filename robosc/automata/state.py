@@ -50,10 +50,10 @@ def subject_type(system: System, subject: Subject) -> Type:
     raise KeyError(str(subject))
 
 
-def initial_state(system: System) -> tuple[Value, ...]:
-    """The initial state, in the order of `subjects`."""
+def initial_values(system: System) -> tuple[tuple[Value, ...], ...]:
+    """For each place of a state, in the order of `subjects`, the values that it may begin with."""
     return tuple(
-        value
+        values
         for automaton in system.automata
-        for value in (automaton.initial, *(variable.initial for variable in automaton.variables))
+        for values in (automaton.initial, *(variable.initial for variable in automaton.variables))
     )

@@ -10,8 +10,9 @@ A is in location l, and `Received(path)` is the event's input of that path.
 """
 
 from dataclasses import dataclass
+from enum import StrEnum
 
-from robosc.expressions import TRUE, Expression, PathStep, Type, Value
+from robosc.expressions import TRUE, Expression, PathStep, Type, Unary, Value
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,11 +25,17 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class DiscreteVariable:
-    """A variable that edges of its automaton assign; its type is finite."""
+    """A variable that edges of its automaton assign.
+
+    Attributes:
+        name: Unique in its automaton.
+        type: A finite type.
+        initial: The values it may begin with, at least one.
+    """
 
     name: str
     type: Type
-    initial: Value
+    initial: tuple[Value, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,35 +81,52 @@ class Edge:
     updates: tuple[Assignment, ...] = ()
 
 
+class Role(StrEnum):
+    """What an automaton is in a synthesis problem."""
+
+    PLANT = "plant"
+    """What can happen."""
+    REQUIREMENT = "requirement"
+    """What may happen: it watches the plants, and an event that it has no edge for is against it."""
+
+
 @dataclass(frozen=True, slots=True)
 class Automaton:
-    """A plant.
+    """A plant, or a requirement.
 
     Attributes:
         name: Unique; a component's name, or e.g. `service calibrate`, which no identifier can be.
         locations: Names, at least one.
-        initial: The initial location.
+        initial: The locations it may begin in, at least one.
         marked: Marked locations.
-        alphabet: Events it takes part in; one without an edge is blocked.
+        alphabet: Events it takes part in. Where it has no edge for one, a plant cannot do it, and a requirement
+            forbids it.
         variables: Its variables.
         edges: Its arcs. Two edges of one location may both take part only for an uncontrollable event.
+        role: What it is.
     """
 
     name: str
     locations: tuple[str, ...]
-    initial: str
+    initial: tuple[str, ...]
     marked: frozenset[str]
     alphabet: frozenset[str]
     edges: tuple[Edge, ...]
     variables: tuple[DiscreteVariable, ...] = ()
+    role: Role = Role.PLANT
 
 
 @dataclass(frozen=True, slots=True)
 class EventCondition:
-    """A state-event requirement: `event` only where `condition` is true."""
+    """A state-event exclusion invariant: `event` only where `condition` is true."""
 
     event: str
     condition: Expression
+
+
+def disables(condition: Expression, event: str) -> EventCondition:
+    """The other form of a state-event exclusion invariant: `event` only where `condition` is not true."""
+    return EventCondition(event, Unary("not", Unary("holds", condition)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,10 +136,13 @@ class System:
     Attributes:
         name: What it is called.
         events: All events.
-        automata: The plants; their synchronous composition is the uncontrolled system.
+        automata: Plants and requirement automata; the synchronous composition of the plants is the uncontrolled
+            system.
         inputs: Received data that updates read.
         conditions: Requirements on events; several on one event must all be true.
         invariants: Conditions that must be true in every state.
+        initial: A condition that is true in every initial state, beside what automata and variables say.
+        marker: A condition that is true in every marked state, beside what the automata say.
     """
 
     name: str
@@ -124,6 +151,8 @@ class System:
     inputs: tuple[InputVariable, ...] = ()
     conditions: tuple[EventCondition, ...] = ()
     invariants: tuple[Expression, ...] = ()
+    initial: Expression = TRUE
+    marker: Expression = TRUE
 
     def automaton(self, name: str) -> Automaton:
         """The automaton called `name` (KeyError if there is none)."""

@@ -22,6 +22,22 @@ from robosc.expressions.tree import (
 )
 from robosc.expressions.types import Value
 
+
+def _whole_quotient(a: Any, b: Any) -> Any:
+    """The quotient of two integers, towards zero; unknown for division by zero or beyond 32 bits."""
+    if a is None or b is None or b == 0:
+        return None
+    quotient = abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)
+    return values.add(quotient, 0)
+
+
+def _remainder(a: Any, b: Any) -> Any:
+    """What division leaves, with the sign of the dividend; unknown for division by zero."""
+    if a is None or b is None or b == 0:
+        return None
+    return abs(a) % abs(b) * (-1 if a < 0 else 1)
+
+
 BINARY: Mapping[str, Callable[[Any, Any], Any]] = {
     "or": values.or_,
     "and": values.and_,
@@ -36,6 +52,8 @@ BINARY: Mapping[str, Callable[[Any, Any], Any]] = {
     "-": values.subtract,
     "*": values.multiply,
     "/": values.divide,
+    "div": _whole_quotient,
+    "mod": _remainder,
 }
 """The function of each binary operator."""
 

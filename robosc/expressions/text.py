@@ -18,7 +18,22 @@ from robosc.expressions.tree import (
     VariableRead,
 )
 
-_LEVELS = {"or": 1, "and": 2, "=": 3, "!=": 4, ">": 5, ">=": 5, "<": 5, "<=": 5, "+": 6, "-": 6, "*": 7, "/": 7}
+_LEVELS = {
+    "or": 1,
+    "and": 2,
+    "=": 3,
+    "!=": 4,
+    ">": 5,
+    ">=": 5,
+    "<": 5,
+    "<=": 5,
+    "+": 6,
+    "-": 6,
+    "*": 7,
+    "/": 7,
+    "div": 7,
+    "mod": 7,
+}
 _NOT, _NEGATIVE, _OPERAND = 8, 9, 10
 _IMPLIES = 0
 _CONDITIONAL = -1

@@ -13,7 +13,8 @@ import msgspec
 from robosc.expressions.types import Name, ScopedName, Value
 
 UnaryOperator = Literal["not", "-", "holds"]
-BinaryOperator = Literal["or", "and", "implies", "=", "!=", "<", "<=", ">", ">=", "+", "-", "*", "/"]
+BinaryOperator = Literal["or", "and", "implies", "=", "!=", "<", "<=", ">", ">=", "+", "-", "*", "/", "div", "mod"]
+"""`div` and `mod`, the whole quotient towards zero and what is left, are of automata only: RoboSC has no such words."""
 
 PathStep = Name | Annotated[int, msgspec.Meta(ge=0, le=2**31 - 1)]
 

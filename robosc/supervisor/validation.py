@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 from robosc.automata import to_automata
-from robosc.errors import InvalidSupervisorError
+from robosc.errors import InvalidExpressionError, InvalidSupervisorError
 from robosc.expressions import (
     ArrayType,
     BooleanType,
@@ -28,6 +28,7 @@ from robosc.expressions import (
     leaves,
     type_text,
 )
+from robosc.expressions.inference import Scope, has_type, is_assignable
 from robosc.model.structure import (
     Behaviour,
     Communication,
@@ -47,7 +48,6 @@ from robosc.model.structure import (
 )
 from robosc.supervisor.diagram import diagram_domains
 from robosc.supervisor.diagram import validate as validate_diagram
-from robosc.supervisor.expression_types import Scope, has_type, is_assignable
 from robosc.supervisor.structure import Certificate, Supervisor
 
 _TAU = re.compile(r"tau_[1-9][0-9]{0,8}\Z")
@@ -114,7 +114,7 @@ def _at(place: str) -> Iterator[None]:
     """Say where an inconsistency is that is found inside."""
     try:
         yield
-    except InvalidSupervisorError as error:
+    except (InvalidSupervisorError, InvalidExpressionError) as error:
         raise InvalidSupervisorError(f"{place}: {error}") from None
 
 

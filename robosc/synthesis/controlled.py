@@ -5,7 +5,7 @@ from typing import Any
 
 from robosc.expressions import Expression
 from robosc.synthesis.encoding import Encoding
-from robosc.synthesis.fixed_point import FixedPoint, Problem, allowed, safe_states
+from robosc.synthesis.fixed_point import FixedPoint, Problem, allowed, initial_states, safe_states
 from robosc.synthesis.questions import Answers, Cause, Questions, Restriction, Together
 from robosc.synthesis.runs import ShortestRuns
 from robosc.synthesis.symbolic import Symbols
@@ -161,7 +161,8 @@ class ControlledSystem:
         if not pairs:
             return ()
         possible = {name: self._reachable & allowed(steps, self._good) for name, steps in self._steps.items()}
-        runs = ShortestRuns(self._encoding, self._watch, self._problem.steps, possible)
+        initial = initial_states(self._encoding) & self._good
+        runs = ShortestRuns(self._encoding, self._watch, initial, self._problem.steps, possible)
         return tuple(Together(first, second, runs.trace_to(states)) for first, second, states in pairs)
 
     def _pairs(self, groups: Iterable[Sequence[str]]) -> Iterator[tuple[str, str, Any]]:

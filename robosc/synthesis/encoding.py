@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from robosc.automata.state import Subject, initial_state, subject_domain, subject_type, subjects
+from robosc.automata.state import Subject, initial_values, subject_domain, subject_type, subjects
 from robosc.automata.structure import InputVariable, System
 from robosc.expressions import IntegerType, PathStep, Type, Value, domain
 from robosc.recursion import allow_depth
@@ -63,6 +63,7 @@ class Encoding:
         self.state_names = tuple(name for bits in self.subjects.values() for name in bits.names)
         self.inputs = tuple((item, self._input(number, item)) for number, item in enumerate(system.inputs))
         self._choices = 0
+        self._valid_states: Any = None
         self._declare()
         # Twice the bits of a state, for the next one; choices are few.
         levels = 2 * len(self.state_names) + sum(len(_names(bits)) for _, bits in self.inputs)
@@ -152,14 +153,22 @@ class Encoding:
 
     def valid_states(self) -> Any:
         """Where every place of the state encodes a value."""
-        return self.all_of(self.valid(bits) for bits in self.subjects.values())
+        if self._valid_states is None:
+            self._valid_states = self.all_of(self.valid(bits) for bits in self.subjects.values())
+        return self._valid_states
 
-    def initial_states(self) -> Any:
-        """The initial state."""
-        values = zip(subjects(self.system), initial_state(self.system), strict=True)
-        return self.all_of(self.equals(self.subjects[subject], value) for subject, value in values)
+    def initial_places(self) -> Any:
+        """Where every location and variable has a value that it may begin with."""
+        begin = zip(subjects(self.system), initial_values(self.system), strict=True)
+        return self.all_of(self.one_of(self.subjects[subject], values) for subject, values in begin)
 
-    def marked_states(self) -> Any:
+    def one_of(self, bits: Bits, values: Sequence[Value]) -> Any:
+        """Where a value is one of `values`."""
+        if len(values) == len(bits.domain):
+            return self.valid(bits)
+        return self.any_of(self.equals(bits, value) for value in values)
+
+    def marked_locations(self) -> Any:
         """Where every automaton is in a marked location."""
         return self.all_of(
             self.any_of(self.in_location(automaton.name, location) for location in sorted(automaton.marked))

@@ -78,7 +78,8 @@ def resolve_engine(name: str) -> str:
     """
     if name == "auto":
         return "cudd" if _has_cudd() else "autoref"
-    if name not in engine_names():
+    # What other packages offer is looked up only if it is asked for: that reads the lists of all that is installed.
+    if name not in _FACTORIES and name not in engine_names():
         raise UnknownEngineError(f"unknown engine '{name}'; there are auto, {', '.join(engine_names())}")
     if name == "cudd" and not _has_cudd():
         raise UnknownEngineError("the engine 'cudd' needs dd's C extension, which is not installed; use 'autoref'")

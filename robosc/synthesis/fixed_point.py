@@ -52,6 +52,11 @@ def safe_states(encoding: Encoding, invariants: Iterable[Expression]) -> Any:
     return encoding.all_of([encoding.valid_states(), *(symbols.holds(item) for item in invariants)])
 
 
+def initial_states(encoding: Encoding) -> Any:
+    """Where the uncontrolled system may begin."""
+    return encoding.initial_places() & Symbols(encoding).holds(encoding.system.initial)
+
+
 class FixedPoint:
     """Works out good states and controlled systems.
 
@@ -63,9 +68,9 @@ class FixedPoint:
     def __init__(self, encoding: Encoding, watch: Watch) -> None:
         self._encoding = encoding
         self._watch = watch
-        self.initial = encoding.initial_states()
-        """The initial state."""
-        self._marked = encoding.marked_states()
+        self.initial = initial_states(encoding)
+        """The initial states."""
+        self._marked = encoding.marked_locations() & Symbols(encoding).holds(encoding.system.marker)
 
     def good_states(self, problem: Problem, known: Any) -> GoodStates:
         """The states from which a supervisor can solve a problem; `known` ones are told beforehand to be such."""
@@ -113,9 +118,9 @@ class FixedPoint:
         return ~closure.of(~good, "controllability", lambda states: self._is_lost(~states))
 
     def reachable_states(self, problem: Problem, good: Any) -> Any:
-        """Every state of the controlled system."""
+        """Every state of the controlled system; it begins in those initial states that are good."""
         closure = self._closure(self._onwards(steps, allowed(steps, good)) for steps in self._each(problem))
-        return closure.of(self.initial, "reachability")
+        return closure.of(self.initial & good, "reachability")
 
     @staticmethod
     def _onwards(steps: Steps, source: Any) -> Step:

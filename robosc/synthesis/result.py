@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from robosc.supervisor.structure import AddedCondition
+from robosc.supervisor.structure import AddedCondition, DecisionDiagram
 from robosc.synthesis.questions import Answers
 
 
@@ -61,6 +61,7 @@ class SynthesisResult:
     Attributes:
         status: How it ended.
         added: What the supervisor adds, for events to which it adds something, in the system's order.
+        initial: Where the supervisor lets the system begin, of its initial states; None if everywhere.
         statistics: Figures.
         reason: Why there is no supervisor, in words; empty where there is one.
         answers: What else was asked about the controlled system; empty where there is none.
@@ -71,3 +72,4 @@ class SynthesisResult:
     statistics: Statistics
     reason: str = ""
     answers: Answers = field(default_factory=Answers)
+    initial: DecisionDiagram | None = None

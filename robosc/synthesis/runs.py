@@ -36,22 +36,25 @@ class _Layer:
 
 
 class ShortestRuns:
-    """Runs from the initial state; layers are made as far as they are needed, once for all runs.
+    """Runs from an initial state; layers are made as far as they are needed, once for all runs.
 
     Args:
         encoding: The variables.
         watch: Who waits.
+        initial: Where runs begin.
         steps: The events, in the order in which equally short runs are preferred.
         possible: For each event the states of the controlled system in which it may happen.
     """
 
-    def __init__(self, encoding: Encoding, watch: Watch, steps: Sequence[Steps], possible: Mapping[str, Any]) -> None:
+    def __init__(
+        self, encoding: Encoding, watch: Watch, initial: Any, steps: Sequence[Steps], possible: Mapping[str, Any]
+    ) -> None:
         self._encoding = encoding
         self._manager = encoding.manager
         self._watch = watch
         self._steps = steps
         self._possible = possible
-        self._layers = [_Layer(encoding.initial_states(), ())]
+        self._layers = [_Layer(initial, ())]
         self._ring = self._layers[0].reached
         self._rounds = 0
         self._effort = 0

@@ -245,6 +245,10 @@ class Symbols:
                 return self._within_32_bits(arithmetic.subtract(first, second), known)
             case "*":
                 return self._within_32_bits(arithmetic.multiply(first, second), known)
+            case "div" | "mod":
+                quotient, remainder = arithmetic.divide(first, second)
+                known = known & ~arithmetic.equal(second, arithmetic.constant(0))
+                return self._within_32_bits(quotient if operator == "div" else remainder, known)
             case "=" | "!=":
                 outcome = arithmetic.equal(first, second)
             case "<" | ">=":

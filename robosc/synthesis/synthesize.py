@@ -89,8 +89,13 @@ class _Synthesis:
         # The figures are those of the synthesis: what the questions take on top is not in them.
         statistics = self._statistics(good.rounds, states)
         controlled = ControlledSystem(self._encoding, self._watch, self._problem, good.states, reachable)
+        begin = self._restricted(fixed_point.initial, good.states)
         return SynthesisResult(
-            SynthesisStatus.SUPERVISOR, tuple(added), statistics, answers=controlled.answers(questions)
+            SynthesisStatus.SUPERVISOR,
+            tuple(added),
+            statistics,
+            answers=controlled.answers(questions),
+            initial=None if begin is None else extract(self._encoding, begin),
         )
 
     def _statistics(self, rounds: int, states: int) -> Statistics:
@@ -100,8 +105,10 @@ class _Synthesis:
         """The condition to add to an event, simplified where it does not matter; None if there is nothing to add."""
         if not steps.event.is_controllable:
             return None
-        care = reachable & steps.plant & steps.condition
-        wanted = steps.only(good)
+        return self._restricted(reachable & steps.plant & steps.condition, steps.only(good))
+
+    def _restricted(self, care: Any, wanted: Any) -> Any | None:
+        """A condition that is `wanted` where it matters, simplified; None if that is true."""
         if care & ~wanted == self._manager.false:
             return None
         if care & wanted == self._manager.false:

@@ -5,14 +5,16 @@ wherever the event is possible: an if-then-else over the edges of the automaton 
 predicate are then found by substitution, and no next-state variable is needed backwards.
 """
 
+from collections import defaultdict
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
 from typing import Any, Self
 
 from robosc.automata.state import Subject
-from robosc.automata.structure import Automaton, Edge, Event, System
-from robosc.synthesis.encoding import Encoding, next_name
+from robosc.automata.structure import Automaton, Edge, Event, Role, System
+from robosc.errors import NondeterministicEventError
+from robosc.synthesis.encoding import Bits, Encoding, next_name
 from robosc.synthesis.nodes import support
 from robosc.synthesis.symbolic import Symbols
 
@@ -25,7 +27,8 @@ class Transition:
         event: The event.
         possible: Where every automaton takes an edge, for data that can come.
         out_of_range: Where, taking it, an update leaves its variable's range.
-        condition: Where its event conditions are true (current-state variables only).
+        condition: Where its event conditions are true and every requirement automaton has an edge for it
+            (current-state variables only).
         functions: Value of each changed bit after it, right where the event is possible.
         hidden: Variables of received data and of choices between edges.
     """
@@ -53,21 +56,31 @@ def transition_of(encoding: Encoding, event: Event) -> Transition:
     symbols = Symbols(encoding, encoding.inputs_of(event.name))
     participants = [automaton for automaton in system.automata if event.name in automaton.alphabet]
     # An event in no alphabet belongs to no plant, so it cannot happen.
-    possible = encoding.possible_inputs(event.name) if participants else manager.false
+    plants = [automaton for automaton in participants if automaton.role is Role.PLANT]
+    possible = encoding.possible_inputs(event.name) if plants else manager.false
+    condition = _condition(encoding, symbols, system, event.name)
     hidden = list(encoding.input_names(event.name))
     functions: dict[str, Any] = {}
     out_of_range = manager.false
     for automaton in participants:
-        arcs, choice_names, valid_choice = _arcs(encoding, symbols, automaton, event.name)
-        hidden += choice_names
-        possible = possible & valid_choice & encoding.any_of(arc.taken for arc in arcs)
+        arcs, choice, is_taken = _arcs(encoding, symbols, automaton, event)
+        if choice is not None:
+            hidden += choice.names
+            possible = possible & encoding.valid(choice)
+        if automaton.role is Role.PLANT:
+            possible = possible & encoding.any_of(arc.taken for arc in arcs)
+        else:
+            condition = condition & is_taken
+            possible = possible & (~is_taken | encoding.any_of(arc.taken for arc in arcs))
+            # Where it has no edge it stays as it is.
+            arcs = [*arcs, _Arc(~is_taken, {}, manager.false)]
         out_of_range = out_of_range | encoding.any_of(arc.taken & arc.out_of_range for arc in arcs)
         functions |= _functions(encoding, arcs)
     return Transition(
         event=event,
         possible=possible,
         out_of_range=out_of_range,
-        condition=_condition(encoding, symbols, system, event.name),
+        condition=condition,
         functions=functions,
         hidden=tuple(hidden),
     )
@@ -78,39 +91,49 @@ def _condition(encoding: Encoding, symbols: Symbols, system: System, event: str)
 
 
 def _arcs(
-    encoding: Encoding, symbols: Symbols, automaton: Automaton, event: str
-) -> tuple[list[_Arc], tuple[str, ...], Any]:
-    """The edges of an automaton for an event; where several may be taken, a choice decides."""
+    encoding: Encoding, symbols: Symbols, automaton: Automaton, event: Event
+) -> tuple[list[_Arc], Bits | None, Any]:
+    """The edges of an automaton for an event; where several may be taken, a choice decides; and where one may be.
+
+    Raises:
+        NondeterministicEventError: The event is controllable, and in some state several may be taken.
+    """
     guards = [
         (edge, encoding.in_location(automaton.name, edge.source) & symbols.holds(edge.guard))
         for edge in automaton.edges
-        if edge.event == event
+        if edge.event == event.name
     ]
+    is_taken = encoding.any_of(guard for _, guard in guards)
     rivals = _rivals(encoding, guards)
     if not rivals:
-        return [_arc(encoding, symbols, automaton, edge, guard) for edge, guard in guards], (), encoding.manager.true
+        return [_arc(encoding, symbols, automaton, edge, guard) for edge, guard in guards], None, is_taken
+    if event.is_controllable:
+        location = guards[min(rivals)][0].source
+        raise NondeterministicEventError(
+            f"{automaton.name}: the controllable event {event.name} has several edges that can be taken in one state "
+            f"of {location}"
+        )
     choice = encoding.choice(max(index for index in rivals.values()) + 1)
     arcs = []
     for number, (edge, guard) in enumerate(guards):
         taken = guard & encoding.code(choice, rivals[number]) if number in rivals else guard
         arcs.append(_arc(encoding, symbols, automaton, edge, taken))
-    return arcs, choice.names, encoding.valid(choice)
+    return arcs, choice, is_taken
 
 
 def _rivals(encoding: Encoding, guards: Sequence[tuple[Edge, Any]]) -> dict[int, int]:
     """Edges of which several can be taken in one state, each with its number among those of its location."""
-    false = encoding.manager.false
-    by_location: dict[str, list[int]] = {}
+    by_location: defaultdict[str, list[int]] = defaultdict(list)
     for number, (edge, _) in enumerate(guards):
-        by_location.setdefault(edge.source, []).append(number)
+        by_location[edge.source].append(number)
     found: dict[int, int] = {}
     for numbers in by_location.values():
-        overlap = any(
-            guards[first][1] & guards[second][1] != false
-            for place, first in enumerate(numbers)
-            for second in numbers[place + 1 :]
-        )
-        if overlap:
+        earlier = overlap = encoding.manager.false
+        for number in numbers:
+            overlap = overlap | (earlier & guards[number][1])
+            earlier = earlier | guards[number][1]
+        # Codes that stand for no value must not count.
+        if overlap != encoding.manager.false and overlap & encoding.valid_states() != encoding.manager.false:
             found |= {number: place for place, number in enumerate(numbers)}
     return found
 

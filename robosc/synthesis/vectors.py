@@ -76,6 +76,33 @@ class Arithmetic:
             total = self._sum(total, tuple(bit & other for other in shifted), self._manager.false)
         return Vector(total, low, high)
 
+    def divide(self, a: Vector, b: Vector) -> tuple[Vector, Vector]:
+        """The quotient, towards zero, and the remainder, with the sign of `a`; both 0 where `b` is 0.
+
+        Restoring division, a bit of the quotient at a time.
+        """
+        zero = self.constant(0)
+        negative_a, negative_b = self.less(a, zero), self.less(b, zero)
+        dividend, divisor = self._magnitude(a, negative_a), self._magnitude(b, negative_b)
+        defined = ~self.equal(b, zero)
+        rest, quotient = zero, []
+        for bit in reversed(dividend.bits):
+            doubled = Vector((bit, *rest.bits), 0, 2 * rest.high + 1)
+            fits = ~self.less(doubled, divisor) & defined
+            kept = self.choose(fits, self.subtract(doubled, divisor), doubled)
+            # Less than the divisor, and no more than what was brought down of the dividend.
+            rest = self.within(kept, 0, max(0, min(doubled.high, divisor.high - 1)))
+            quotient.append(fits)
+        whole = self.unsigned(quotient[::-1], dividend.high)
+        differ = self._manager.ite(negative_a, ~negative_b, negative_b)
+        most = min(dividend.high, max(0, divisor.high - 1))
+        remainder = self.choose(negative_a, self.negate(rest), rest)
+        masked = tuple(bit & defined for bit in self._extend(remainder, width_for(-most, most)))
+        return self.choose(differ, self.negate(whole), whole), Vector(masked, -most, most)
+
+    def _magnitude(self, a: Vector, negative: Any) -> Vector:
+        return self.within(self.choose(negative, self.negate(a), a), 0, max(abs(a.low), abs(a.high)))
+
     def choose(self, condition: Any, a: Vector, b: Vector) -> Vector:
         """`a` where the condition is true, else `b`."""
         low, high = min(a.low, b.low), max(a.high, b.high)

@@ -21,7 +21,7 @@ class ExplicitSupervisor:
     """The maximally permissive supervisor of a system.
 
     Attributes:
-        is_empty: Whether no supervisor exists: the initial state is not good.
+        is_empty: Whether no supervisor exists: no initial state is good.
         explored: States that the plant can reach under the event conditions, without going on from bad ones.
         good: Those of them from which a supervisor can keep the system safe and nonblocking.
         allowed: State and controllable event, where the state is good and the event may happen.
@@ -50,9 +50,10 @@ class _Step:
 
 @dataclass(frozen=True, slots=True)
 class _Graph:
-    """Explored states and their steps; state 0 is the initial one."""
+    """Explored states, the initial ones first, and their steps."""
 
     states: tuple[State, ...]
+    initial_count: int
     steps: tuple[tuple[_Step, ...], ...]
     bad: frozenset[int]
     marked: frozenset[int]
@@ -86,7 +87,7 @@ def synthesize_explicit(
     good = _good_states(graph, should_stop)
     reachable = _controlled_states(graph, good)
     return ExplicitSupervisor(
-        is_empty=0 not in good,
+        is_empty=not _initial_states(graph, good),
         explored=frozenset(graph.states),
         good=frozenset(graph.states[number] for number in good),
         allowed=frozenset(
@@ -102,8 +103,8 @@ def synthesize_explicit(
 def _explore(system: System, limit: int, should_stop: Callable[[], bool]) -> _Graph | None:
     """The graph of the plant under the event conditions on controllable events; bad states are its ends."""
     semantics = Semantics(system)
-    numbers = {semantics.initial: 0}
-    states = [semantics.initial]
+    states = list(semantics.initial_states)
+    numbers = {state: number for number, state in enumerate(states)}
     steps: list[tuple[_Step, ...]] = []
     bad = set[int]()
     transitions = 0
@@ -131,7 +132,7 @@ def _explore(system: System, limit: int, should_stop: Callable[[], bool]) -> _Gr
         if len(states) > limit or transitions > TRANSITIONS_PER_STATE * limit:
             return None
     marked = frozenset(number for number, state in enumerate(states) if semantics.is_marked(state))
-    return _Graph(tuple(states), tuple(steps), frozenset(bad), marked)
+    return _Graph(tuple(states), len(semantics.initial_states), tuple(steps), frozenset(bad), marked)
 
 
 def _good_states(graph: _Graph, should_stop: Callable[[], bool]) -> set[int]:
@@ -177,11 +178,15 @@ def _controllable_states(graph: _Graph, good: set[int]) -> set[int]:
     }
 
 
+def _initial_states(graph: _Graph, good: set[int]) -> list[int]:
+    """The initial states that a supervisor can begin in."""
+    return [number for number in range(graph.initial_count) if number in good]
+
+
 def _controlled_states(graph: _Graph, good: set[int]) -> set[int]:
-    """What is reachable from the initial state under the supervisor that keeps to `good`."""
-    if 0 not in good:
-        return set()
-    found, frontier = {0}, [0]
+    """What is reachable from initial states of `good` under the supervisor that keeps to it."""
+    frontier = _initial_states(graph, good)
+    found = set(frontier)
     while frontier:
         for step in graph.steps[frontier.pop()]:
             if good.issuperset(step.targets):

@@ -20,7 +20,7 @@ def _counter(name: str, high: int, initial: int, up: list[str], down: list[str])
     level = read(f"{name}.n")
     edges = [edge(f"here -{event}-> here", n=operation(level, "+", 1)) for event in up]
     edges += [edge(f"here -{event}-> here", n=operation(level, "-", 1)) for event in down]
-    return automaton(name, edges, variables=[DiscreteVariable("n", IntegerType(0, high), initial)])
+    return automaton(name, edges, variables=[DiscreteVariable("n", IntegerType(0, high), (initial,))])
 
 
 def dining_philosophers(count: int) -> System:
@@ -134,7 +134,7 @@ def bounded_counters(high: int) -> System:
         edge("here -u_leak-> here", operation(level, ">", 0), n=operation(level, "-", 1)),
         edge("here -u_gush-> here", operation(level, "<", high // 2), n=operation(level, "+", 5)),
     ]
-    tank = automaton("tank", edges, variables=[DiscreteVariable("n", IntegerType(0, high), high // 3)])
+    tank = automaton("tank", edges, variables=[DiscreteVariable("n", IntegerType(0, high), (high // 3,))])
     return replace(system(tank), invariants=(operation(level, "!=", high - 1),))
 
 
@@ -155,7 +155,7 @@ def random_robot(components: int, seed: int = 1) -> System:
             edge(f"busy -{sensor}.response-> busy", seen=Unary("not", read(f"{name}.seen"))),
             edge(f"failed -{sensor}.response-> failed"),
         ]
-        variable = DiscreteVariable("seen", BooleanType(), False)
+        variable = DiscreteVariable("seen", BooleanType(), (False,))
         automata.append(automaton(name, edges, marked=["ready"], variables=[variable]))
         events += [
             Event(f"{sensor}.response", False),

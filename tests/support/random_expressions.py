@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 from robosc.automata import Automaton, DiscreteVariable, Edge, Event, InputVariable, System
 from robosc.expressions import (
     Binary,
+    BinaryOperator,
     BooleanType,
     Call,
     Conditional,
@@ -30,15 +31,15 @@ SYSTEM = System(
         Automaton(
             name="A",
             locations=("on", "off", "broken"),
-            initial="on",
+            initial=("on",),
             marked=frozenset({"on"}),
             alphabet=frozenset({"e"}),
             edges=(Edge("on", "e", "off"), Edge("off", "e", "broken")),
             variables=(
-                DiscreteVariable("flag", BooleanType(), False),
-                DiscreteVariable("small", SMALL, 0),
-                DiscreteVariable("wide", WIDE, 2147483640),
-                DiscreteVariable("colour", COLOUR, "red"),
+                DiscreteVariable("flag", BooleanType(), (False,)),
+                DiscreteVariable("small", SMALL, (0,)),
+                DiscreteVariable("wide", WIDE, (2147483640,)),
+                DiscreteVariable("colour", COLOUR, ("red",)),
             ),
         ),
     ),
@@ -64,8 +65,13 @@ def _numbers(children: st.SearchStrategy[Expression]) -> st.SearchStrategy[Expre
         st.builds(Unary, st.just("-"), children),
         st.builds(lambda name, child: Call(name, (child,)), st.sampled_from(["abs", "integer", "double"]), children),
         st.builds(_pair, st.sampled_from(["min", "max", "if"]), _kinds, children, children),
+        st.builds(_whole_pair, st.sampled_from(["div", "mod"]), children, children),
         st.builds(_clamped, children, children, children),
     )
+
+
+def _whole_pair(operator: BinaryOperator, left: Expression, right: Expression) -> Expression:
+    return Binary(operator, Call("integer", (left,)), Call("integer", (right,)))
 
 
 def _clamped(*parts: Expression) -> Expression:

@@ -10,6 +10,7 @@ times as long, and what fails is small already.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from random import Random
 
@@ -23,6 +24,7 @@ from robosc.automata import (
     Event,
     EventCondition,
     InputVariable,
+    Role,
     Semantics,
     System,
 )
@@ -42,6 +44,7 @@ from robosc.expressions import (
     StateTest,
     Type,
     Unary,
+    Value,
     VariableRead,
     domain,
     leaves,
@@ -56,6 +59,15 @@ WANTED_STATES = 5
 ATTEMPTS = 20
 
 
+@lru_cache(maxsize=4096)
+def wide_system(seed: int) -> System:
+    """As `random_system`, with all that automata offer beyond RoboSC.
+
+    Several ways to begin, requirement automata, conditions on initial and marked states, whole division.
+    """
+    return _chosen(Random(seed), is_wide=True)
+
+
 def systems() -> st.SearchStrategy[System]:
     """Systems of 2 to 4 automata with 1 to 4 locations and 0 to 2 variables each."""
     return st.integers(0, 2**32 - 1).map(random_system)
@@ -64,15 +76,18 @@ def systems() -> st.SearchStrategy[System]:
 @lru_cache(maxsize=4096)
 def random_system(seed: int) -> System:
     """The system of a seed: mostly the first of some candidates whose supervisor disables something."""
-    random = Random(seed)
-    candidate = _Builder(random).system()
-    if random.random() < 0.2:
+    return _chosen(Random(seed), is_wide=False)
+
+
+def _chosen(random: Random, *, is_wide: bool) -> System:
+    candidate = _Builder(random, is_wide=is_wide).system()
+    if random.random() < 0.1:
         return candidate
     for _ in range(ATTEMPTS):
         supervisor = synthesize_explicit(candidate, limit=MAXIMUM_STATES)
         if supervisor and len(supervisor.reachable) >= WANTED_STATES and disables_something(candidate, supervisor):
             break
-        candidate = _Builder(random).system()
+        candidate = _Builder(random, is_wide=is_wide).system()
     return candidate
 
 
@@ -108,8 +123,9 @@ def shares(systems: Sequence[System]) -> dict[str, float]:
 class _Builder:
     """Draws one system."""
 
-    def __init__(self, random: Random) -> None:
+    def __init__(self, random: Random, *, is_wide: bool) -> None:
         self.random = random
+        self.is_wide = is_wide
         names = ("A", "B", "C", "D")[: random.choice((2, 2, 3, 3, 4))]
         self.events = (*CONTROLLABLE[: random.choice((2, 3, 4))], *UNCONTROLLABLE[: random.choice((1, 2, 3))])
         self.locations = {name: tuple(f"l{n}" for n in range(random.choice((1, 2, 2, 3, 3, 4)))) for name in names}
@@ -141,24 +157,65 @@ class _Builder:
         automata = tuple(
             self._automaton(name, [event for event in self.events if name in owners[event]]) for name in self.locations
         )
+        if self.is_wide:
+            automata = (*automata, *self._requirements())
         read = {(edge.event, leaf) for automaton in automata for edge in automaton.edges for leaf in _paths(edge)}
         inputs = tuple(item for item in self.inputs if (item.event, item.path) in read)
         conditions = tuple(condition for event in self.events for condition in self._event_conditions(event))
         invariants = (Binary("or", self._condition(), self._condition()),) if self._chance(0.25) else ()
-        return System("random", self.events, automata, inputs, conditions, invariants)
+        if not self.is_wide:
+            return System("random", self.events, automata, inputs, conditions, invariants)
+        return System(
+            "random",
+            self.events,
+            automata,
+            inputs,
+            conditions,
+            invariants,
+            initial=self._condition() if self._chance(0.3) else TRUE,
+            marker=Binary("or", self._condition(), self._condition()) if self._chance(0.3) else TRUE,
+        )
+
+    def _requirements(self) -> list[Automaton]:
+        """No requirement automaton, or one that forbids some events, seldom an uncontrollable one."""
+        if self._chance(0.4):
+            return []
+        watched = self.random.sample(self.events, self.random.choice((1, 2, 3)))
+        self.locations["R"] = ("r0", "r1", "r2")[: self.random.choice((1, 2, 3))]
+        self.variables["R", "w"] = self._type()
+        made = self._automaton("R", watched)
+        has_edge = {(edge.source, edge.event) for edge in made.edges}
+        loops = [
+            Edge(location, event.name, location)
+            for event in watched
+            for location in made.locations
+            if not event.is_controllable and (location, event.name) not in has_edge and self._chance(0.9)
+        ]
+        return [replace(made, edges=(*made.edges, *loops), role=Role.REQUIREMENT)]
 
     def _automaton(self, name: str, alphabet: list[Event]) -> Automaton:
         locations = self.locations[name]
         edges = [edge for event in alphabet for where in locations for edge in self._edges(name, where, event)]
         variables = tuple(
-            DiscreteVariable(variable, type_, self.random.choice(tuple(domain(type_))))
+            DiscreteVariable(variable, type_, self._initial(tuple(domain(type_))))
             for (owner, variable), type_ in self.variables.items()
             if owner == name
         )
         marked = frozenset(location for location in locations if self._chance(0.5)) or frozenset(locations[:1])
         return Automaton(
-            name, locations, locations[0], marked, frozenset(e.name for e in alphabet), tuple(edges), variables
+            name,
+            locations,
+            self._initial(locations) if self.is_wide else locations[:1],
+            marked,
+            frozenset(e.name for e in alphabet),
+            tuple(edges),
+            variables,
         )
+
+    def _initial[T: Value](self, values: tuple[T, ...]) -> tuple[T, ...]:
+        """One value, and now and then more."""
+        count = self.random.randint(1, len(values)) if self.is_wide and self._chance(0.3) else 1
+        return tuple(self.random.sample(values, count))
 
     def _edges(self, name: str, source: str, event: Event) -> list[Edge]:
         """No edge, one, or two; the two of a controllable event have guards that exclude each other."""
@@ -221,7 +278,8 @@ class _Builder:
             return Call(self.random.choice(("min", "max")), (own, self.random.choice(others)))
         if shape == 3:
             return Call("integer", (Binary("/", own, self.random.choice(others)),))
-        return Binary(self.random.choice(("+", "-", "*")), own, self.random.choice(others))
+        operators: tuple[BinaryOperator, ...] = ("+", "-", "*", "div", "mod") if self.is_wide else ("+", "-", "*")
+        return Binary(self.random.choice(operators), own, self.random.choice(others))
 
     def _constant(self, type_: Type) -> Expression:
         value = self.random.choice(tuple(domain(type_)))
@@ -254,7 +312,10 @@ class _Builder:
             return Binary(self.random.choice(("=", "!=")), read, self._constant(type_))
         operators: tuple[BinaryOperator, ...] = ("=", "!=", "<", "<=", ">", ">=")
         # A quotient is unknown where the divisor is zero.
-        left = Binary("/", Constant(2), read) if self._chance(0.2) else read
+        if self.is_wide and self._chance(0.2):
+            left: Expression = Binary(self.random.choice(("div", "mod")), Constant(3), read)
+        else:
+            left = Binary("/", Constant(2), read) if self._chance(0.2) else read
         return Binary(self.random.choice(operators), left, self._constant(type_))
 
     def _event_conditions(self, event: Event) -> list[EventCondition]:
@@ -273,7 +334,7 @@ def _paths(edge: Edge) -> list[tuple[object, ...]]:
 def main() -> None:
     """Print the shares among systems of successive seeds."""
     drawn = shares([random_system(seed) for seed in range(1000)])
-    plain = shares([_Builder(Random(seed)).system() for seed in range(1000)])
+    plain = shares([_Builder(Random(seed), is_wide=False).system() for seed in range(1000)])
     print("drawn:", {name: f"{share:.0%}" for name, share in drawn.items()})
     print("without choosing:", {name: f"{share:.0%}" for name, share in plain.items()})
 

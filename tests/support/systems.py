@@ -4,7 +4,7 @@ An edge is written `idle -go-> busy`. Events whose names start with `u_` are unc
 """
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from robosc.automata import (
     Assignment,
@@ -34,7 +34,7 @@ def automaton(
     name: str,
     edges: Iterable[Edge | str],
     *,
-    initial: str | None = None,
+    initial: str | Sequence[str] | None = None,
     marked: Iterable[str] | None = None,
     variables: Iterable[DiscreteVariable] = (),
     blocks: Iterable[str] = (),
@@ -44,7 +44,7 @@ def automaton(
     Args:
         name: Its name.
         edges: Its edges, as values or as text.
-        initial: Its initial location.
+        initial: Its initial location, or several.
         marked: Its marked locations.
         variables: Its variables.
         blocks: Events of its alphabet that have no edge.
@@ -54,7 +54,7 @@ def automaton(
     return Automaton(
         name=name,
         locations=locations,
-        initial=locations[0] if initial is None else initial,
+        initial=(locations[0],) if initial is None else (initial,) if isinstance(initial, str) else tuple(initial),
         marked=frozenset(locations if marked is None else marked),
         alphabet=frozenset([*(arc.event for arc in arcs), *blocks]),
         edges=arcs,

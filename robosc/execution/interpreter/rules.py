@@ -117,7 +117,7 @@ def initial_state(model: Model) -> dict[Place, Value]:
     for communication in model.communications:
         plant = communication_plant(communication)
         if len(plant.locations) > 1:
-            state[plant.name, None] = plant.initial
+            (state[plant.name, None],) = plant.initial
     return state
 
 

@@ -55,7 +55,7 @@ class Writer:
     def _location(self, automaton: str) -> str:
         if automaton in self.layout.locations:
             return f"self.{self.layout.locations[automaton]}"
-        return repr(self.system.automaton(automaton).initial)  # A message's plant has one location.
+        return repr(self.system.automaton(automaton).initial[0])  # A message's plant has one location.
 
     @staticmethod
     def chosen(behaviour: Behaviour, event: str, state: str) -> Transition | None:

@@ -16,7 +16,7 @@ def _arcs(plant: Automaton) -> set[str]:
 
 def test_incoming_message() -> None:
     plant = communication_plant(incoming("move"))
-    assert (plant.name, plant.locations, plant.initial) == ("message move", ("idle",), "idle")
+    assert (plant.name, plant.locations, plant.initial) == ("message move", ("idle",), ("idle",))
     assert plant.marked == {"idle"}
     assert plant.alphabet == {"move.request"}
     assert _arcs(plant) == {"idle -move.request-> idle"}
@@ -34,7 +34,7 @@ def test_service() -> None:
     plant = communication_plant(service("calibrate"))
     assert plant.name == "service calibrate"
     assert plant.locations == ("idle", "waiting", "ready", "failed")
-    assert plant.initial == "idle"
+    assert plant.initial == ("idle",)
     assert plant.marked == {"idle"}
     assert plant.alphabet == {f"calibrate.{kind}" for kind in ("request", "response", "error", "reset")}
     assert _arcs(plant) == {
@@ -50,7 +50,7 @@ def test_action() -> None:
     plant = communication_plant(action("go"))
     assert plant.name == "action go"
     assert plant.locations == ("idle", "executing", "ready", "failed")
-    assert plant.initial == "idle"
+    assert plant.initial == ("idle",)
     assert plant.marked == {"idle"}
     assert plant.alphabet == {f"go.{kind}" for kind in ("request", "response", "feedback", "error", "cancel", "reset")}
     assert _arcs(plant) == {
@@ -73,7 +73,7 @@ def test_states_become_locations() -> None:
     plant = _plant(component("Base", "idle* driving halted*", ["idle: move.request -> driving"]))
     assert plant.name == "Base"
     assert plant.locations == ("idle", "driving", "halted")
-    assert plant.initial == "idle"
+    assert plant.initial == ("idle",)
     assert plant.marked == {"idle", "halted"}
     assert plant.alphabet == {"move.request"}
 
@@ -122,7 +122,7 @@ def test_only_synthesis_variables_and_their_updates_are_kept() -> None:
         [variable("n", IntegerType(0, 3), 2), variable("text", StringType(), "", is_synthesis=False)],
     )
     plant = _plant(made)
-    assert [(item.name, item.type, item.initial) for item in plant.variables] == [("n", IntegerType(0, 3), 2)]
+    assert [(item.name, item.type, item.initial) for item in plant.variables] == [("n", IntegerType(0, 3), (2,))]
     assert plant.edges == (edge("a -scan.response-> a", n=Received(("n",))),)
 
 

@@ -84,8 +84,8 @@ def test_updates_read_the_old_state_and_happen_together() -> None:
     other = edge("l -swap-> l", y=read("A.x"))
     subject = Semantics(
         system(
-            automaton("A", [swap], variables=[DiscreteVariable("x", DIGIT, 0)]),
-            automaton("B", [other], variables=[DiscreteVariable("y", DIGIT, 2)]),
+            automaton("A", [swap], variables=[DiscreteVariable("x", DIGIT, (0,))]),
+            automaton("B", [other], variables=[DiscreteVariable("y", DIGIT, (2,))]),
         )
     )
     assert subject.targets(("l", 0, "l", 2), "swap") == {("l", 2, "l", 0)}
@@ -94,13 +94,13 @@ def test_updates_read_the_old_state_and_happen_together() -> None:
 def test_an_unknown_update_leaves_its_variable() -> None:
     quotient = operation(read("A.x"), "/", 0)
     move = edge("l -go-> m", x=operation(quotient, "+", 1))
-    subject = Semantics(system(automaton("A", [move], variables=[DiscreteVariable("x", DIGIT, 2)])))
+    subject = Semantics(system(automaton("A", [move], variables=[DiscreteVariable("x", DIGIT, (2,))])))
     assert subject.targets(subject.initial, "go") == {("m", 2)}
 
 
 def test_leaving_the_range_disables_a_controllable_event() -> None:
     count = edge("l -count-> l", x=operation(read("A.x"), "+", 1))
-    subject = Semantics(system(automaton("A", [count], variables=[DiscreteVariable("x", DIGIT, 1)])))
+    subject = Semantics(system(automaton("A", [count], variables=[DiscreteVariable("x", DIGIT, (1,))])))
     assert subject.targets(("l", 1), "count") == {("l", 2)}
     assert not subject.enabled(("l", 2), "count")
     assert subject.targets(("l", 2), "count") == frozenset()
@@ -109,7 +109,7 @@ def test_leaving_the_range_disables_a_controllable_event() -> None:
 
 def test_leaving_the_range_with_an_uncontrollable_event_is_bad() -> None:
     count = edge("l -u_count-> l", x=operation(read("A.x"), "-", 1))
-    subject = Semantics(system(automaton("A", [count], variables=[DiscreteVariable("x", DIGIT, 1)])))
+    subject = Semantics(system(automaton("A", [count], variables=[DiscreteVariable("x", DIGIT, (1,))])))
     assert not subject.bad(("l", 1))
     assert subject.enabled(("l", 0), "u_count")
     assert subject.trouble(("l", 0)) == "u_count can take a variable out of its range"
@@ -119,7 +119,7 @@ def test_one_datum_out_of_range_among_many_is_enough_for_a_bad_state() -> None:
     take = edge("l -u_got-> l", x=received("n"))
     subject = Semantics(
         system(
-            automaton("A", [take], variables=[DiscreteVariable("x", DIGIT, 1)]),
+            automaton("A", [take], variables=[DiscreteVariable("x", DIGIT, (1,))]),
             inputs=[InputVariable("u_got", ("n",), IntegerType(1, 3))],
         )
     )
@@ -134,10 +134,10 @@ def test_received_data_is_shared_by_all_updates_of_a_step() -> None:
             automaton(
                 "A",
                 [edge("l -u_seen-> l", c=received("colour"), b=operation(received("colour"), "=", same))],
-                variables=[DiscreteVariable("c", COLOUR, "green"), DiscreteVariable("b", BooleanType(), True)],
+                variables=[DiscreteVariable("c", COLOUR, ("green",)), DiscreteVariable("b", BooleanType(), (True,))],
             ),
             automaton(
-                "B", [edge("l -u_seen-> l", d=received("colour"))], variables=[DiscreteVariable("d", COLOUR, "red")]
+                "B", [edge("l -u_seen-> l", d=received("colour"))], variables=[DiscreteVariable("d", COLOUR, ("red",))]
             ),
             inputs=[InputVariable("u_seen", ("colour",), COLOUR)],
         )
@@ -154,7 +154,7 @@ def test_different_data_of_one_event_vary_freely() -> None:
             automaton(
                 "A",
                 [edge("l -u_seen-> l", b=received("p"), c=received("q"))],
-                variables=[DiscreteVariable(name, BooleanType(), False) for name in ("b", "c")],
+                variables=[DiscreteVariable(name, BooleanType(), (False,)) for name in ("b", "c")],
             ),
             inputs=[InputVariable("u_seen", (name,), BooleanType()) for name in ("p", "q")],
         )
@@ -168,7 +168,7 @@ def test_data_of_another_event_is_other_data() -> None:
             automaton(
                 "A",
                 [edge("l -u_a-> l", x=received("n")), edge("l -u_b-> l", x=received("n"))],
-                variables=[DiscreteVariable("x", DIGIT, 0)],
+                variables=[DiscreteVariable("x", DIGIT, (0,))],
             ),
             inputs=[InputVariable("u_a", ("n",), IntegerType(1, 1)), InputVariable("u_b", ("n",), IntegerType(0, 1))],
         )
@@ -188,7 +188,7 @@ def test_several_edges_of_an_uncontrollable_event_all_count() -> None:
 
 
 def test_a_later_element_is_known_only_if_the_earlier_ones_are() -> None:
-    flags = [DiscreteVariable(name, COLOUR, "red") for name in ("a", "b")]
+    flags = [DiscreteVariable(name, COLOUR, ("red",)) for name in ("a", "b")]
     take = edge("l -u_scan-> l", a=received("scan", 1), b=received("scan", 4))
     subject = Semantics(
         system(
@@ -198,7 +198,7 @@ def test_a_later_element_is_known_only_if_the_earlier_ones_are() -> None:
     )
     # Unknown leaves green; only the later one alone cannot be known.
     assert subject.targets(("l", "green", "green"), "u_scan") == set(product(["l"], COLOUR.values, COLOUR.values))
-    boolean = [DiscreteVariable(name, IntegerType(0, 2), 0) for name in ("a", "b")]
+    boolean = [DiscreteVariable(name, IntegerType(0, 2), (0,)) for name in ("a", "b")]
     subject = Semantics(
         system(
             automaton("A", [take], variables=boolean),
@@ -366,6 +366,6 @@ def test_compiled_expressions_mean_the_same_as_evaluated_ones(drawn: System) -> 
 
 
 def test_the_state_helper_starts_from_the_initial_state() -> None:
-    made = system(automaton("A", ["l -go-> m"], variables=[DiscreteVariable("x", DIGIT, 1)]))
+    made = system(automaton("A", ["l -go-> m"], variables=[DiscreteVariable("x", DIGIT, (1,))]))
     assert state(made, A="m") == ("m", 1)
     assert state(made, A_x=2) == ("l", 2)

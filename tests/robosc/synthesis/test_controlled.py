@@ -238,7 +238,7 @@ def chain(length: int) -> System:
     up = edge("l -up-> l", operation(n, "<", length), n=operation(n, "+", 1))
     ends = [edge(f"l -{name}-> l", operation(n, "=", length)) for name in ("first", "second")]
     back = edge("l -zero-> l", n=operation(0, "*", n))
-    counter = DiscreteVariable("n", IntegerType(0, length), 0)
+    counter = DiscreteVariable("n", IntegerType(0, length), (0,))
     return system_of(automaton("C", [up, *ends, back], variables=[counter]))
 
 
@@ -346,7 +346,7 @@ def test_an_update_that_always_leaves_its_range_is_the_plants_own_fault(engine: 
     plant = automaton(
         "A",
         [replace(edge("l -go-> l"), updates=(Assignment("n", operation(5, "+", 5)),)), edge("l -stay-> l")],
-        variables=[DiscreteVariable("n", IntegerType(0, 3), 0)],
+        variables=[DiscreteVariable("n", IntegerType(0, 3), (0,))],
     )
     answers = synthesize(system_of(plant), engine=engine, questions=Questions(events=("go", "stay"))).answers
     assert answers.never == (("go", Cause.PLANT),)

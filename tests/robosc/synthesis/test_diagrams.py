@@ -50,12 +50,12 @@ def test_diagrams_are_reduced_and_independent_of_the_engine(condition: Expressio
 
 
 def counter(bits: int) -> Encoding:
-    variable = DiscreteVariable("x", IntegerType(0, 2**bits - 1), 0)
+    variable = DiscreteVariable("x", IntegerType(0, 2**bits - 1), (0,))
     return Encoding(system(automaton("A", ["l -e-> l"], variables=[variable])), make_manager("autoref"))
 
 
 def test_every_other_value(engine: str) -> None:
-    variable = DiscreteVariable("x", IntegerType(0, 9), 0)
+    variable = DiscreteVariable("x", IntegerType(0, 9), (0,))
     encoding = Encoding(system(automaton("A", ["l -e-> l"], variables=[variable])), make_manager(engine))
     odd = encoding.manager.var(encoding.subjects[Subject("A", "x")].names[-1])
     diagram = extract(encoding, odd)
@@ -65,7 +65,7 @@ def test_every_other_value(engine: str) -> None:
 
 def test_codes_beyond_the_last_value_leave_no_branch(engine: str) -> None:
     """5 of 8 codes are values: a predicate that differs only among the others is constant."""
-    variable = DiscreteVariable("x", IntegerType(0, 4), 0)
+    variable = DiscreteVariable("x", IntegerType(0, 4), (0,))
     encoding = Encoding(system(automaton("A", ["l -e-> l"], variables=[variable])), make_manager(engine))
     bits = encoding.subjects[Subject("A", "x")]
     assert extract(encoding, encoding.code(bits, 6)) == DecisionDiagram((), 0)

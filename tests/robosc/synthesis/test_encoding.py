@@ -21,7 +21,7 @@ def engine(request: pytest.FixtureRequest) -> str:
 
 def integer(count: int) -> System:
     """One variable with `count` values."""
-    variable = DiscreteVariable("x", IntegerType(3, 2 + count), 3)
+    variable = DiscreteVariable("x", IntegerType(3, 2 + count), (3,))
     return system(automaton("A", ["l -e-> l"], variables=[variable]))
 
 
@@ -39,7 +39,7 @@ def copies(count: int, high: int) -> System:
     """One event that carries a number for each of `count` automata, and one that needs the first three to ascend."""
     values = IntegerType(0, high)
     sensors = [
-        automaton(f"S{n}", [edge("l -u_seen-> l", v=received(n))], variables=[DiscreteVariable("v", values, 0)])
+        automaton(f"S{n}", [edge("l -u_seen-> l", v=received(n))], variables=[DiscreteVariable("v", values, (0,))])
         for n in range(count)
     ]
     monitor = automaton("M", ["off -on-> on", "on -off-> off"])
@@ -109,7 +109,7 @@ def test_arrays_have_no_gaps(engine: str, paths: list[tuple[PathStep, ...]], exp
 
 def test_hundreds_of_bits_are_no_depth(engine: str) -> None:
     """Only one of 600 automata moves, but every predicate on the state has a level for each."""
-    still = [Automaton(f"A{n}", ("here", "there"), "here", frozenset({"here"}), frozenset(), ()) for n in range(600)]
+    still = [Automaton(f"A{n}", ("here", "there"), ("here",), frozenset({"here"}), frozenset(), ()) for n in range(600)]
     moving = automaton("M", ["a -go-> b", "b -back-> a", "b -u_jump-> b"], marked=["a"])
     calm = system(moving)
     whole = System("Wide", calm.events, (*still, moving))

@@ -17,15 +17,18 @@ from robosc.errors import SynthesisCancelled
 from robosc.expressions import BooleanType, IntegerType, Received
 from robosc.expressions.tree import Binary, Constant, VariableRead
 from robosc.model.structure import Deployment
-from robosc.supervisor.conditions import state_predicates
+from robosc.supervisor.conditions import state_predicate, state_predicates
 from robosc.synthesis import Progress, SynthesisStatus, UnknownEngineError, synthesize
 from robosc.verification import synthesize_explicit
 from support.models import EXAMPLE_NAMES, example_model
-from support.random_systems import kind, random_system
+from support.random_systems import kind, random_system, wide_system
 
 ENGINES = ("cudd", "autoref")
-EXAMPLES = int(os.environ.get("ROBOSC_RANDOM_SYSTEMS", "300"))
+EXAMPLES = int(os.environ.get("ROBOSC_RANDOM_SYSTEMS", "2000"))
 """Random systems in one run; set the variable to try more."""
+
+PARTS = 4
+"""Parts that can run beside each other."""
 
 LIMIT = 50_000
 
@@ -60,20 +63,28 @@ def agree(system: System) -> str:
             allowed = plant and (event.name not in added or added[event.name](state))
             assert allowed == explicit.allows(state, event.name), (state, event)
             disables = disables or (plant and not allowed)
-    graph = controlled_graph(semantics, added, limit=LIMIT)
+    assert all(result.initial == first.initial for result in results)
+    begins = state_predicate(system, first.initial) if first.initial else (lambda state: True)
+    assert all(begins(state) == (state in explicit.good) for state in semantics.initial_states)
+    graph = controlled_graph(semantics, added, initial=begins, limit=LIMIT)
     assert graph is not None
     assert set(graph.states) == set(explicit.reachable)
     return "disables" if disables else "free"
 
 
 @pytest.mark.timeout(300 + EXAMPLES)
-def test_random_systems(record_property: Callable[[str, object], None]) -> None:
+@pytest.mark.parametrize("part", range(PARTS))
+@pytest.mark.parametrize("make", [random_system, wide_system])
+def test_random_systems(
+    make: Callable[[int], System], part: int, record_property: Callable[[str, object], None]
+) -> None:
     shares: Counter[str] = Counter()
 
-    @settings(max_examples=EXAMPLES, deadline=None, database=None, derandomize=True)
+    @settings(max_examples=EXAMPLES // (2 * PARTS), deadline=None, database=None, derandomize=True)
     @given(st.integers(0, 2**32 - 1))
     def compare(seed: int) -> None:
-        system = random_system(seed)
+        # The seeds are the same in every part, the systems are not.
+        system = make(seed * PARTS + part)
         found = agree(system)
         assert found == kind(system)
         shares[found] += 1
@@ -81,7 +92,7 @@ def test_random_systems(record_property: Callable[[str, object], None]) -> None:
     compare()
     total = sum(shares.values())
     told = ", ".join(f"{name} {shares[name] / total:.0%}" for name in sorted(shares))
-    record_property("random systems against the explicit twin", f"{total}, {told}")
+    record_property(f"{make.__name__}s, part {part}, against the explicit twin", f"{total}, {told}")
     assert shares["disables"] >= total / 2
     assert shares["empty"] >= total / 10
 
@@ -104,14 +115,14 @@ def counter(high: int, *, controllable: bool = True) -> System:
     automaton = Automaton(
         name="C",
         locations=("only",),
-        initial="only",
+        initial=("only",),
         marked=frozenset({"only"}),
         alphabet=frozenset({"up", "zero"}),
         edges=(
             Edge("only", "up", "only", updates=(Assignment("n", up),)),
             Edge("only", "zero", "only", updates=(Assignment("n", Constant(0)),)),
         ),
-        variables=(DiscreteVariable("n", IntegerType(0, high), 0),),
+        variables=(DiscreteVariable("n", IntegerType(0, high), (0,)),),
     )
     return System("Counter", (Event("up", controllable), Event("zero", True)), (automaton,))
 
@@ -136,7 +147,7 @@ def test_counts_are_exact_beyond_a_double(engine: str) -> None:
         Automaton(
             f"T{number}",
             ("off", "on"),
-            "off",
+            ("off",),
             frozenset({"off", "on"}),
             frozenset({f"t{number}"}),
             (Edge("off", f"t{number}", "on"), Edge("on", f"t{number}", "off")),
@@ -146,7 +157,7 @@ def test_counts_are_exact_beyond_a_double(engine: str) -> None:
     line = Automaton(
         "Three",
         ("a", "b", "c"),
-        "a",
+        ("a",),
         frozenset({"a", "b", "c"}),
         frozenset({"next"}),
         (Edge("a", "next", "b"), Edge("b", "next", "c")),
@@ -158,10 +169,10 @@ def test_counts_are_exact_beyond_a_double(engine: str) -> None:
 
 def nested(paths: tuple[tuple[str | int, ...], ...]) -> System:
     """One automaton that remembers the last received elements of arrays within arrays."""
-    variables = tuple(DiscreteVariable(f"v{n}", BooleanType(), False) for n in range(len(paths)))
+    variables = tuple(DiscreteVariable(f"v{n}", BooleanType(), (False,)) for n in range(len(paths)))
     updates = tuple(Assignment(f"v{n}", Received(path)) for n, path in enumerate(paths))
     automaton = Automaton(
-        "A", ("l",), "l", frozenset({"l"}), frozenset({"e"}), (Edge("l", "e", "l", updates=updates),), variables
+        "A", ("l",), ("l",), frozenset({"l"}), frozenset({"e"}), (Edge("l", "e", "l", updates=updates),), variables
     )
     inputs = tuple(InputVariable("e", path, BooleanType(), may_be_unknown=True) for path in paths)
     return System("Nested", (Event("e", False),), (automaton,), inputs)

@@ -80,7 +80,7 @@ def test_bad_states_of_random_systems(engine: str, seed: int) -> None:
 
 
 def one(*arcs: Any) -> System:
-    return system(automaton("A", arcs, variables=[DiscreteVariable("x", IntegerType(0, 3), 0)]))
+    return system(automaton("A", arcs, variables=[DiscreteVariable("x", IntegerType(0, 3), (0,))]))
 
 
 def functions_of(engine: str, source: System, event: str) -> tuple[Encoding, dict[str, Any]]:

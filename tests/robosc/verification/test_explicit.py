@@ -78,7 +78,7 @@ def test_a_condition_on_a_controllable_event_is_kept_but_is_no_reason_to_keep_aw
 def test_a_bounded_counter_counts_up_to_its_range() -> None:
     up = edge("l -up-> l", n=operation(read("A.n"), "+", 1))
     down = edge("l -down-> l", n=operation(read("A.n"), "-", 1))
-    made = system(automaton("A", [up, down], variables=[DiscreteVariable("n", IntegerType(-1, 1), 0)]))
+    made = system(automaton("A", [up, down], variables=[DiscreteVariable("n", IntegerType(-1, 1), (0,))]))
     assert _allowed(made) == {("l", -1): {"up"}, ("l", 0): {"up", "down"}, ("l", 1): {"down"}}
 
 
@@ -86,7 +86,7 @@ def test_a_counter_of_the_environment_must_not_run_over() -> None:
     got = edge("l -u_got-> l", operation(read("A.on"), "=", True), n=operation(read("A.n"), "+", 1), on=FALSE)
     ask = edge("l -ask-> l", on=operation(read("A.on"), "or", True))
     use = edge("l -use-> l", n=operation(read("A.n"), "-", 1))
-    variables = [DiscreteVariable("n", IntegerType(0, 1), 0), DiscreteVariable("on", BooleanType(), False)]
+    variables = [DiscreteVariable("n", IntegerType(0, 1), (0,)), DiscreteVariable("on", BooleanType(), (False,))]
     made = system(automaton("A", [got, ask, use], variables=variables))
     assert _allowed(made) == {
         ("l", 0, False): {"ask"},
@@ -97,7 +97,7 @@ def test_a_counter_of_the_environment_must_not_run_over() -> None:
 
 def test_received_data_that_could_be_bad_is_reason_enough() -> None:
     take = edge("asked -u_got-> idle", n=operation(read("A.n"), "+", received()))
-    variables = [DiscreteVariable("n", IntegerType(0, 3), 0)]
+    variables = [DiscreteVariable("n", IntegerType(0, 3), (0,))]
     made = system(
         automaton(
             "A", ["idle -ask-> asked", take, edge("idle -drop-> idle", n=operation(1, "+", 0))], variables=variables

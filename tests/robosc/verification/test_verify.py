@@ -119,7 +119,7 @@ def test_a_range_that_the_environment_can_leave_is_unsafe() -> None:
         automaton(
             "A",
             [edge("l -ask-> m"), edge("m -u_got-> l", n=operation(read("A.n"), "+", 1))],
-            variables=[DiscreteVariable("n", IntegerType(0, 2), 0)],
+            variables=[DiscreteVariable("n", IntegerType(0, 2), (0,))],
         )
     )
     found = verify(made, {})

@@ -1,15 +1,15 @@
-"""Types of resolved expressions, inferred from the model that they speak of.
+"""Types of resolved expressions, inferred from what they speak of.
 
-The checked model's own front end has typed the text that it was made from; this is for expressions that
-come from a file and may say anything.
+The language's front end has typed the text that its expressions were made from; this is for expressions that come
+from elsewhere (a file, another front end) and may say anything.
 """
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import assert_never
 
-from robosc.errors import InvalidSupervisorError
+from robosc.errors import InvalidExpressionError
 from robosc.expressions import (
     ARGUMENTS,
     MAXIMUM_INTEGER,
@@ -57,6 +57,8 @@ class Scope:
         enums: Every enum, by name.
         enum_values: Its values, for a quick look.
         objects: Types of each object's properties, by the object's name.
+        data: Types of received data that are known by their paths.
+        has_whole_division: Whether there are `div` and `mod`.
     """
 
     variables: Mapping[tuple[str, str], Type]
@@ -64,6 +66,8 @@ class Scope:
     enums: Mapping[str, EnumType]
     enum_values: Mapping[str, frozenset[str]]
     objects: Mapping[str, Mapping[str, Type]]
+    data: Mapping[tuple[PathStep, ...], Type] = field(default_factory=dict)
+    has_whole_division: bool = False
 
     def infer(self, expression: Expression, received: Type | None = None, elements: tuple[Type, ...] = ()) -> Type:
         """The type of an expression.
@@ -74,7 +78,7 @@ class Scope:
             elements: Types of what the quantifiers around it look at, the innermost first.
 
         Raises:
-            InvalidSupervisorError: It names something that is not there, or its types do not fit.
+            InvalidExpressionError: It names something that is not there, or its types do not fit.
         """
         match expression:
             case Constant(value=value):
@@ -83,19 +87,18 @@ class Scope:
                 return self._enum_value_type(enum, value)
             case VariableRead(component=component, variable=variable):
                 if (component, variable) not in self.variables:
-                    raise InvalidSupervisorError(f"there is no variable {component}.{variable}")
+                    raise InvalidExpressionError(f"there is no variable {component}.{variable}")
                 return self.variables[component, variable]
             case StateTest(component=component, state=state):
                 if (component, state) not in self.states:
-                    raise InvalidSupervisorError(f"there is no state {component}.{state}")
+                    raise InvalidExpressionError(f"there is no state {component}.{state}")
                 return _BOOLEAN
             case Received():
                 return self.received_type(expression, received)
             case Unary(operator=operator, operand=operand):
                 return _unary_type(operator, self.infer(operand, received, elements))
-            case Binary(operator=operator, left=left, right=right):
-                types = self.infer(left, received, elements), self.infer(right, received, elements)
-                return _binary_type(operator, *types)
+            case Binary():
+                return self._chain_type(expression, received, elements)
             case Conditional(condition=condition, then=then, otherwise=otherwise):
                 parts = (self.infer(part, received, elements) for part in (condition, then, otherwise))
                 return _conditional_type(*parts)
@@ -103,7 +106,7 @@ class Scope:
                 return _call_type(function, [self.infer(item, received, elements) for item in arguments])
             case Element(level=level, path=path):
                 if level >= len(elements):
-                    raise InvalidSupervisorError("an element is read outside the quantifier that looks at it")
+                    raise InvalidExpressionError("an element is read outside the quantifier that looks at it")
                 return self._part_type(elements[level], path)
             case Reduction(function=function, part=part):
                 element = self._element_type(part, received, elements)
@@ -113,26 +116,42 @@ class Scope:
             case Quantifier(part=part, condition=condition):
                 element = self._element_type(part, received, elements)
                 if not isinstance(self.infer(condition, received, (element, *elements)), BooleanType):
-                    raise InvalidSupervisorError("a quantifier needs a condition")
+                    raise InvalidExpressionError("a quantifier needs a condition")
                 return _BOOLEAN
         assert_never(expression)
 
+    def _chain_type(self, expression: Binary, received: Type | None, elements: tuple[Type, ...]) -> Type:
+        """The type of a binary expression: `a and b and ...` is as deep as it is long, leaning left, so a loop."""
+        spine: list[Binary] = []
+        node: Expression = expression
+        while isinstance(node, Binary):
+            spine.append(node)
+            node = node.left
+        found = self.infer(node, received, elements)
+        for item in reversed(spine):
+            if item.operator in ("div", "mod") and not self.has_whole_division:
+                raise InvalidExpressionError(f"there is no operator '{item.operator}'")
+            found = _binary_type(item.operator, found, self.infer(item.right, received, elements))
+        return found
+
     def _element_type(self, part: ArrayPart, received: Type | None, elements: tuple[Type, ...]) -> Type:
         if (part.low is None) is not (part.high is None):
-            raise InvalidSupervisorError("a slice has one end only")
+            raise InvalidExpressionError("a slice has one end only")
         type_ = self.infer(part.array, received, elements)
         if not isinstance(type_, ArrayType):
-            raise InvalidSupervisorError(f"{type_text(type_)} has no elements")
+            raise InvalidExpressionError(f"{type_text(type_)} has no elements")
         return type_.element
 
     def received_type(self, read: Received, received: Type | None) -> Type:
         """The type of the part of `received` that a path reads.
 
         Raises:
-            InvalidSupervisorError: Nothing is received here, or it has no such part.
+            InvalidExpressionError: Nothing is received here, or it has no such part.
         """
+        if read.path in self.data:
+            return self.data[read.path]
         if received is None:
-            raise InvalidSupervisorError("received data is read where none is")
+            raise InvalidExpressionError("received data is read where none is")
         return self._part_type(received, read.path)
 
     def _part_type(self, type_: Type, path: tuple[PathStep, ...]) -> Type:
@@ -143,14 +162,14 @@ class Scope:
                 case ArrayType(element=element), int():
                     type_ = element
                 case _:
-                    raise InvalidSupervisorError(f"{type_text(type_)} has no part {step!r}")
+                    raise InvalidExpressionError(f"{type_text(type_)} has no part {step!r}")
         return type_
 
     def _enum_value_type(self, enum: str, value: str) -> EnumType:
         if enum not in self.enums:
-            raise InvalidSupervisorError(f"there is no enum {enum}")
+            raise InvalidExpressionError(f"there is no enum {enum}")
         if value not in self.enum_values[enum]:
-            raise InvalidSupervisorError(f"the enum {enum} has no value {value}")
+            raise InvalidExpressionError(f"the enum {enum} has no value {value}")
         return self.enums[enum]
 
 
@@ -198,7 +217,7 @@ def _constant_type(value: Value) -> Type:
         return _BOOLEAN
     if isinstance(value, int):
         if not MINIMUM_INTEGER <= value <= MAXIMUM_INTEGER:
-            raise InvalidSupervisorError("an integer is beyond 32 bits")
+            raise InvalidExpressionError("an integer is beyond 32 bits")
         return _INTEGER
     return _DOUBLE if isinstance(value, float) else StringType()
 
@@ -226,6 +245,8 @@ def _binary_type(operator: str, left: Type, right: Type) -> Type:
         raise _unfit(operator, left, right)
     if operator in _ORDER:
         return _BOOLEAN
+    if operator in ("div", "mod") and (isinstance(left, DoubleType) or isinstance(right, DoubleType)):
+        raise _unfit(operator, left, right)
     is_double = operator == "/" or isinstance(left, DoubleType) or isinstance(right, DoubleType)
     return _DOUBLE if is_double else _INTEGER
 
@@ -248,5 +269,5 @@ def _call_type(function: str, arguments: list[Type]) -> Type:
     return _DOUBLE if any(isinstance(type_, DoubleType) for type_ in arguments) else _INTEGER
 
 
-def _unfit(operator: str, *operands: Type) -> InvalidSupervisorError:
-    return InvalidSupervisorError(f"'{operator}' does not take {' and '.join(map(type_text, operands))}")
+def _unfit(operator: str, *operands: Type) -> InvalidExpressionError:
+    return InvalidExpressionError(f"'{operator}' does not take {' and '.join(map(type_text, operands))}")

@@ -1,0 +1,149 @@
+"""Whether the parts of a system fit together: what a front end may ask before it hands one on.
+
+What only values can tell, such as two edges of a controllable event that can be taken at once, is found where the
+values are: by `Semantics` and by synthesis.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+from robosc.automata.structure import Automaton, Edge, System
+from robosc.errors import InvalidExpressionError, InvalidSystemError
+from robosc.expressions import BooleanType, EnumType, Expression, PathStep, is_finite, type_text
+from robosc.expressions.inference import Scope, has_type, is_assignable
+
+
+def check_system(system: System) -> None:
+    """Do nothing if every part of a system fits every other.
+
+    Raises:
+        InvalidSystemError: Some do not; one line for each.
+    """
+    problems = list(dict.fromkeys(_Checker(system).problems()))
+    if problems:
+        raise InvalidSystemError("\n".join(f"{system.name}: {problem}" for problem in problems))
+
+
+@dataclass(frozen=True, slots=True)
+class _Checker:
+    system: System
+
+    def problems(self) -> Iterator[str]:
+        """Everything that does not fit, in the system's order."""
+        system = self.system
+        yield from _doubles("event", (event.name for event in system.events))
+        yield from _doubles("automaton", (automaton.name for automaton in system.automata))
+        events = {event.name for event in system.events}
+        for automaton in system.automata:
+            for problem in (*_shape(automaton, events), *_variables(automaton)):
+                yield f"{automaton.name}: {problem}"
+        yield from self._inputs(events)
+        scope = self._scope()
+        for automaton in system.automata:
+            for edge in automaton.edges:
+                for problem in self._edge(scope, automaton, edge):
+                    yield f"{automaton.name}: {edge.source} -{edge.event}-> {edge.target}: {problem}"
+        for condition in system.conditions:
+            if condition.event not in events:
+                yield f"a condition is on the event {condition.event}, which there is not"
+            yield from _condition(scope, condition.condition, f"a condition on {condition.event}")
+        for invariant in system.invariants:
+            yield from _condition(scope, invariant, "an invariant")
+        yield from _condition(scope, system.initial, "the initial condition")
+        yield from _condition(scope, system.marker, "the marker condition")
+
+    def _inputs(self, events: set[str]) -> Iterator[str]:
+        yield from _doubles("received datum", (f"{item.event} {_path(item.path)}" for item in self.system.inputs))
+        for item in self.system.inputs:
+            if item.event not in events:
+                yield f"data is received with the event {item.event}, which there is not"
+            if not is_finite(item.type):
+                yield f"{item.event} {_path(item.path)}: {type_text(item.type)} has infinitely many values"
+
+    def _scope(self) -> Scope:
+        variables = {
+            (automaton.name, variable.name): variable.type
+            for automaton in self.system.automata
+            for variable in automaton.variables
+        }
+        types = (*variables.values(), *(item.type for item in self.system.inputs))
+        enums = {type_.name: type_ for type_ in types if isinstance(type_, EnumType)}
+        return Scope(
+            variables=variables,
+            states=frozenset((item.name, location) for item in self.system.automata for location in item.locations),
+            enums=enums,
+            enum_values={name: frozenset(type_.values) for name, type_ in enums.items()},
+            objects={},
+            has_whole_division=True,
+        )
+
+    def _edge(self, scope: Scope, automaton: Automaton, edge: Edge) -> Iterator[str]:
+        for location in dict.fromkeys((edge.source, edge.target)):
+            if location not in automaton.locations:
+                yield f"there is no location {location}"
+        if edge.event not in automaton.alphabet:
+            yield f"{edge.event} is not in the alphabet"
+        yield from _condition(scope, edge.guard, "the guard")
+        yield from _doubles("assignment to", (update.variable for update in edge.updates))
+        own = {variable.name: variable.type for variable in automaton.variables}
+        received = {item.path: item.type for item in self.system.inputs if item.event == edge.event}
+        receiving = replace(scope, data=received)
+        for update in edge.updates:
+            if update.variable not in own:
+                yield f"there is no variable {update.variable} to assign to"
+                continue
+            try:
+                found = receiving.infer(update.expression)
+            except InvalidExpressionError as error:
+                yield f"{update.variable}: {error}"
+                continue
+            if not is_assignable(found, own[update.variable]):
+                yield f"{update.variable}: {type_text(found)} is no {type_text(own[update.variable])}"
+
+
+def _shape(automaton: Automaton, events: set[str]) -> Iterator[str]:
+    """What is wrong with locations and alphabet."""
+    yield from _doubles("location", automaton.locations)
+    locations = set(automaton.locations)
+    if not automaton.initial:
+        yield "it has no location to begin in"
+    for what, names in (("initial", automaton.initial), ("marked", sorted(automaton.marked))):
+        for name in names:
+            if name not in locations:
+                yield f"there is no location {name}, which is to be {what}"
+    for event in sorted(automaton.alphabet - events):
+        yield f"there is no event {event}, which is in the alphabet"
+
+
+def _variables(automaton: Automaton) -> Iterator[str]:
+    yield from _doubles("variable", (variable.name for variable in automaton.variables))
+    for variable in automaton.variables:
+        if not is_finite(variable.type):
+            yield f"{variable.name}: {type_text(variable.type)} has infinitely many values"
+        if not variable.initial:
+            yield f"{variable.name}: it has no value to begin with"
+        for value in variable.initial:
+            if not has_type(value, variable.type):
+                yield f"{variable.name}: {value!r} is no {type_text(variable.type)}"
+
+
+def _condition(scope: Scope, condition: Expression, what: str) -> Iterator[str]:
+    try:
+        found = scope.infer(condition)
+    except InvalidExpressionError as error:
+        yield f"{what}: {error}"
+        return
+    if not isinstance(found, BooleanType):
+        yield f"{what}: {type_text(found)} is no condition"
+
+
+def _doubles(what: str, names: Iterable[str]) -> Iterator[str]:
+    seen = set[str]()
+    for name in names:
+        if name in seen:
+            yield f"there are two of {what} {name}"
+        seen.add(name)
+
+
+def _path(path: tuple[PathStep, ...]) -> str:
+    return ".".join(("value", *map(str, path)))

@@ -1,0 +1,46 @@
+"""Input variables: what the environment sets as it likes, at any time, and automata may read."""
+
+from dataclasses import dataclass
+
+from robosc.automata.structure import Assignment, Automaton, DiscreteVariable, Edge, Event, InputVariable
+from robosc.expressions import Expression, Received, Type, VariableRead, domain
+
+_LOCATION = "here"
+
+
+@dataclass(frozen=True, slots=True)
+class EnvironmentVariable:
+    """An input variable, as parts of a system: one uncontrollable event gives it any value, at any time.
+
+    Attributes:
+        automaton: It holds the value, is marked whatever that is, and may begin with any.
+        event: The environment changes the value.
+        received: The new value.
+        read: What reads it in guards, updates and conditions.
+    """
+
+    automaton: Automaton
+    event: Event
+    received: InputVariable
+    read: Expression
+
+
+def environment_variable(name: str, type_: Type) -> EnvironmentVariable:
+    """An input variable.
+
+    Args:
+        name: Name of its automaton, and with `.changes` of its event.
+        type_: A finite type.
+    """
+    event = Event(f"{name}.changes", is_controllable=False)
+    edge = Edge(_LOCATION, event.name, _LOCATION, updates=(Assignment("value", Received()),))
+    automaton = Automaton(
+        name=name,
+        locations=(_LOCATION,),
+        initial=(_LOCATION,),
+        marked=frozenset({_LOCATION}),
+        alphabet=frozenset({event.name}),
+        edges=(edge,),
+        variables=(DiscreteVariable("value", type_, tuple(domain(type_))),),
+    )
+    return EnvironmentVariable(automaton, event, InputVariable(event.name, (), type_), VariableRead(name, "value"))

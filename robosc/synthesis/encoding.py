@@ -1,7 +1,8 @@
 """Locations, variables and received data as Boolean variables, and expressions as predicates over them.
 
 A value of a finite domain is encoded by its index, most significant bit first. Each bit has a variable for
-the current state and, next to it in the order, one for the next state, which only forward images use. Bits of
+the current state and, next to it in the order, one for the next state if forward images need it: if some event writes
+it otherwise than as one constant. Bits of
 received data stand among those of the variable that is first in the order of those they are written to: were they
 apart, a relation that copies several data would have to remember all of them at once.
 """
@@ -15,6 +16,7 @@ from robosc.automata.state import Subject, initial_values, subject_domain, subje
 from robosc.automata.structure import InputVariable, System
 from robosc.expressions import IntegerType, PathStep, Type, Value, domain
 from robosc.recursion import allow_depth
+from robosc.synthesis.changes import computed_subjects
 from robosc.synthesis.engines import Manager
 from robosc.synthesis.order import input_targets, subject_order
 
@@ -88,8 +90,9 @@ class Encoding:
         for item, bits in self.inputs:
             written = targets.get((item.event, item.path), set())
             beside[next((subject for subject in self.subjects if subject in written), None)].append(bits)
+        computed = computed_subjects(self.system)
         for subject, bits in self.subjects.items():
-            self.manager.declare(*_interleaved(bits, beside[subject]))
+            self.manager.declare(*_interleaved(bits, beside[subject], has_next=subject in computed))
         for bits in beside[None]:
             self.manager.declare(*_names(bits))
 
@@ -195,7 +198,7 @@ def _names(bits: Bits) -> tuple[str, ...]:
     return bits.names if bits.known is None else (bits.known, *bits.names)
 
 
-def _interleaved(place: Bits, inputs: Sequence[Bits]) -> list[str]:
+def _interleaved(place: Bits, inputs: Sequence[Bits], *, has_next: bool) -> list[str]:
     """Names of a place of the state and of received data; bits of equal weight stand together."""
     ranked = [
         (len(bits.names) - rank, name, bits is place)
@@ -204,7 +207,9 @@ def _interleaved(place: Bits, inputs: Sequence[Bits]) -> list[str]:
     ]
     # Stable: within one weight the state comes first.
     ranked.sort(key=lambda item: -item[0])
-    return [each for _, name, is_state in ranked for each in ((name, next_name(name)) if is_state else (name,))]
+    return [
+        each for _, name, is_state in ranked for each in ((name, next_name(name)) if is_state and has_next else (name,))
+    ]
 
 
 def _implied(later: InputVariable, earlier: InputVariable) -> bool:

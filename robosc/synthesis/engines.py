@@ -13,6 +13,10 @@ from robosc.errors import RoboscError
 
 ENTRY_POINTS = "robosc.bdd_engines"
 
+_CACHE_SLOTS = 2**14
+"""Results of operations that CUDD remembers at the beginning; it takes more as they pay. Its own choice of 2^18 takes
+longer to set up than a supervisor of a dozen states."""
+
 
 class Manager(Protocol):
     """A store of shared nodes over ordered Boolean variables.
@@ -48,7 +52,7 @@ _FACTORIES: dict[str, Callable[[], Manager]] = {}
 
 
 def _make_cudd() -> Manager:
-    manager = importlib.import_module("dd.cudd").BDD()
+    manager = importlib.import_module("dd.cudd").BDD(initial_cache_size=_CACHE_SLOTS)
     # The order is chosen from the model; reordering would make results depend on sizes met on the way.
     manager.configure(reordering=False)
     return manager  # type: ignore[no-any-return]  # dd has no types

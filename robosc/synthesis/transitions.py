@@ -14,6 +14,7 @@ from typing import Any, Self
 from robosc.automata.state import Subject
 from robosc.automata.structure import Automaton, Edge, Event, Role, System
 from robosc.errors import NondeterministicEventError
+from robosc.synthesis.changes import Leads, leads_of
 from robosc.synthesis.encoding import Bits, Encoding, next_name
 from robosc.synthesis.nodes import support
 from robosc.synthesis.symbolic import Symbols
@@ -104,9 +105,10 @@ def _arcs(
         if edge.event == event.name
     ]
     is_taken = encoding.any_of(guard for _, guard in guards)
+    leads = leads_of([edge for edge, _ in guards])
     rivals = _rivals(encoding, guards)
     if not rivals:
-        return [_arc(encoding, symbols, automaton, edge, guard) for edge, guard in guards], None, is_taken
+        return [_arc(encoding, symbols, automaton, edge, guard, leads) for edge, guard in guards], None, is_taken
     if event.is_controllable:
         location = guards[min(rivals)][0].source
         raise NondeterministicEventError(
@@ -117,7 +119,7 @@ def _arcs(
     arcs = []
     for number, (edge, guard) in enumerate(guards):
         taken = guard & encoding.code(choice, rivals[number]) if number in rivals else guard
-        arcs.append(_arc(encoding, symbols, automaton, edge, taken))
+        arcs.append(_arc(encoding, symbols, automaton, edge, taken, leads))
     return arcs, choice, is_taken
 
 
@@ -138,11 +140,12 @@ def _rivals(encoding: Encoding, guards: Sequence[tuple[Edge, Any]]) -> dict[int,
     return found
 
 
-def _arc(encoding: Encoding, symbols: Symbols, automaton: Automaton, edge: Edge, taken: Any) -> _Arc:
+def _arc(encoding: Encoding, symbols: Symbols, automaton: Automaton, edge: Edge, taken: Any, leads: Leads) -> _Arc:
     manager = encoding.manager
     written: dict[str, Any] = {}
     out_of_range = manager.false
-    if edge.target != edge.source:
+    # Where all edges lead to one place each of them writes it, so that what is written is a constant.
+    if leads is Leads.TO_ONE_PLACE or (leads is Leads.AWAY and edge.target != edge.source):
         location = encoding.subjects[Subject(automaton.name)]
         index = location.domain.index(edge.target)
         for place, name in enumerate(reversed(location.names)):
@@ -221,6 +224,9 @@ class Steps:
         """The current-state variables that it reads or changes."""
         self._in_range = transition.possible & ~transition.out_of_range
         self._changed = tuple(transition.functions)
+        self._arrival = encoding.all_of(
+            self._manager.var(name) if value else ~self._manager.var(name) for name, value in self._constants.items()
+        )
         self._relation: Any = None
 
     @property
@@ -249,12 +255,15 @@ class Steps:
         manager = self._manager
         if self._relation is None:
             relation = self._in_range
-            for name, function in self._transition.functions.items():
+            for name, function in self._composed.items():
                 following = manager.var(next_name(name))
                 relation = relation & manager.ite(following, function, ~function)
             self._relation = self._without_hidden(relation)
         moved = self._exist(self._changed, states & self._relation)
-        return manager.let({next_name(name): name for name in self._changed}, moved) if self._changed else moved
+        if self._composed:
+            moved = manager.let({next_name(name): name for name in self._composed}, moved)
+        # What is written as a constant needs no next-state variable: it is forgotten, and then known.
+        return moved & self._arrival
 
     def _after(self, predicate: Any) -> Any:
         """Where a predicate will be true after the event: substitution of the next-state functions."""

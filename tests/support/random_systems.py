@@ -56,7 +56,7 @@ CONTROLLABLE = tuple(Event(name, True) for name in ("go", "stop", "turn", "lift"
 UNCONTROLLABLE = tuple(Event(name, False) for name in ("seen", "lost", "done"))
 MAXIMUM_STATES = 20_000
 WANTED_STATES = 5
-ATTEMPTS = 20
+ATTEMPTS = 30
 
 
 @lru_cache(maxsize=4096)

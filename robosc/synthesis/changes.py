@@ -1,0 +1,51 @@
+"""What edges write as constants, and what they do not: only the latter needs variables of the next state."""
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from enum import Enum, auto
+
+from robosc.automata.state import Subject
+from robosc.automata.structure import Automaton, Edge, Role, System
+from robosc.expressions import Constant, EnumValue
+
+
+class Leads(Enum):
+    """Where the edges of an automaton for one event lead."""
+
+    NOWHERE = auto()
+    """None of them leaves its location."""
+    TO_ONE_PLACE = auto()
+    """All of them lead to one location, some of them from elsewhere."""
+    AWAY = auto()
+    """To several locations."""
+
+
+def leads_of(edges: Sequence[Edge]) -> Leads:
+    """Where the edges of an automaton for one event lead."""
+    if all(edge.source == edge.target for edge in edges):
+        return Leads.NOWHERE
+    return Leads.TO_ONE_PLACE if len({edge.target for edge in edges}) == 1 else Leads.AWAY
+
+
+def computed_subjects(system: System) -> frozenset[Subject]:
+    """The places of a state that some event changes otherwise than to one constant."""
+    return frozenset(subject for automaton in system.automata for subject in _computed(automaton))
+
+
+def _computed(automaton: Automaton) -> Iterable[Subject]:
+    by_event = defaultdict[str, list[Edge]](list)
+    for edge in automaton.edges:
+        by_event[edge.event].append(edge)
+    for edges in by_event.values():
+        # A requirement that has no edge for an event stays as it is, so nothing that it writes is one constant.
+        stays = automaton.role is Role.REQUIREMENT
+        leads = leads_of(edges)
+        if leads is Leads.AWAY or (stays and leads is Leads.TO_ONE_PLACE):
+            yield Subject(automaton.name)
+        for variable in dict.fromkeys(update.variable for edge in edges for update in edge.updates):
+            written = [
+                next((update.expression for update in edge.updates if update.variable == variable), None)
+                for edge in edges
+            ]
+            if stays or not isinstance(written[0], Constant | EnumValue) or any(item != written[0] for item in written):
+                yield Subject(automaton.name, variable)

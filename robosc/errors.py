@@ -153,6 +153,10 @@ class NondeterministicEventError(InvalidSystemError):
     """A controllable event that one automaton could take by several edges in one state."""
 
 
+class NodeLimitError(RoboscError):
+    """Decision diagrams grew beyond the number of nodes that they may have."""
+
+
 class SynthesisCancelled(RoboscError):
     """The caller asked long work to stop."""
 

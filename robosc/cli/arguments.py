@@ -2,10 +2,14 @@
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from robosc.cli.output import UsageError
 from robosc.model.structure import Deployment
 from robosc.source import Bundle
+
+if TYPE_CHECKING:
+    from robosc.synthesis import EngineOptions
 
 
 def add_model_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,13 +48,42 @@ def add_deployment_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def add_engine_argument(parser: argparse.ArgumentParser) -> None:
-    """The engine for decision diagrams."""
+    """The engine for decision diagrams, and how it works."""
     parser.add_argument(
         "--engine",
         default="auto",
         metavar="NAME",
         help="engine for decision diagrams: cudd, autoref (plain Python), or auto: the fastest installed (the default)",
     )
+    parser.add_argument(
+        "--reorder",
+        action="store_true",
+        help="let the engine change the order of its variables while it works: slower, but an unlucky order may need "
+        "it; the result is the same",
+    )
+    parser.add_argument(
+        "--max-nodes",
+        type=_positive,
+        metavar="N",
+        help="give up when decision diagrams grow beyond N nodes (default: no limit)",
+    )
+
+
+def _positive(text: str) -> int:
+    try:
+        number = int(text)
+    except ValueError:
+        number = 0
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number from 1 on")
+    return number
+
+
+def engine_options(arguments: argparse.Namespace) -> "EngineOptions":
+    """What `add_engine_argument` has read."""
+    from robosc.synthesis import EngineOptions
+
+    return EngineOptions(arguments.engine or "auto", arguments.reorder, arguments.max_nodes)
 
 
 def read_bundle(arguments: argparse.Namespace) -> Bundle:

@@ -45,8 +45,11 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 def run(arguments: argparse.Namespace) -> int:
     """Check the model; 0 without errors (and, where it was asked for, with a supervisor), else 1."""
-    if not arguments.synthesize and (arguments.deployment or arguments.engine):
-        raise UsageError("--deployment and --engine say how to synthesize: they need --synthesize")
+    engine = arguments.engine or arguments.reorder or arguments.max_nodes
+    if not arguments.synthesize and (arguments.deployment or engine):
+        raise UsageError(
+            "--deployment, --engine, --reorder and --max-nodes say how to synthesize: they need --synthesize"
+        )
     try:
         bundle = read_bundle(arguments)
     except LanguageError as error:
@@ -83,7 +86,6 @@ def _synthesized(arguments: argparse.Namespace, bundle: Bundle) -> _Synthesized:
     from robosc.supervisor import MadeStatus
 
     arguments.deployment = arguments.deployment or str(Deployment.CONTROLLER)
-    arguments.engine = arguments.engine or "auto"
     try:
         made = synth.make(arguments, bundle)
     except UnsupportedModelError as error:

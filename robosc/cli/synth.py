@@ -5,7 +5,13 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robosc.cli.arguments import add_deployment_argument, add_engine_argument, add_model_arguments, read_bundle
+from robosc.cli.arguments import (
+    add_deployment_argument,
+    add_engine_argument,
+    add_model_arguments,
+    engine_options,
+    read_bundle,
+)
 from robosc.cli.output import ExitCode, ProgressLine, diagnostics_json, print_diagnostics, print_json, write_bytes
 from robosc.model.structure import Deployment
 from robosc.source import Bundle
@@ -48,7 +54,7 @@ def make(arguments: argparse.Namespace, bundle: Bundle) -> "Made":
         return make_supervisor(
             bundle,
             deployment=Deployment(arguments.deployment),
-            engine=arguments.engine,
+            engine=engine_options(arguments),
             on_progress=lambda step: progress.show(f"{step.stage}: {step.message}"),
         )
     finally:

@@ -18,8 +18,16 @@ from robosc.model.structure import Deployment
 from robosc.source import Bundle
 from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.structure import Certificate, CheckResult, Supervisor
+from robosc.synthesis import (
+    EngineOptions,
+    Statistics,
+    SynthesisResult,
+    SynthesisStatus,
+    findings,
+    questions_about,
+    synthesize,
+)
 from robosc.synthesis import Progress as SynthesisProgress
-from robosc.synthesis import Statistics, SynthesisResult, SynthesisStatus, findings, questions_about, synthesize
 from robosc.verification import verify
 
 VERIFICATION_LIMIT = 50_000
@@ -75,7 +83,7 @@ def make_supervisor(
     bundle: Bundle,
     *,
     deployment: Deployment = Deployment.CONTROLLER,
-    engine: str = "auto",
+    engine: str | EngineOptions = "auto",
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[Progress], None] = lambda progress: None,
 ) -> Made:
@@ -84,12 +92,13 @@ def make_supervisor(
     Args:
         bundle: The model and its libraries.
         deployment: Where the supervisor will stand.
-        engine: Name of the engine for decision diagrams.
+        engine: Name of the engine for decision diagrams, or more about it.
         should_stop: Asked again and again; once true, the work ends.
         on_progress: Told where the work is.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.
+        NodeLimitError: Decision diagrams became larger than the engine's options allow.
         UnsupportedModelError: The model is outside what synthesis handles.
         InternalError: The verifier found fault with the result.
     """

@@ -1,6 +1,6 @@
 """Symbolic supervisor synthesis on extended finite automata."""
 
-from robosc.synthesis.engines import UnknownEngineError, engine_names, register, resolve_engine
+from robosc.synthesis.engines import EngineOptions, UnknownEngineError, engine_names, register, resolve_engine
 from robosc.synthesis.findings import findings, questions_about
 from robosc.synthesis.questions import Answers, Cause, Questions, Restriction, Together
 from robosc.synthesis.result import Progress, Statistics, SynthesisResult, SynthesisStatus
@@ -9,6 +9,7 @@ from robosc.synthesis.synthesize import synthesize
 __all__ = [
     "Answers",
     "Cause",
+    "EngineOptions",
     "Progress",
     "Questions",
     "Restriction",

@@ -54,6 +54,7 @@ class Encoding:
         system: The system.
         subjects: Bits of each place of a state.
         state_names: Every current-state variable, in the manager's order.
+        order: Every variable, in the order in which they were declared.
     """
 
     def __init__(self, system: System, manager: Manager) -> None:
@@ -64,6 +65,7 @@ class Encoding:
             self.subjects[subject] = self._bits(f"s{number}", subject_domain(system, subject), self._type(subject))
         self.state_names = tuple(name for bits in self.subjects.values() for name in bits.names)
         self.inputs = tuple((item, self._input(number, item)) for number, item in enumerate(system.inputs))
+        self.order: list[str] = []
         self._choices = 0
         self._valid_states: Any = None
         self._declare()
@@ -92,15 +94,20 @@ class Encoding:
             beside[next((subject for subject in self.subjects if subject in written), None)].append(bits)
         computed = computed_subjects(self.system)
         for subject, bits in self.subjects.items():
-            self.manager.declare(*_interleaved(bits, beside[subject], has_next=subject in computed))
+            self._add(*_interleaved(bits, beside[subject], has_next=subject in computed))
         for bits in beside[None]:
-            self.manager.declare(*_names(bits))
+            self._add(*_names(bits))
+
+    def _add(self, *names: str) -> None:
+        """Put variables below those there are."""
+        self.manager.declare(*names)
+        self.order += names
 
     def choice(self, count: int) -> Bits:
         """Fresh variables for a choice among `count` edges."""
         bits = self._bits(f"c{self._choices}", range(count), None)
         self._choices += 1
-        self.manager.declare(*bits.names)
+        self._add(*bits.names)
         return bits
 
     def inputs_of(self, event: str) -> dict[tuple[PathStep, ...], Bits]:

@@ -5,13 +5,24 @@ what the two do differently (counting, restricting, complemented edges) is not u
 """
 
 import importlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib.metadata import entry_points
 from typing import Any, Protocol
 
-from robosc.errors import RoboscError
+from robosc.errors import NodeLimitError, RoboscError
 
 ENTRY_POINTS = "robosc.bdd_engines"
+
+_CUDD_BASE_BYTES = 32 * 2**20
+"""What CUDD takes beside nodes: caches and tables at the beginning."""
+
+_CUDD_NODE_BYTES = 64
+"""A node, its place in the unique table and its share of the cache."""
+
+_SLACK = 4
+"""How much more than the limit one operation may have for what it needs on its way."""
 
 _CACHE_SLOTS = 2**14
 """Results of operations that CUDD remembers at the beginning; it takes more as they pay. Its own choice of 2^18 takes
@@ -28,6 +39,9 @@ class Manager(Protocol):
     true: Any
     false: Any
 
+    def __len__(self) -> int:
+        """How many nodes there are, of all predicates together."""
+
     def declare(self, *names: str) -> Any:
         """Add variables below those there are."""
 
@@ -42,6 +56,23 @@ class Manager(Protocol):
 
     def exist(self, names: Iterable[str], node: Any) -> Any:
         """Where some value of the variables makes a predicate true."""
+
+
+@dataclass(frozen=True, slots=True)
+class EngineOptions:
+    """How decision diagrams are made.
+
+    Attributes:
+        name: Name of the engine; `auto` is the fastest installed.
+        is_reordering: Whether the engine may change the order of variables during the fixed points (sifting; R. Rudell,
+            "Dynamic variable ordering for ordered binary decision diagrams", ICCAD 1993, pp. 42-47). The static
+            order is mostly better and takes no time; what comes out is the same.
+        maximum_nodes: Nodes of all predicates together beyond which work is given up; None for no limit.
+    """
+
+    name: str = "auto"
+    is_reordering: bool = False
+    maximum_nodes: int | None = None
 
 
 class UnknownEngineError(RoboscError, LookupError):
@@ -104,6 +135,65 @@ def make_manager(name: str) -> Manager:
     except (ImportError, AttributeError) as error:
         raise UnknownEngineError(f"the engine '{name}' cannot be loaded from {point.value}: {error}") from error
     return factory()
+
+
+def node_count_of(manager: Manager) -> int:
+    """Nodes that are in use; what an engine keeps without use is thrown away first if it can be."""
+    collect = getattr(manager, "collect_garbage", None)
+    if collect is not None:
+        collect()
+    return len(manager)
+
+
+@contextmanager
+def limited(manager: Manager, maximum_nodes: int | None) -> Iterator[None]:
+    """Let no single operation of CUDD grow far beyond a number of nodes.
+
+    The plain engine loses count of its nodes when an operation is broken off, so it is only asked between operations.
+
+    Raises:
+        NodeLimitError: An operation would have grown too far.
+    """
+    if maximum_nodes is None or "cudd" not in type(manager).__module__:
+        yield
+        return
+    is_full = False
+    manager.configure(max_memory=_CUDD_BASE_BYTES + _SLACK * _CUDD_NODE_BYTES * maximum_nodes)  # type: ignore[attr-defined]
+    try:
+        yield
+    except ValueError as error:
+        # There is no error of its own for this.
+        is_full = "NULL" in str(error)
+        if not is_full:
+            raise
+    # Outside of the handler: the error would keep the frames, and they the nodes of a manager that is to end.
+    if is_full:
+        raise node_limit_error(maximum_nodes)
+
+
+def node_limit_error(maximum_nodes: int) -> NodeLimitError:
+    """What is told when diagrams have become too large."""
+    return NodeLimitError(f"the decision diagrams need more than the {maximum_nodes} nodes that they may have")
+
+
+@contextmanager
+def reordering(manager: Manager, order: Sequence[str]) -> Iterator[None]:
+    """Let an engine change the order of variables meanwhile; afterwards it is the given one again.
+
+    Args:
+        manager: A manager.
+        order: Its variables, topmost first.
+
+    Raises:
+        UnknownEngineError: The engine cannot do that.
+    """
+    module = importlib.import_module(type(manager).__module__)
+    if not hasattr(module, "reorder") or not hasattr(manager, "configure"):
+        raise UnknownEngineError("this engine cannot change the order of variables")
+    manager.configure(reordering=True)
+    yield
+    manager.configure(reordering=False)
+    module.reorder(manager, {name: level for level, name in enumerate(order)})
 
 
 def _has_cudd() -> bool:

@@ -1,6 +1,7 @@
 """Synthesis of the maximally permissive supervisor: encoding, fixed point, what the supervisor adds, figures."""
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from typing import Any
 
 from robosc.automata.structure import System
@@ -8,7 +9,16 @@ from robosc.supervisor.structure import AddedCondition
 from robosc.synthesis.controlled import ControlledSystem
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.encoding import Encoding
-from robosc.synthesis.engines import make_manager, resolve_engine
+from robosc.synthesis.engines import (
+    EngineOptions,
+    Manager,
+    limited,
+    make_manager,
+    node_count_of,
+    node_limit_error,
+    reordering,
+    resolve_engine,
+)
 from robosc.synthesis.fixed_point import FixedPoint, Problem, safe_states
 from robosc.synthesis.nodes import count_models, node_count, restrict
 from robosc.synthesis.questions import Questions
@@ -30,7 +40,7 @@ def _silent(progress: Progress) -> None:
 def synthesize(
     system: System,
     *,
-    engine: str = "auto",
+    engine: str | EngineOptions = "auto",
     questions: Questions = _NOTHING,
     should_stop: Callable[[], bool] = _never,
     on_progress: Callable[[Progress], None] = _silent,
@@ -39,27 +49,38 @@ def synthesize(
 
     Args:
         system: Plants and event conditions.
-        engine: Name of the engine for decision diagrams; `auto` is the fastest installed.
+        engine: Name of the engine for decision diagrams, or more about it; `auto` is the fastest installed.
         questions: What else to find out about the controlled system.
         should_stop: Asked before each step of the work with one event; once true, the work ends.
         on_progress: Told after each event's encoding and after each round.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.
+        NodeLimitError: Diagrams became larger than the options allow.
         UnknownEngineError: There is no such engine.
         UnsupportedModelError: An expression computes with too many doubles, or a condition would be too large.
     """
-    name = resolve_engine(engine)
-    return _Synthesis(system, name, Watch(should_stop, on_progress)).result(questions)
+    options = EngineOptions(engine) if isinstance(engine, str) else engine
+    name = resolve_engine(options.name)
+    manager = make_manager(name)
+    watch = Watch(should_stop, on_progress, lambda: _check_nodes(manager, options.maximum_nodes))
+    with limited(manager, options.maximum_nodes):
+        return _Synthesis(system, name, manager, watch, is_reordering=options.is_reordering).result(questions)
+
+
+def _check_nodes(manager: Manager, maximum: int | None) -> None:
+    if maximum is not None and len(manager) > maximum and node_count_of(manager) > maximum:
+        raise node_limit_error(maximum)
 
 
 class _Synthesis:
-    """One synthesis: its manager lives and ends with it."""
+    """One synthesis: its manager is its own."""
 
-    def __init__(self, system: System, engine: str, watch: Watch) -> None:
+    def __init__(self, system: System, engine: str, manager: Manager, watch: Watch, *, is_reordering: bool) -> None:
         self._engine = engine
         self._watch = watch
-        self._manager = make_manager(engine)
+        self._manager = manager
+        self._is_reordering = is_reordering
         self._encoding = Encoding(system, self._manager)
         self._problem = Problem(self._steps(), safe_states(self._encoding, system.invariants))
 
@@ -74,11 +95,12 @@ class _Synthesis:
     def result(self, questions: Questions) -> SynthesisResult:
         """The supervisor, or why there is none."""
         fixed_point = FixedPoint(self._encoding, self._watch)
-        good = fixed_point.good_states(self._problem, self._manager.false)
+        with reordering(self._manager, self._encoding.order) if self._is_reordering else nullcontext():
+            good = fixed_point.good_states(self._problem, self._manager.false)
+            reachable = None if good.reason else fixed_point.reachable_states(self._problem, good.states)
         if good.reason:
             statistics = self._statistics(good.rounds, 0)
             return SynthesisResult(SynthesisStatus.EMPTY, (), statistics, good.reason)
-        reachable = fixed_point.reachable_states(self._problem, good.states)
         states = count_models(self._manager, reachable, self._encoding.state_names)
         added: list[AddedCondition] = []
         for steps in self._problem.steps:

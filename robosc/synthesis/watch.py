@@ -13,14 +13,21 @@ class Watch:
     Args:
         should_stop: Asked before each step of the work with one event; once true, the work ends.
         on_progress: Told after each event's encoding and after each round.
+        check_nodes: Asked before each step, too: raises an error where there are too many.
 
     Attributes:
         peak_nodes: Most nodes that a predicate took that progress was told of.
     """
 
-    def __init__(self, should_stop: Callable[[], bool], on_progress: Callable[[Progress], None]) -> None:
+    def __init__(
+        self,
+        should_stop: Callable[[], bool],
+        on_progress: Callable[[Progress], None],
+        check_nodes: Callable[[], None] = lambda: None,
+    ) -> None:
         self._should_stop = should_stop
         self._on_progress = on_progress
+        self._check_nodes = check_nodes
         self.peak_nodes = 0
 
     def check_stop(self) -> None:
@@ -28,9 +35,11 @@ class Watch:
 
         Raises:
             SynthesisCancelled: The work is to end.
+            NodeLimitError: There are more nodes than there may be.
         """
         if self._should_stop():
             raise SynthesisCancelled("synthesis was stopped")
+        self._check_nodes()
 
     def tell(self, phase: str, rounds: int, states: Any) -> None:
         """After each round: its phase and number, and the predicate that was found."""

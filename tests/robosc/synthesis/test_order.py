@@ -1,5 +1,6 @@
 """The static variable order."""
 
+from itertools import permutations
 from random import Random
 
 from hypothesis import given
@@ -8,7 +9,7 @@ from hypothesis import strategies as st
 from robosc.automata import System, to_automata
 from robosc.automata.state import subjects
 from robosc.model.structure import Deployment
-from robosc.synthesis.order import force, hyperedges, span, subject_order
+from robosc.synthesis.order import force, hyperedges, slide, span, subject_order
 from support.models import example_model
 from support.random_systems import systems
 
@@ -21,6 +22,25 @@ def test_force_gives_a_permutation_that_is_never_worse(count: int, seed: int) ->
     assert sorted(order) == list(range(count))
     assert span(order, edges) <= span(range(count), edges)
     assert force(count, edges) == order
+
+
+@given(st.integers(1, 12), st.integers(2, 4), st.integers(0, 2**32 - 1))
+def test_no_window_of_a_slid_order_can_be_better(count: int, width: int, seed: int) -> None:
+    random = Random(seed)
+    edges = [random.sample(range(count), random.randint(1, min(4, count))) for _ in range(random.randint(0, 8))]
+    given_order = random.sample(range(count), count)
+    order = slide(given_order, edges, width=width, times=1000)
+    assert sorted(order) == list(range(count))
+    assert span(order, edges) <= span(given_order, edges)
+    for start in range(count - width + 1):
+        for window in permutations(order[start : start + width]):
+            other = (*order[:start], *window, *order[start + width :])
+            assert span(other, edges) >= span(order, edges)
+
+
+def test_an_order_that_is_best_stays() -> None:
+    chain = [[place, place + 1] for place in range(19)]
+    assert slide(range(20), chain) == tuple(range(20))
 
 
 def test_a_shuffled_chain_is_put_in_order() -> None:

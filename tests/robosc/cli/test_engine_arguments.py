@@ -1,0 +1,43 @@
+"""`--engine`, `--reorder` and `--max-nodes` of the commands that synthesize."""
+
+import json
+
+import pytest
+
+from robosc.cli.main import main
+from support.models import EXAMPLES
+
+NAVIGATION = str(EXAMPLES / "navigation" / "navigation.rscd")
+
+
+def outcome(capsys: pytest.CaptureFixture[str], *arguments: str) -> object:
+    assert main(["synth", NAVIGATION, "--json", *arguments]) == 0
+    return json.loads(capsys.readouterr().out)["summary"]
+
+
+def test_reordering_and_enough_nodes_change_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    plain = outcome(capsys)
+    assert outcome(capsys, "--reorder") == plain
+    assert outcome(capsys, "--max-nodes", "100000") == plain
+
+
+@pytest.mark.parametrize("command", [["synth"], ["explore"], ["check", "--synthesize"]])
+@pytest.mark.parametrize("engine", ["auto", "autoref"])
+def test_too_few_nodes_end_it(capsys: pytest.CaptureFixture[str], command: list[str], engine: str) -> None:
+    assert main([*command, NAVIGATION, "--max-nodes", "50", "--engine", engine]) == 1
+    captured = capsys.readouterr()
+    assert captured.err == "robosc: the decision diagrams need more than the 50 nodes that they may have\n"
+
+
+@pytest.mark.parametrize("number", ["0", "-1", "many"])
+def test_a_limit_is_a_number_from_one_on(capsys: pytest.CaptureFixture[str], number: str) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(["synth", NAVIGATION, f"--max-nodes={number}"])
+    assert caught.value.code == 2
+    assert "is no number from 1 on" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("option", [["--reorder"], ["--max-nodes", "5"]])
+def test_without_synthesis_there_is_nothing_to_limit(capsys: pytest.CaptureFixture[str], option: list[str]) -> None:
+    assert main(["check", NAVIGATION, *option]) == 2
+    assert "they need --synthesize" in capsys.readouterr().err

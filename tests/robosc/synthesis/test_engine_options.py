@@ -1,0 +1,116 @@
+"""Limits and orders of the engines: nothing is left broken, and what comes out is the same."""
+
+import gc
+from collections.abc import Iterator
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robosc.errors import NodeLimitError
+from robosc.synthesis import EngineOptions, UnknownEngineError, register, synthesize
+from robosc.synthesis.engines import _FACTORIES, Manager, limited, make_manager, reordering
+from support.families import FAMILIES
+from support.random_systems import wide_system
+
+
+@pytest.fixture(scope="module", params=["cudd", "autoref"])
+def engine(request: pytest.FixtureRequest) -> str:
+    if request.param == "cudd":
+        pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+    return str(request.param)
+
+
+def test_a_synthesis_beyond_its_nodes_is_given_up(engine: str) -> None:
+    system = FAMILIES["dining philosophers"](8)
+    for maximum in (1, 50, 300):
+        with pytest.raises(NodeLimitError, match=f"more than the {maximum} nodes"):
+            synthesize(system, engine=EngineOptions(engine, maximum_nodes=maximum))
+    # Nothing is left behind that another synthesis would stumble over.
+    gc.collect()
+    assert synthesize(system, engine=EngineOptions(engine, maximum_nodes=1_000_000)) == synthesize(
+        system, engine=engine
+    )
+
+
+def test_the_limit_is_one_of_nodes_in_use(engine: str) -> None:
+    """What is thrown away on the way does not count."""
+    system = FAMILIES["counter"](200)
+    assert synthesize(system, engine=EngineOptions(engine, maximum_nodes=5_000)).added
+
+
+def test_a_single_operation_of_cudd_cannot_fill_the_memory() -> None:
+    pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+    manager = make_manager("cudd")
+    width = 18
+    manager.declare(*(f"x{place}" for place in range(2 * width)))
+    with pytest.raises(NodeLimitError, match="more than the 1000 nodes"), limited(manager, 1_000):
+        _far_apart(manager, width)
+    assert manager.var("x0") & manager.var("x1") != manager.false
+
+
+def _far_apart(manager: Manager, width: int) -> None:
+    """Equality of two numbers, one below the other: it needs two to the power of their width of nodes."""
+    found = manager.true
+    for place in range(width):
+        first, second = manager.var(f"x{place}"), manager.var(f"x{place + width}")
+        found = found & manager.ite(first, second, ~second)
+
+
+def test_other_errors_pass_the_limit(engine: str) -> None:
+    manager = make_manager(engine)
+    with pytest.raises(ValueError, match="something else"), limited(manager, 1_000):
+        raise ValueError("something else")
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(deadline=None, max_examples=20)
+def test_reordering_changes_nothing(engine: str, seed: int) -> None:
+    system = wide_system(seed)
+    plain, reordered = (synthesize(system, engine=EngineOptions(engine, is_reordering=flag)) for flag in (False, True))
+    assert (plain.status, plain.added, plain.initial) == (reordered.status, reordered.added, reordered.initial)
+    assert plain.statistics.states == reordered.statistics.states
+
+
+def test_the_order_comes_back(engine: str) -> None:
+    manager = make_manager(engine)
+    names = [f"x{place}" for place in range(12)]
+    manager.declare(*names)
+    with reordering(manager, names):
+        found = manager.true
+        for place in range(6):
+            first, second = manager.var(names[place]), manager.var(names[place + 6])
+            found = found & manager.ite(first, second, ~second)
+        module = __import__(type(manager).__module__, fromlist=["reorder"])
+        module.reorder(manager)
+        small = found.dag_size
+    assert [manager.var(name).level for name in names] == list(range(12))
+    assert found.dag_size > 2 * small
+
+
+@pytest.fixture
+def fixed_engine() -> Iterator[str]:
+    class Fixed:
+        """An engine without orders."""
+
+        def __getattr__(self, name: str) -> object:
+            if name == "configure":
+                raise AttributeError(name)
+            return getattr(self.manager, name)
+
+        def __len__(self) -> int:
+            return len(self.manager)
+
+        def __init__(self) -> None:
+            self.manager = make_manager("autoref")
+
+    register("fixed", Fixed)  # type: ignore[arg-type]  # it hands on what it does not know
+    yield "fixed"
+    del _FACTORIES["fixed"]
+
+
+def test_an_engine_without_orders_says_so(fixed_engine: str) -> None:
+    system = FAMILIES["dining philosophers"](3)
+    assert synthesize(system, engine=fixed_engine).added
+    with pytest.raises(UnknownEngineError, match="cannot change the order"):
+        synthesize(system, engine=EngineOptions(fixed_engine, is_reordering=True))

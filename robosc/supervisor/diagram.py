@@ -1,24 +1,12 @@
-"""Decision diagrams over locations and variables: evaluation, checks, and readable formulas where they are small."""
+"""Decision diagrams over locations and variables: domains, evaluation and checks."""
 
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from typing import overload
 
 from robosc.automata.structure import System
-from robosc.expressions import (
-    FALSE,
-    TRUE,
-    Binary,
-    Constant,
-    EnumValue,
-    Expression,
-    StateTest,
-    Unary,
-    Value,
-    VariableRead,
-)
-from robosc.expressions.types import EnumType, IntegerType, Type, domain
-from robosc.supervisor.structure import DecisionDiagram, DecisionNode
+from robosc.expressions.types import Type, Value, domain
+from robosc.supervisor.structure import DecisionDiagram
 
 Subject = tuple[str, str | None]
 """An automaton, and one of its variables or None for its location."""
@@ -99,119 +87,3 @@ def validate(diagram: DecisionDiagram, domains: Domains) -> None:
             raise ValueError(f"node {number} has a child that does not stand before it")
     if diagram.root >= len(diagram.nodes) + 2:
         raise ValueError("the root is no node")
-
-
-def to_expression(diagram: DecisionDiagram, domains: Domains, *, limit: int) -> Expression | None:
-    """A formula with the same meaning, or None where it would have more than `limit` operands.
-
-    The size is found before anything is built: a formula can be exponentially larger than its diagram.
-    """
-    if _size(diagram, domains, limit) > limit:
-        return None
-    built: list[Expression] = [FALSE, TRUE]
-    for node in diagram.nodes:
-        built.append(_formula(node, domains[node.automaton, node.variable], built))
-    return built[diagram.root]
-
-
-def _size(diagram: DecisionDiagram, domains: Domains, limit: int) -> int:
-    """Operands of the formula, counted no further than just past the limit."""
-    sizes = [0, 0]
-    for node in diagram.nodes:
-        domain = domains[node.automaton, node.variable]
-        total = 0
-        for child, indices in _branches(node, len(domain)):
-            if child != 0:
-                total += _test_size(domain, indices) + sizes[child]
-        sizes.append(min(total, limit + 1))
-    return sizes[diagram.root]
-
-
-Indices = list[range]
-"""Runs of indices, ascending and apart."""
-
-
-def _branches(node: DecisionNode, count: int) -> list[tuple[int, Indices]]:
-    """For each child the indices that lead to it, in the order of their first index."""
-    found: dict[int, Indices] = {}
-    ends = (*node.starts[1:], count)
-    for start, end, child in zip(node.starts, ends, node.children, strict=True):
-        found.setdefault(child, []).append(range(start, end))
-    return list(found.items())
-
-
-def _formula(node: DecisionNode, domain: SubjectDomain, built: Sequence[Expression]) -> Expression:
-    branches = _branches(node, len(domain))
-    if len(branches) == 1:  # A file may hold a node that decides nothing.
-        return built[branches[0][0]]
-    if len(branches) == 2:
-        (first, where), (second, elsewhere) = branches
-        if first == 1 or second == 0:
-            return _choice(_test(node, domain, where), built[first], built[second])
-        if second == 1 or first == 0:
-            return _choice(_test(node, domain, elsewhere), built[second], built[first])
-    parts = [_both(_test(node, domain, indices), built[child]) for child, indices in branches if child != 0]
-    return _any(parts)
-
-
-def _choice(test: Expression, then: Expression, otherwise: Expression) -> Expression:
-    """`test and then`, or `test or otherwise`: one of the two branches is a constant."""
-    if otherwise == FALSE:
-        return _both(test, then)
-    return Binary("or", test, otherwise)
-
-
-def _both(a: Expression, b: Expression) -> Expression:
-    return a if b == TRUE else Binary("and", a, b)
-
-
-def _any(parts: Sequence[Expression]) -> Expression:
-    result = parts[0]
-    for part in parts[1:]:
-        result = Binary("or", result, part)
-    return result
-
-
-def _all(parts: Sequence[Expression]) -> Expression:
-    result = parts[0]
-    for part in parts[1:]:
-        result = Binary("and", result, part)
-    return result
-
-
-def _test_size(domain: SubjectDomain, indices: Indices) -> int:
-    if isinstance(domain.type, IntegerType):
-        return 2 * len(indices)
-    inside = sum(len(run) for run in indices)
-    return max(1, min(inside, len(domain) - inside))
-
-
-def _test(node: DecisionNode, domain: SubjectDomain, indices: Indices) -> Expression:
-    """Whether the subject has one of some indices."""
-    inside = [index for run in indices for index in run] if not isinstance(domain.type, IntegerType) else []
-    outside = [index for index in range(len(domain)) if index not in inside] if inside else []
-    if node.variable is None:
-        tests = [StateTest(node.automaton, str(domain[index])) for index in inside]
-        others = [Unary("not", StateTest(node.automaton, str(domain[index]))) for index in outside]
-        return _any(tests) if len(tests) <= len(others) else _all(others)
-    variable = VariableRead(node.automaton, node.variable)
-    match domain.type:
-        case IntegerType():
-            return _any([_between(variable, domain, run) for run in indices])
-        case EnumType(name=name):
-            equal = [Binary("=", variable, EnumValue(name, str(domain[index]))) for index in inside]
-            unequal = [Binary("!=", variable, EnumValue(name, str(domain[index]))) for index in outside]
-            return _any(equal) if len(equal) <= len(unequal) else _all(unequal)
-        case _:
-            return variable if inside == [1] else Unary("not", variable)
-
-
-def _between(variable: VariableRead, domain: SubjectDomain, run: range) -> Expression:
-    low, high = Constant(domain[run[0]]), Constant(domain[run[-1]])
-    if len(run) == 1:
-        return Binary("=", variable, low)
-    if run[-1] == len(domain) - 1:
-        return Binary(">=", variable, low)
-    if run[0] == 0:
-        return Binary("<=", variable, high)
-    return Binary("and", Binary(">=", variable, low), Binary("<=", variable, high))

@@ -1,13 +1,21 @@
 """A supervisor in figures and words: what `synth` prints, on this machine or from a service."""
 
-from robosc.automata import System, to_automata
-from robosc.expressions.text import expression_text
-from robosc.model.structure import Model
-from robosc.supervisor.diagram import diagram_domains, to_expression
-from robosc.supervisor.structure import Certificate, DecisionDiagram, Supervisor
+import textwrap
 
-_EXPRESSION_LIMIT = 40
-"""Operands up to which a condition is printed as a formula; a larger one is told by its size."""
+from robosc.automata import System, to_automata
+from robosc.expressions import TRUE, Expression
+from robosc.model.structure import Model
+from robosc.supervisor.diagram import diagram_domains
+from robosc.supervisor.structure import Certificate, DecisionDiagram, Supervisor
+from robosc.supervisor.words import Formulas, diagram_lines, in_words, size_in_words
+
+_WIDTH = 100
+"""Columns that a condition takes in the summary for people; it goes on in the next line."""
+
+_LINES = 300
+"""Tests that the diagrams in the summary for people may have together; what is beyond is told by its size."""
+
+_TRUE = DecisionDiagram((), 1)
 
 
 def summary_json(supervisor: Supervisor) -> dict[str, object]:
@@ -15,6 +23,8 @@ def summary_json(supervisor: Supervisor) -> dict[str, object]:
     system = to_automata(supervisor.model, supervisor.deployment)
     variables = _variables(supervisor.model)
     certificate = supervisor.certificate
+    domains = diagram_domains(system)
+    added = _added(supervisor, system)
     return {
         "model": supervisor.model.name,
         "deployment": str(supervisor.deployment),
@@ -28,7 +38,12 @@ def summary_json(supervisor: Supervisor) -> dict[str, object]:
         "requirements": len(supervisor.model.requirements),
         "states": int(certificate.states),
         "transitions": None if certificate.transitions is None else int(certificate.transitions),
-        "added": added_texts(supervisor, system),
+        "added": {event: _told(diagram, formula) for event, diagram, formula in added},
+        "diagrams": {
+            event: [line.json() for line in diagram_lines(diagram, domains)]
+            for event, diagram, formula in added
+            if formula is None
+        },
         "certificate": {
             "engine_version": certificate.engine_version,
             "bundle_sha256": certificate.bundle_sha256,
@@ -54,9 +69,7 @@ def summary_text(supervisor: Supervisor) -> str:
     lines = [f"{supervisor.model.name}: a supervisor exists ({supervisor.deployment})"]
     lines += [f"  {name:<13} {text}" for name, text in rows]
     lines.append("  the supervisor adds to each controllable event")
-    added = added_texts(supervisor, system)
-    width = max((len(event) for event in added), default=0)
-    lines += [f"    {event:<{width}}  {text if text != 'true' else 'nothing'}" for event, text in added.items()]
+    lines += [f"    {line}" for line in added_lines(supervisor, system)]
     lines.append("  certificate")
     checks = _checks(certificate)
     lines += [f"    {name.replace('_', ' '):<21} {outcome}" for name, outcome in checks.items()]
@@ -67,19 +80,47 @@ def summary_text(supervisor: Supervisor) -> str:
 
 def added_texts(supervisor: Supervisor, system: System) -> dict[str, str]:
     """For each controllable event what the supervisor adds, in the model's words; `true` where nothing."""
+    return {event: _told(diagram, formula) for event, diagram, formula in _added(supervisor, system)}
+
+
+def _added(supervisor: Supervisor, system: System) -> list[tuple[str, DecisionDiagram, Expression | None]]:
+    """For each controllable event what the supervisor adds, and its formula if there is one that reads well."""
+    formulas = Formulas(diagram_domains(system))
+    events = [event.name for event in system.events if event.is_controllable]
+    diagrams = {item.event: item.condition for item in supervisor.added}
+    return [
+        (event, diagram, formulas.formula(diagram))
+        for event, diagram in ((event, diagrams.get(event, _TRUE)) for event in events)
+    ]
+
+
+def _told(diagram: DecisionDiagram, formula: Expression | None) -> str:
+    return size_in_words(diagram) if formula is None else in_words(formula)
+
+
+def added_lines(supervisor: Supervisor, system: System) -> list[str]:
+    """What the supervisor adds, for people: formulas, and the lines of diagrams as long as they are few."""
     domains = diagram_domains(system)
+    added = _added(supervisor, system)
+    width = max((len(event) for event, _, _ in added), default=0)
+    lines: list[str] = []
+    left = _LINES
+    for event, diagram, formula in added:
+        told = [] if formula is not None else diagram_lines(diagram, domains)
+        left -= sum(1 + line.operands for line in told)
+        parts = [_told(diagram, formula) if formula != TRUE else "nothing"]
+        if told and left >= 0:
+            parts = [f"{parts[0]}, to be read from [1] on:", *map(str, told)]
+        elif told:
+            parts = [f"{parts[0]}; --json tells it node by node"]
+        wrapped = [row for part in parts for row in _wrapped(part)]
+        lines += [f"{name:<{width}}  {row}" for name, row in zip([event, *[""] * len(wrapped)], wrapped, strict=False)]
+    return lines
 
-    def text(diagram: DecisionDiagram | None) -> str:
-        if diagram is None:
-            return "true"
-        expression = to_expression(diagram, domains, limit=_EXPRESSION_LIMIT)
-        return (
-            f"a decision diagram of {len(diagram.nodes)} nodes" if expression is None else expression_text(expression)
-        )
 
-    return {
-        event.name: text(supervisor.added_condition(event.name)) for event in system.events if event.is_controllable
-    }
+def _wrapped(text: str) -> list[str]:
+    """The text in rows; names are never broken."""
+    return textwrap.wrap(text, _WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
 
 
 def _variables(model: Model) -> tuple[int, int]:

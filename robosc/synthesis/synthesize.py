@@ -5,9 +5,8 @@ from contextlib import nullcontext
 from typing import Any
 
 from robosc.automata.structure import System
-from robosc.supervisor.structure import AddedCondition
+from robosc.supervisor.structure import AddedCondition, DecisionDiagram
 from robosc.synthesis.controlled import ControlledSystem
-from robosc.synthesis.diagrams import extract
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import (
     EngineOptions,
@@ -20,9 +19,10 @@ from robosc.synthesis.engines import (
     resolve_engine,
 )
 from robosc.synthesis.fixed_point import FixedPoint, Problem, safe_states
-from robosc.synthesis.nodes import count_models, node_count, restrict
+from robosc.synthesis.nodes import count_models
 from robosc.synthesis.questions import Questions
 from robosc.synthesis.result import Progress, Statistics, SynthesisResult, SynthesisStatus
+from robosc.synthesis.simplify import Simplifier
 from robosc.synthesis.transitions import Steps, transition_of
 from robosc.synthesis.watch import Watch
 
@@ -103,38 +103,28 @@ class _Synthesis:
             return SynthesisResult(SynthesisStatus.EMPTY, (), statistics, good.reason)
         states = count_models(self._manager, reachable, self._encoding.state_names)
         added: list[AddedCondition] = []
+        simplifier = Simplifier(self._encoding)
         for steps in self._problem.steps:
             self._watch.check_stop()
-            condition = self._added(steps, good.states, reachable)
+            condition = self._added(simplifier, steps, good.states, reachable)
             if condition is not None:
-                added.append(AddedCondition(steps.event.name, extract(self._encoding, condition)))
+                added.append(AddedCondition(steps.event.name, condition))
         # The figures are those of the synthesis: what the questions take on top is not in them.
         statistics = self._statistics(good.rounds, states)
         controlled = ControlledSystem(self._encoding, self._watch, self._problem, good.states, reachable)
-        begin = self._restricted(fixed_point.initial, good.states)
         return SynthesisResult(
             SynthesisStatus.SUPERVISOR,
             tuple(added),
             statistics,
             answers=controlled.answers(questions),
-            initial=None if begin is None else extract(self._encoding, begin),
+            initial=simplifier.condition(good.states, fixed_point.initial),
         )
 
     def _statistics(self, rounds: int, states: int) -> Statistics:
         return Statistics(self._engine, len(self._encoding.state_names), rounds, self._watch.peak_nodes, states)
 
-    def _added(self, steps: Steps, good: Any, reachable: Any) -> Any | None:
+    def _added(self, simplifier: Simplifier, steps: Steps, good: Any, reachable: Any) -> DecisionDiagram | None:
         """The condition to add to an event, simplified where it does not matter; None if there is nothing to add."""
         if not steps.event.is_controllable:
             return None
-        return self._restricted(reachable & steps.plant & steps.condition, steps.only(good))
-
-    def _restricted(self, care: Any, wanted: Any) -> Any | None:
-        """A condition that is `wanted` where it matters, simplified; None if that is true."""
-        if care & ~wanted == self._manager.false:
-            return None
-        if care & wanted == self._manager.false:
-            return self._manager.false
-        simplified = restrict(self._manager, wanted, care)
-        plain = wanted & self._encoding.valid_states()
-        return simplified if node_count(self._manager, simplified) <= node_count(self._manager, plain) else plain
+        return simplifier.condition(steps.only(good), reachable & steps.plant & steps.condition)

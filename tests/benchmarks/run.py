@@ -1,12 +1,13 @@
 """Prints every benchmark table of the project, measured side by side in one run.
 
-Usage: run.py [cold-start] [execution] [language] [ros2] [synthesis]      (all of them without an argument)
+Usage: run.py [cold-start] [conditions] [execution] [language] [ros2] [synthesis]      (all of them without an argument)
 """
 
 import sys
 from collections.abc import Callable
 
 import cold_start
+import conditions
 import execution
 import language
 import ros2_cycle
@@ -14,6 +15,7 @@ import synthesis
 
 TABLES: dict[str, Callable[[], str]] = {
     "cold-start": cold_start.table,
+    "conditions": conditions.table,
     "execution": execution.table,
     "language": language.table,
     "ros2": ros2_cycle.table,

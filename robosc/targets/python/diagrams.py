@@ -5,14 +5,11 @@ from dataclasses import dataclass, field
 
 from robosc.automata import System
 from robosc.expressions import Value
-from robosc.expressions.text import expression_text
-from robosc.supervisor.diagram import diagram_domains, to_expression
+from robosc.supervisor.diagram import diagram_domains
 from robosc.supervisor.structure import DecisionDiagram, DecisionNode
+from robosc.supervisor.words import Formulas, in_words, size_in_words
 from robosc.targets.python.expressions import FALSE_CODE, TRUE_CODE, Code, Scope, truth
 from robosc.targets.python.text import docstring, indent
-
-FORMULA_LIMIT = 40
-"""Operands up to which a condition is written as a formula."""
 
 
 @dataclass(slots=True)
@@ -29,16 +26,20 @@ class Diagrams:
     scope: Scope
     methods: list[tuple[str, list[str]]] = field(default_factory=list)
     _names: dict[tuple[object, ...], str] = field(default_factory=dict)
+    _formulas: Formulas = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._formulas = Formulas(diagram_domains(self.system))
 
     def condition(self, diagram: DecisionDiagram) -> tuple[str, Code]:
         """A diagram in words and as Python."""
-        expression = to_expression(diagram, diagram_domains(self.system), limit=FORMULA_LIMIT)
+        expression = self._formulas.formula(diagram)
         if expression is not None:
-            return expression_text(expression), truth(expression, self.scope)
+            return in_words(expression), truth(expression, self.scope)
         codes = [FALSE_CODE, TRUE_CODE]
         for node in diagram.nodes:
             codes.append(self._node(node, codes))
-        return f"a decision diagram of {len(diagram.nodes)} nodes", codes[diagram.root]
+        return size_in_words(diagram), codes[diagram.root]
 
     def _node(self, node: DecisionNode, codes: list[Code]) -> Code:
         branches = tuple(codes[child].text for child in node.children)
@@ -50,7 +51,7 @@ class Diagrams:
         return Code(f"self.{self._names[key]}()")
 
     def _method(self, name: str, node: DecisionNode, branches: tuple[str, ...]) -> list[str]:
-        values = diagram_domains(self.system)[node.automaton, node.variable]
+        values = self._formulas.domains[node.automaton, node.variable]
         if node.variable is None:
             subject = self.scope.location(node.automaton)
         else:

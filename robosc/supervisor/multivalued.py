@@ -1,0 +1,314 @@
+"""Decision diagrams over finitely many values as a store of shared nodes: joined, subtracted, searched.
+
+Values that no diagram tells apart are one class, so that a node has a child for each class however large the range is.
+Every walk counts its steps: what would take too many ends with `GaveUp`, on every machine at the same place.
+
+Source: A. Srinivasan, T. Kam, S. Malik and R. K. Brayton, "Algorithms for discrete function manipulation", IEEE
+ICCAD 1990, pp. 92-95.
+"""
+
+from bisect import bisect_right
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from graphlib import CycleError, TopologicalSorter
+from itertools import pairwise
+from typing import Self
+
+from robosc.supervisor.diagram import Domains, Subject
+from robosc.supervisor.literals import Indices, merged
+from robosc.supervisor.structure import DecisionDiagram, DecisionNode
+
+MAXIMUM_SUBJECTS = 100
+"""Places that the diagrams of one store may test."""
+
+MAXIMUM_RUNS = 128
+"""Ranges of one place's values that they may tell apart."""
+
+Node = int
+"""A node's number: 0 false, 1 true."""
+
+Cube = tuple[int, ...]
+"""For each place a set of classes, as bits: the states whose places all hold a value of their set."""
+
+
+class GaveUp(Exception):
+    """There is no result within the bounds."""
+
+
+class Effort:
+    """A number of steps that work may take.
+
+    Args:
+        steps: Steps that are left.
+        whole: The effort that this one is a part of.
+    """
+
+    def __init__(self, steps: int, whole: "Effort | None" = None) -> None:
+        self.left = steps
+        self._whole = whole
+
+    def spend(self, steps: int = 1) -> None:
+        """Take some steps.
+
+        Raises:
+            GaveUp: There are not so many left.
+        """
+        self.left -= steps
+        if self._whole is not None:
+            self._whole.spend(steps)
+        if self.left < 0:
+            raise GaveUp
+
+    def part(self, steps: int) -> "Effort":
+        """A part of it for work of its own."""
+        return Effort(steps, self)
+
+
+class Space:
+    """A store of nodes over the places that some diagrams test.
+
+    Args:
+        diagrams: They decide which values are told apart.
+        domains: What the places can hold.
+        effort: What the work may take.
+
+    Attributes:
+        subjects: The places, in the order of the diagrams.
+        classes: For each place, the indices of each class.
+        full: The cube of all states.
+        effort: What further work may take.
+
+    Raises:
+        GaveUp: They test too many places or tell too many values apart.
+    """
+
+    def __init__(self, diagrams: Sequence[DecisionDiagram], domains: Domains, effort: Effort) -> None:
+        self.effort = effort
+        self.subjects = _ordered(diagrams)
+        if len(self.subjects) > MAXIMUM_SUBJECTS:
+            raise GaveUp
+        self._variables = {subject: place for place, subject in enumerate(self.subjects)}
+        nodes: dict[Subject, list[DecisionNode]] = {subject: [] for subject in self.subjects}
+        for node in (node for diagram in diagrams for node in diagram.nodes):
+            nodes[node.automaton, node.variable].append(node)
+        self.classes = [_classes(nodes[subject], len(domains[subject]), effort) for subject in self.subjects]
+        self.full: Cube = tuple((1 << len(classes)) - 1 for classes in self.classes)
+        # The constants are tested below everything.
+        self._nodes: list[tuple[int, tuple[Node, ...]]] = [(len(self.subjects), ())] * 2
+        self._numbers: dict[tuple[int, tuple[Node, ...]], Node] = {}
+        self._known: dict[tuple[str, Node, Node], Node] = {}
+        self._cubes: dict[Cube, Node] = {}
+
+    @contextmanager
+    def within(self, effort: Effort) -> Iterator[Self]:
+        """Work that has an effort of its own."""
+        before, self.effort = self.effort, effort
+        try:
+            yield self
+        finally:
+            self.effort = before
+
+    # Nodes
+
+    def variable(self, node: Node) -> int:
+        """The place that a node tests."""
+        return self._nodes[node][0]
+
+    def children(self, node: Node) -> tuple[Node, ...]:
+        """Its child for each class."""
+        return self._nodes[node][1]
+
+    def make(self, variable: int, children: tuple[Node, ...]) -> Node:
+        """The node with these children, which test later places; a child where all are equal."""
+        self.effort.spend()
+        if children.count(children[0]) == len(children):
+            return children[0]
+        key = (variable, children)
+        number = self._numbers.get(key)
+        if number is None:
+            number = self._numbers[key] = len(self._nodes)
+            self._nodes.append(key)
+        return number
+
+    def both(self, a: Node, b: Node) -> Node:
+        """Where both are true."""
+        if a == b or b == 1:
+            return a
+        if a == 0 or b == 0:
+            return 0
+        return b if a == 1 else self._apply("both", min(a, b), max(a, b))
+
+    def either(self, a: Node, b: Node) -> Node:
+        """Where one of them is true."""
+        if a == b or b == 0:
+            return a
+        if a == 1 or b == 1:
+            return 1
+        return b if a == 0 else self._apply("either", min(a, b), max(a, b))
+
+    def without(self, a: Node, b: Node) -> Node:
+        """Where the first is true and the second is not."""
+        if a == b or a == 0 or b == 1:
+            return 0
+        return a if b == 0 else self._apply("without", a, b)
+
+    def _apply(self, operation: str, a: Node, b: Node) -> Node:
+        key = (operation, a, b)
+        found = self._known.get(key)
+        if found is None:
+            self.effort.spend()
+            variable = min(self.variable(a), self.variable(b))
+            work = getattr(self, operation)
+            pairs = zip(self._below(a, variable), self._below(b, variable), strict=True)
+            found = self._known[key] = self.make(variable, tuple(work(first, second) for first, second in pairs))
+        return found
+
+    def _below(self, node: Node, variable: int) -> tuple[Node, ...]:
+        here, children = self._nodes[node]
+        return children if here == variable else (node,) * len(self.classes[variable])
+
+    # Cubes
+
+    def of_cube(self, cube: Cube) -> Node:
+        """The node of a cube."""
+        node = self._cubes.get(cube)
+        if node is not None:
+            return node
+        node = 1
+        for variable in reversed(range(len(cube))):
+            if cube[variable] != self.full[variable]:
+                count = len(self.classes[variable])
+                node = self.make(variable, tuple(node if cube[variable] >> item & 1 else 0 for item in range(count)))
+        self._cubes[cube] = node
+        return node
+
+    def sum_of(self, cubes: Iterable[Cube]) -> Node:
+        """Where one of some cubes is."""
+        node = 0
+        for cube in cubes:
+            node = self.either(node, self.of_cube(cube))
+        return node
+
+    def meets(self, node: Node, cube: Cube) -> bool:
+        """Whether a node is true somewhere in a cube."""
+        if node == 1:
+            return True
+        seen, stack = {0, node}, [node] if node else []
+        while stack:
+            variable, children = self._nodes[stack.pop()]
+            mask = cube[variable]
+            below = set(children)
+            if mask != self.full[variable]:
+                below = {child for place, child in enumerate(children) if mask >> place & 1}
+            if 1 in below:
+                self.effort.spend(len(seen))
+                return True
+            below -= seen
+            seen |= below
+            stack += below
+        self.effort.spend(len(seen))
+        return False
+
+    def paths(self, node: Node) -> int:
+        """Ways from a node to true, those through one and the same nodes counted once."""
+        counts = {0: 0, 1: 1}
+
+        def count(item: Node) -> int:
+            if item not in counts:
+                self.effort.spend()
+                counts[item] = sum(count(child) for child in set(self.children(item)))
+            return counts[item]
+
+        return count(node)
+
+    def shortest_path(self, node: Node) -> Cube:
+        """A largest cube among the paths to true of a node that is not false; the first of several."""
+        lengths: dict[Node, int] = {1: 0}
+
+        def length(item: Node) -> int:
+            found = lengths.get(item)
+            if found is None:
+                self.effort.spend()
+                found = lengths[item] = 1 + min(length(child) for child in self.children(item) if child)
+            return found
+
+        cube = list(self.full)
+        while node != 1:
+            variable, children = self._nodes[node]
+            node = min((child for child in dict.fromkeys(children) if child), key=length)
+            cube[variable] = sum(1 << place for place, child in enumerate(children) if child == node)
+        return tuple(cube)
+
+    # Diagrams
+
+    def of(self, diagram: DecisionDiagram) -> Node:
+        """The node of one of the diagrams that the store was made for."""
+        nodes: list[Node] = [0, 1]
+        for node in diagram.nodes:
+            variable = self._variables[node.automaton, node.variable]
+            firsts = [indices[0].start for indices in self.classes[variable]]
+            nodes.append(
+                self._chosen(variable, [nodes[node.children[bisect_right(node.starts, i) - 1]] for i in firsts])
+            )
+        return nodes[diagram.root]
+
+    def _chosen(self, variable: int, children: Sequence[Node]) -> Node:
+        if all(self.variable(child) > variable for child in children):
+            return self.make(variable, tuple(children))
+        # A file's diagram may test a place twice, or in another order each time.
+        result = 0
+        for place, child in enumerate(children):
+            cube = list(self.full)
+            cube[variable] = 1 << place
+            result = self.either(result, self.both(child, self.of_cube(tuple(cube))))
+        return result
+
+    def diagram(self, root: Node) -> DecisionDiagram:
+        """A node's diagram, with numbers that depend on its function and the order of places alone."""
+        numbers: dict[Node, int] = {0: 0, 1: 1}
+        found: list[DecisionNode] = []
+
+        def number(node: Node) -> int:
+            if node not in numbers:
+                self.effort.spend()
+                variable, children = self._nodes[node]
+                runs = sorted(
+                    (run.start, child)
+                    for indices, child in zip(self.classes[variable], children, strict=True)
+                    for run in indices
+                )
+                kept = runs[:1] + [later for earlier, later in pairwise(runs) if later[1] != earlier[1]]
+                branches = tuple(number(child) for _, child in kept)
+                found.append(DecisionNode(*self.subjects[variable], tuple(start for start, _ in kept), branches))
+                numbers[node] = len(found) + 1
+            return numbers[node]
+
+        last = number(root)
+        return DecisionDiagram(tuple(found), last)
+
+
+def _ordered(diagrams: Sequence[DecisionDiagram]) -> tuple[Subject, ...]:
+    """The places that diagrams test, each before those that are tested below it as far as that is possible."""
+    later: dict[Subject, dict[Subject, None]] = {}
+    for diagram in diagrams:
+        names = [(node.automaton, node.variable) for node in diagram.nodes]
+        for place in reversed(range(len(names))):
+            below = later.setdefault(names[place], {})
+            below |= {names[child - 2]: None for child in diagram.nodes[place].children if child > 1}
+    try:
+        return tuple(reversed(tuple(TopologicalSorter(later).static_order())))
+    except CycleError:
+        return tuple(later)
+
+
+def _classes(nodes: Sequence[DecisionNode], count: int, effort: Effort) -> list[Indices]:
+    """The indices of a place's values in classes that none of its nodes tells apart, in the order of their first."""
+    starts = sorted({start for node in nodes for start in node.starts})
+    if len(starts) > MAXIMUM_RUNS:
+        raise GaveUp
+    effort.spend(len(starts) * len(nodes))
+    found: dict[tuple[int, ...], list[range]] = {}
+    for start, end in pairwise([*starts, count]):
+        signature = tuple(node.children[bisect_right(node.starts, start) - 1] for node in nodes)
+        found.setdefault(signature, []).append(range(start, end))
+    return [merged(runs) for runs in found.values()]

@@ -1,0 +1,151 @@
+"""The supervisor's conditions in the model's words: a short formula, else the decision diagram node by node.
+
+The diagram is told as numbered lines that read from the top down, each in the language's own `if ... then ... else`,
+where `[n]` stands for line n; a line is told once however often it is needed, so the text is never larger than the
+diagram.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from robosc.expressions import Expression
+from robosc.expressions.text import expression_text
+from robosc.supervisor.diagram import Domains
+from robosc.supervisor.formula import OPERANDS, to_expression
+from robosc.supervisor.literals import Indices, Membership, membership, merged
+from robosc.supervisor.multivalued import Effort
+from robosc.supervisor.structure import DecisionDiagram, DecisionNode
+
+SHORT = 12
+"""Operands up to which a formula is always preferred to its diagram; a longer one only if the diagram has as many."""
+
+TOTAL_STEPS = 500_000
+"""Steps that the search for the formulas of one supervisor may take: about two seconds."""
+
+Target = bool | int
+"""Where a case leads: the outcome, or the number of a line."""
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One node of a diagram.
+
+    Attributes:
+        number: Its number: the root is 1, and lines lead to later ones.
+        cases: Tests of one place, and where the one that is true leads.
+        otherwise: Where it leads if none is.
+    """
+
+    number: int
+    cases: tuple[tuple[Membership, Target], ...]
+    otherwise: Target
+
+    def __str__(self) -> str:
+        if [target for _, target in self.cases] == [True] and self.otherwise is False:
+            return f"[{self.number}] {_negated(self.cases[0][0].text)}"
+        cases = "".join(f"if {_negated(test.text)} then {_target(target)} else " for test, target in self.cases)
+        return f"[{self.number}] {cases}{_target(self.otherwise)}"
+
+    def json(self) -> dict[str, object]:
+        """The line as JSON values."""
+        cases = [{"if": _negated(test.text), "then": target} for test, target in self.cases]
+        return {"node": self.number, "cases": cases, "else": self.otherwise}
+
+    @property
+    def operands(self) -> int:
+        """The tests that it writes down."""
+        return sum(test.size[0] for test, _ in self.cases)
+
+
+def _target(target: Target) -> str:
+    return str(target).lower() if isinstance(target, bool) else f"[{target}]"
+
+
+class Formulas:
+    """The formulas of one supervisor's diagrams, found with a bounded effort for all of them together.
+
+    Args:
+        domains: What the places of the state can hold.
+
+    Attributes:
+        domains: The same.
+        effort: What the search may still take.
+    """
+
+    def __init__(self, domains: Domains) -> None:
+        self.domains = domains
+        self.effort = Effort(TOTAL_STEPS)
+        self._known: dict[DecisionDiagram, Expression | None] = {}
+
+    def formula(self, diagram: DecisionDiagram) -> Expression | None:
+        """A formula that reads better than its diagram, or None where none was found."""
+        if diagram not in self._known:
+            tests = sum(line.operands for line in diagram_lines(diagram, self.domains))
+            limit = min(OPERANDS, max(SHORT, tests))
+            self._known[diagram] = to_expression(diagram, self.domains, limit=limit, effort=self.effort)
+        return self._known[diagram]
+
+
+def in_words(condition: Expression) -> str:
+    """A condition of a supervisor, as a user would write it, with `not` for the language's `!`."""
+    return _negated(expression_text(condition))
+
+
+def _negated(text: str) -> str:
+    # Neither a name nor a number has an exclamation mark in it.
+    return re.sub("!(?!=)", "not ", text)
+
+
+def size_in_words(diagram: DecisionDiagram) -> str:
+    """How large a diagram is."""
+    count = len(diagram.nodes)
+    return f"a decision diagram of {count} node{'s' if count != 1 else ''}"
+
+
+def diagram_lines(diagram: DecisionDiagram, domains: Domains) -> tuple[Line, ...]:
+    """A diagram node by node, the root first; a node that decides nothing is left out for what it leads to."""
+    branches, leads_to = _branches(diagram, domains)
+    root = leads_to[diagram.root]
+    needed = {root}
+    for number in reversed(range(2, len(leads_to))):
+        if number in needed:
+            needed |= branches[number].keys()
+    # Children stand before their parents in a diagram, and after them in the text.
+    order = sorted((number for number in needed if number > 1), reverse=True)
+    numbers = {number: place for place, number in enumerate(order, start=1)}
+    return tuple(
+        _line(diagram.nodes[number - 2], branches[number], numbers, numbers[number], domains) for number in order
+    )
+
+
+Branches = dict[int, Indices]
+"""For each child of a node the indices that lead to it."""
+
+
+def _branches(diagram: DecisionDiagram, domains: Domains) -> tuple[list[Branches], list[int]]:
+    """For each number its branches, and the number that it comes to where nodes decide nothing."""
+    found: list[Branches] = [{}, {}]
+    leads_to = [0, 1]
+    for number, node in enumerate(diagram.nodes, start=2):
+        runs: dict[int, list[range]] = {}
+        ends = (*node.starts[1:], len(domains[node.automaton, node.variable]))
+        for start, end, child in zip(node.starts, ends, node.children, strict=True):
+            runs.setdefault(leads_to[child], []).append(range(start, end))
+        found.append({child: merged(parts) for child, parts in runs.items()})
+        leads_to.append(number if len(runs) > 1 else next(iter(runs)))
+    return found, leads_to
+
+
+def _line(node: DecisionNode, branches: Branches, numbers: Mapping[int, int], number: int, domains: Domains) -> Line:
+    subject = (node.automaton, node.variable)
+    tests = [(membership(subject, domains[subject], where), child) for child, where in branches.items()]
+    # The longest test goes without saying; where all is decided, what it takes to be true is told.
+    is_decided = all(child < 2 for child in branches)
+    *cases, (_, last) = sorted(tests, key=lambda case: (-case[1] if is_decided else 0, case[0].size))
+    told = tuple((test, _reached(child, numbers)) for test, child in cases)
+    return Line(number, told, _reached(last, numbers))
+
+
+def _reached(child: int, numbers: Mapping[int, int]) -> Target:
+    return bool(child) if child < 2 else numbers[child]

@@ -1,0 +1,125 @@
+"""Models whose supervisors' conditions are written down in words.
+
+`python tests/robosc/supervisor/test_golden.py` writes them anew; look at what has changed before it is kept.
+"""
+
+import sys
+from functools import cache
+from itertools import product
+from pathlib import Path
+
+import pytest
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from robosc.automata import System, to_automata
+from robosc.expressions import Expression, StateTest, Value, VariableRead, leaves
+from robosc.expressions.evaluate import evaluate as evaluate_expression
+from robosc.model import check
+from robosc.supervisor import Supervisor, make_supervisor
+from robosc.supervisor.diagram import Domains, Subject, diagram_domains, evaluate
+from robosc.supervisor.structure import DecisionDiagram
+from robosc.supervisor.summary import added_lines, added_texts, summary_json
+from robosc.supervisor.words import Formulas, in_words
+from support.models import bundle_of
+
+FOLDER = Path(__file__).parent / "golden"
+MODELS = sorted(FOLDER.glob("*.rscd"))
+
+
+@cache
+def made(path: Path, engine: str = "autoref") -> tuple[Supervisor, System]:
+    supervisor = make_supervisor(bundle_of(path.read_text(encoding="utf-8")), engine=engine).supervisor
+    assert supervisor is not None
+    return supervisor, to_automata(supervisor.model, supervisor.deployment)
+
+
+def words(supervisor: Supervisor, system: System) -> str:
+    return "".join(f"{line}\n" for line in added_lines(supervisor, system))
+
+
+@pytest.mark.parametrize("engine", ["cudd", "autoref"])
+@pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
+def test_conditions_in_words(path: Path, engine: str) -> None:
+    if engine == "cudd":
+        pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+    assert words(*made(path, engine)) == path.with_suffix(".txt").read_text(encoding="utf-8")
+
+
+def test_there_are_models_of_every_kind() -> None:
+    texts = {path.stem: path.with_suffix(".txt").read_text(encoding="utf-8") for path in MODELS}
+    assert len(texts) >= 10
+    assert "LidarSensor.safe_distance and not EmergencyStop.stopped" in texts["safe_distance"]
+    together = "".join(texts.values())
+    for part in (" <= ", " >= ", " != ", " or ", "false", "nothing", "decision diagram", ".reset", ".cancel", ".tau_"):
+        assert part in together, part
+
+
+def same_everywhere(system: System, formula: Expression, diagram: DecisionDiagram) -> None:
+    """Every valuation of the places that either names: the formula is true where the diagram is."""
+    domains = diagram_domains(system)
+    named = [(node.automaton, node.variable) for node in diagram.nodes]
+    for leaf in leaves(formula):
+        if isinstance(leaf, StateTest):
+            named.append((leaf.component, None))
+        if isinstance(leaf, VariableRead):
+            named.append((leaf.component, leaf.variable))
+    places: list[Subject] = list(dict.fromkeys(named))
+    for indices in product(*(range(len(domains[place])) for place in places)):
+        state = dict(zip(places, indices, strict=True))
+        assert _plain(formula, state, domains) is _holds(diagram, state)
+
+
+def _plain(formula: Expression, state: dict[Subject, int], domains: Domains) -> object:
+    def value(automaton: str, variable: str | None) -> Value:
+        return domains[automaton, variable][state[automaton, variable]]
+
+    return evaluate_expression(formula, value, lambda automaton: str(value(automaton, None)))
+
+
+def _holds(diagram: DecisionDiagram, state: dict[Subject, int]) -> bool:
+    return evaluate(diagram, lambda automaton, variable: state[automaton, variable])
+
+
+def test_only_so_many_lines_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    supervisor, system = made(FOLDER / "parity.rscd")
+    monkeypatch.setattr("robosc.supervisor.summary._LINES", 10)
+    assert words(supervisor, system).splitlines()[-1] == (
+        "shut.request    a decision diagram of 11 nodes; --json tells it node by node"
+    )
+    diagrams = summary_json(supervisor)["diagrams"]
+    assert isinstance(diagrams, dict)
+    assert diagrams["shut.request"][0] == {"node": 1, "cases": [{"if": "S1.off", "then": 3}], "else": 2}
+    assert diagrams["shut.request"][-1] == {"node": 11, "cases": [{"if": "S6.off", "then": True}], "else": False}
+
+
+@pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
+def test_what_is_printed_is_what_is_stored(path: Path) -> None:
+    """Each formula, put into the model as a requirement where it can be, means the stored diagram."""
+    supervisor, system = made(path)
+    text = path.read_text(encoding="utf-8")
+    request = next(item.name for item in supervisor.model.communications if item.request is not None)
+    diagrams = summary_json(supervisor)["diagrams"]
+    assert isinstance(diagrams, dict)
+    for event, told in added_texts(supervisor, system).items():
+        diagram = supervisor.added_condition(event) or DecisionDiagram((), 1)
+        if event in diagrams:
+            assert told == f"a decision diagram of {len(diagram.nodes)} nodes"
+            assert len(diagrams[event]) == len(diagram.nodes)
+            continue
+        if any(" " in node.automaton for node in diagram.nodes):
+            # No requirement can name where a service stands.
+            formula = Formulas(diagram_domains(system)).formula(diagram)
+            assert formula is not None
+            assert in_words(formula) == told
+            same_everywhere(system, formula, diagram)
+            continue
+        needs = f"requirement {request} needs {told.replace('not ', '!')}\n}}"
+        model = check(bundle_of(text.rstrip().removesuffix("}") + needs)).model_or_raise()
+        same_everywhere(system, model.requirements[-1].expression, diagram)
+
+
+if __name__ == "__main__":
+    for model in MODELS:
+        model.with_suffix(".txt").write_text(words(*made(model)), encoding="utf-8")

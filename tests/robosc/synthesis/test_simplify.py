@@ -1,0 +1,123 @@
+"""Simplified conditions against the slow way: every valuation, every reachable state, both engines."""
+
+import sys
+from itertools import product
+from math import prod
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robosc.automata import System
+from robosc.automata.semantics import Semantics
+from robosc.automata.state import subjects
+from robosc.expressions import Expression
+from robosc.expressions.evaluate import evaluate as evaluate_expression
+from robosc.supervisor.conditions import state_predicates
+from robosc.supervisor.diagram import diagram_domains, validate
+from robosc.supervisor.structure import AddedCondition, DecisionDiagram
+from robosc.supervisor.words import Formulas, in_words
+from robosc.synthesis import SynthesisStatus, simplify, synthesize
+from robosc.synthesis.diagrams import extract
+from robosc.synthesis.nodes import restrict
+from robosc.verification import synthesize_explicit
+from support.families import FAMILIES
+from support.random_systems import random_system
+
+MOST_STATES = 2_000
+
+
+def plain(system: System, formula: Expression, state: tuple[Any, ...]) -> Any:
+    values = {(place.automaton, place.variable): value for place, value in zip(subjects(system), state, strict=True)}
+    return evaluate_expression(formula, lambda a, v: values[a, v], lambda a: str(values[a, None]))
+
+
+def check_conditions(system: System, added: tuple[AddedCondition, ...]) -> None:
+    """Conditions are right wherever it matters, and their formulas are the conditions everywhere."""
+    explicit = synthesize_explicit(system, limit=50_000)
+    assert explicit is not None
+    semantics = Semantics(system)
+    predicates = state_predicates(system, added)
+    for event, holds in predicates.items():
+        for state in explicit.reachable:
+            if semantics.enabled(state, event) and semantics.condition(state, event):
+                assert holds(state) == explicit.allows(state, event), (event, state)
+    domains = diagram_domains(system)
+    if prod(map(len, domains.values())) > MOST_STATES:
+        return
+    formulas = Formulas(domains)
+    for item in added:
+        validate(item.condition, domains)
+        formula = formulas.formula(item.condition)
+        if formula is not None:
+            for state in product(*domains.values()):
+                assert plain(system, formula, state) is predicates[item.event](state), (item.event, state)
+
+
+@settings(max_examples=15, deadline=None, derandomize=True)
+@given(st.integers(0, 2**32 - 1))
+def test_random_systems(seed: int) -> None:
+    system = random_system(seed)
+    found = synthesize(system, engine="autoref")
+    if found.status is SynthesisStatus.SUPERVISOR:
+        check_conditions(system, found.added)
+
+
+@pytest.mark.parametrize(("family", "size"), [("dining philosophers", 3), ("cat and mouse, 1 pair", 2)])
+@pytest.mark.parametrize("bound", ["MAXIMUM_NODES", "MAXIMUM_KEPT_NODES", "MAXIMUM_SUBJECTS", "STEPS"])
+def test_what_is_given_up_is_right_all_the_same(
+    family: str, size: int, bound: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    system = FAMILIES[family](size)
+    best = synthesize(system, engine="autoref").added
+    monkeypatch.setattr(simplify, bound, 0)
+    found = synthesize(system, engine="autoref").added
+    assert [item.event for item in found] == [item.event for item in best]
+    check_conditions(system, found)
+    assert length(system, found) > length(system, best)
+
+
+def length(system: System, added: tuple[AddedCondition, ...]) -> int:
+    formulas = Formulas(diagram_domains(system))
+    found = [formulas.formula(item.condition) for item in added]
+    return sum(len(str(formula)) for formula in found)
+
+
+@settings(max_examples=15, deadline=None, derandomize=True)
+@given(st.integers(0, 2**32 - 1))
+def test_formulas_are_never_longer_than_after_restricting_alone(seed: int) -> None:
+    """The candidate that restricting gives is always among those that are compared."""
+
+    class Watched(simplify.Simplifier):
+        def condition(self, wanted: Any, care: Any) -> DecisionDiagram | None:
+            chosen = super().condition(wanted, care)
+            if chosen is not None and chosen.nodes:
+                first = extract(self._encoding, restrict(self._manager, wanted, care))
+                plain = extract(self._encoding, wanted & self._encoding.valid_states())
+                assert self._length(chosen) <= max(self._length(first), self._length(plain))
+            return chosen
+
+    with pytest.MonkeyPatch.context() as patch:
+        # The package has a function of its module's name.
+        patch.setattr(sys.modules["robosc.synthesis.synthesize"], "Simplifier", Watched)
+        synthesize(random_system(seed), engine="autoref")
+
+
+@pytest.mark.parametrize(
+    ("family", "size", "event", "words"),
+    [
+        ("transfer line", 2, "m0b_start", "b0b.n = 0"),
+        ("transfer line", 2, "m0a_start", "b0a.n <= 1 or t0.idle and b0a.n = 2"),
+        ("counter", 40, "fill", "tank.n <= 35"),
+        ("cat and mouse, 1 pair", 1, "cat0_0_3_4", "false"),
+        ("cat and mouse, 2 pairs", 1, "cat0_0_2_0", "mouse0.r0_4 and mouse1.r0_4"),
+        ("dining philosophers", 5, "p1_takes_f2", "not (p0.right and p2.right and p4.right and f4.used)"),
+    ],
+)
+def test_families_in_words(family: str, size: int, event: str, words: str) -> None:
+    system = FAMILIES[family](size)
+    added = {item.event: item.condition for item in synthesize(system).added}
+    formula = Formulas(diagram_domains(system)).formula(added[event])
+    assert formula is not None
+    assert in_words(formula) == words

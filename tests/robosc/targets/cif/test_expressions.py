@@ -41,7 +41,7 @@ def assert_same(requirement: str = "true", update: str = "n := 1") -> None:
         "C.n + 2147483640 > C.m - 2000000000",
         "2147483647 - C.n > 5",
         "C.n * 2000000000 - C.n * 2000000000 = 0",
-        "C.n * 1073741823 > C.m * -1073741823",
+        "C.m * 1073741823 > (if C.flag then 1 else 0) * -1073741823",
         "abs(C.n) = max(C.m, 1) and clamp(C.n, -1, C.m) < 1",
         "(1 / double(C.n) > 0) => (1 / double(C.m) > 0)",
         "!((1 / double(C.n) > 0) => (1 / double(C.m) > 0))",

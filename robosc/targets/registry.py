@@ -61,6 +61,10 @@ class UnknownTargetError(RoboscError, LookupError):
 
 # Name, description and place of the built-in targets: listing them imports none.
 _BUILT_IN: dict[str, tuple[str, str]] = {
+    "cif": (
+        "the synthesis problem and the controlled system in CIF, for Eclipse ESCET",
+        "robosc.targets.cif:TARGET",
+    ),
     "python": (
         "the supervisor and its executor as a Python package without any dependency",
         "robosc.targets.python:TARGET",

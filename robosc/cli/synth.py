@@ -65,7 +65,7 @@ def report_synthesis(arguments: argparse.Namespace, made: "Made", bundle: Bundle
         print_json(
             {
                 "status": str(made.status),
-                "reason": made.reason,
+                **reasons_json(made),
                 "summary": summary_json(made.supervisor) if made.supervisor else None,
                 "file": str(arguments.output) if made.supervisor and arguments.output else None,
                 **diagnostics_json(made.diagnostics),
@@ -83,5 +83,21 @@ def report_synthesis(arguments: argparse.Namespace, made: "Made", bundle: Bundle
 def report_problems(made: "Made", bundle: Bundle) -> None:
     """Findings and, where there is no supervisor, why, on standard error."""
     print_diagnostics(made.diagnostics, bundle)
+    report_reasons(made, bundle)
+
+
+def report_reasons(made: "Made", bundle: Bundle) -> None:
+    """Where there is no supervisor, why, on standard error."""
+    from robosc.explanation import empty_text
+
     if made.reason:
         sys.stderr.write(f"{bundle.main.name}: {made.reason}\n")
+    if made.explanation is not None:
+        sys.stderr.write(empty_text(made.explanation))
+
+
+def reasons_json(made: "Made") -> dict[str, object]:
+    """Why there is no supervisor, as JSON values."""
+    from robosc.explanation import document
+
+    return {"reason": made.reason, "explanation": document(made.explanation) if made.explanation else None}

@@ -92,6 +92,10 @@ class FixedPoint:
             if good == before or (is_closed and good == nonblocking):
                 return GoodStates(good, rounds)
 
+    def nonblocking_states(self, problem: Problem, states: Any) -> Any:
+        """Those of some states that reach a marked one through transitions that stay in them."""
+        return self._nonblocking(problem, states, self._encoding.manager.false)
+
     def _is_lost(self, good: Any) -> bool:
         return bool(self.initial & good == self._encoding.manager.false)
 

@@ -3,7 +3,7 @@
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from robosc.cli.arguments import add_deployment_argument, add_engine_argument, add_model_arguments, read_bundle
 from robosc.cli.output import ExitCode, ProgressLine, diagnostics_json, print_diagnostics, print_json, write_bytes
@@ -11,7 +11,20 @@ from robosc.model.structure import Deployment
 from robosc.source import Bundle
 
 if TYPE_CHECKING:
+    from robosc.explanation import EmptyExplanation
     from robosc.supervisor import Made
+
+
+class Reasons(Protocol):
+    """Whatever knows why there is no supervisor."""
+
+    @property
+    def reason(self) -> str:
+        """Why, in one sentence; empty where there is one."""
+
+    @property
+    def explanation(self) -> "EmptyExplanation | None":
+        """What is to blame where none exists."""
 
 
 def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -86,7 +99,7 @@ def report_problems(made: "Made", bundle: Bundle) -> None:
     report_reasons(made, bundle)
 
 
-def report_reasons(made: "Made", bundle: Bundle) -> None:
+def report_reasons(made: Reasons, bundle: Bundle) -> None:
     """Where there is no supervisor, why, on standard error."""
     from robosc.explanation import empty_text
 
@@ -96,7 +109,7 @@ def report_reasons(made: "Made", bundle: Bundle) -> None:
         sys.stderr.write(empty_text(made.explanation))
 
 
-def reasons_json(made: "Made") -> dict[str, object]:
+def reasons_json(made: Reasons) -> dict[str, object]:
     """Why there is no supervisor, as JSON values."""
     from robosc.explanation import document
 

@@ -14,7 +14,7 @@ LIMIT = 2_000
 
 @lru_cache(maxsize=4096)
 def empty_system(seed: int) -> System:
-    """The first of some systems without a supervisor; of every other seed, all locations are marked: it never blocks."""
+    """The first of some systems without a supervisor; of every other seed, all locations are marked."""
     random = Random(seed)
     while True:
         system = _with_invariants(_Builder(random).system(), random)

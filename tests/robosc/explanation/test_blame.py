@@ -23,7 +23,7 @@ from robosc.verification import synthesize_explicit
 from support.empty_systems import empty_system
 
 ENGINES = ("cudd", "autoref")
-EXAMPLES = int(os.environ.get("ROBOSC_RANDOM_SYSTEMS", "40"))
+EXAMPLES = int(os.environ.get("ROBOSC_RANDOM_SYSTEMS", "30"))
 LIMIT = 50_000
 
 
@@ -214,8 +214,8 @@ def _check_detour(system: System, search: Search, trouble: Trouble, last: State,
         state = queue.popleft()
         if free.is_marked(state):
             found = distances[state]
-        for event in system.events:
-            for target in free.targets(state, event.name):
+        for each in system.events:
+            for target in free.targets(state, each.name):
                 if target not in distances:
                     distances[target] = distances[state] + 1
                     queue.append(target)

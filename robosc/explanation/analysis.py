@@ -231,7 +231,6 @@ class Analysis:
             run = self.runs(start, anything).run_to(self._troubled)
         if run is None:
             raise InternalError("a state that must be avoided does not run into trouble")
-        is_forced = is_forced or not run.events
         return self._named(run, is_forced)
 
     def _restricted(self, steps: Steps) -> Any:

@@ -9,6 +9,9 @@ from robosc.explanation.terms import Terms
 from robosc.explanation.words import value_text
 from robosc.synthesis.runs import Run
 
+MAXIMUM_REASONS = 20
+"""Reasons, and parts that are broken, that are told of one state: thousands would tell nothing more."""
+
 
 class Reporter:
     """Words for the answers of one analysis.
@@ -37,28 +40,30 @@ class Reporter:
 
     def stopped(self, item: Detour, good: Any) -> Stopped:
         """A way of the behaviours, and where it is stopped."""
-        reasons = tuple(self.reason(hindrance, item.state, good) for hindrance in item.hindrances)
+        reasons = tuple(self.reason(hindrance, item.state, good) for hindrance in item.hindrances[:MAXIMUM_REASONS])
         return Stopped(item.events, item.stopped_at, self._terms.state(item.state), reasons)
 
     def trouble(self, item: Trouble) -> TroubleReport:
         """A run into trouble."""
         state = item.run.states[-1]
-        parts = [self._terms.invariant_part(place) for place in item.invariants]
+        parts = [self._terms.invariant_part(place) for place in item.invariants[:MAXIMUM_REASONS]]
         messages = [f"'{part.text}' is broken" for part in parts]
-        for event, obstacle in item.leaving:
+        for event, obstacle in item.leaving[:MAXIMUM_REASONS]:
             part = self._terms.part(obstacle)
             subject = str(obstacle.range)
             value = self._terms.state(state).variables[subject]
             messages.append(f"{event} can take {subject}, which is {value_text(value)}, out of its range")
             parts.append(part)
-        for event, place in item.forbidden:
+        for event, place in item.forbidden[:MAXIMUM_REASONS]:
             part = self._terms.condition_part(place)
             messages.append(f"{event} cannot be prevented, against '{part.text}'")
             parts.append(part)
         stopped = None
         if item.is_blocking:
-            names = [self._terms.automaton(name) for name in item.unmarked]
-            parts += [self._terms.automaton_part(name) for name in item.unmarked]
+            unmarked = item.unmarked[:MAXIMUM_REASONS]
+            names = [self._terms.automaton(name) for name in unmarked]
+            names += ["..."] if len(unmarked) < len(item.unmarked) else []
+            parts += [self._terms.automaton_part(name) for name in unmarked]
             whose = f"; not marked now: {', '.join(names)}" if names else ""
             messages.append(f"no marked state can be reached from there{whose}")
             if item.detour is None:

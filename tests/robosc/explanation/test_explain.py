@@ -145,6 +145,19 @@ def test_a_state_that_blocks() -> None:
     ]
 
 
+def test_a_way_that_the_environment_leads_into_trouble() -> None:
+    """The only way to the marked state goes through one that must never be."""
+    text = """component C { outgoing message slip with type: none incoming message go with type: none
+        behaviour { initial state a { on response from slip goto b } state b { on request to go goto c }
+        marked state c { } } }"""
+    explanation = explained(robot(text, "requirement never C.b")).empty
+    assert explanation is not None
+    stopped = explanation.trouble.stopped
+    assert stopped is not None
+    assert (stopped.events, stopped.stopped_at) == (("slip.response", "go.request"), 0)
+    assert (stopped.state.components, stopped.reasons) == ({"C": "a"}, ())
+
+
 def test_a_condition_on_cancel_that_is_to_blame() -> None:
     motor = """component Motor {
         action drive with request: none, response: none, feedback: none links i
@@ -280,6 +293,16 @@ def test_in_a_state_and_after_a_run() -> None:
     assert report is not None
     assert [(item.event, item.can_happen, item.reasons) for item in report.events] == [("ring.request", True, ())]
     # All events where nothing is asked for.
+
+
+def test_of_the_states_that_fit_one_is_shown_in_which_the_event_cannot_happen() -> None:
+    report = explained(robot(LIFT), event="bottom", state="Lift.off").state
+    assert report is not None
+    assert (report.way.events, report.fitting) == (("arm.request", "up.response"), "3")
+    assert [item.can_happen for item in report.events] == [False]
+    report = explained(robot(LIFT), event="bottom", state="Lift.off, Lift.n = 0").state
+    assert report is not None
+    assert (report.way.events, report.events[0].can_happen) == ((), True)
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ What a server answers is not trusted: numbers, enums and paths are checked here.
 from collections.abc import Iterable
 
 from robosc.errors import Diagnostic, RelatedPlace, Severity
+from robosc.explanation import EmptyExplanation, from_text
 from robosc.model.structure import Deployment
 from robosc.source import Bundle, Location, SourceFile
 from robosc.targets import GeneratedFiles
@@ -85,6 +86,7 @@ def progress_or_synthesis(response: pb.SynthesizeResponse) -> Progress | Synthes
         supervisor=result.supervisor,
         summary=_summary(result.summary) if result.HasField("summary") else None,
         statistics=_statistics(result.statistics) if result.HasField("statistics") else None,
+        explanation=_explanation(result.explanation),
     )
 
 
@@ -103,7 +105,16 @@ def generation(response: pb.GenerateResponse) -> Generation:
             files = GeneratedFiles(texts, programs)
         except ValueError as error:
             raise ServiceError(f"the server's answer is malformed: {error}") from error
-    return Generation(status, diagnostics(response.diagnostics), response.reason, files)
+    explanation = _explanation(response.explanation)
+    return Generation(status, diagnostics(response.diagnostics), response.reason, files, explanation)
+
+
+def _explanation(text: str) -> EmptyExplanation | None:
+    """What is to blame, or None where nothing is told."""
+    try:
+        return from_text(text) if text else None
+    except ValueError as error:
+        raise ServiceError(f"the server's answer is malformed: {error}") from error
 
 
 def _bundle(bundle: Bundle) -> pb.Bundle:

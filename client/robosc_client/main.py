@@ -16,11 +16,11 @@ from robosc.cli.generate import add_generate_arguments, report_generated
 from robosc.cli.main import guarded
 from robosc.cli.output import ExitCode, ProgressLine
 from robosc.cli.synth import add_output_argument, report_synthesis
-from robosc.errors import Diagnostic, InvalidSupervisorError, LanguageError, UnsupportedModelError
+from robosc.errors import InvalidSupervisorError, LanguageError, UnsupportedModelError
 from robosc.model.structure import Deployment
 from robosc.source import Bundle
 from robosc.supervisor import Made, MadeStatus, decode
-from robosc_client import Client, ClientError, ServiceError, SynthesisStatus
+from robosc_client import Client, ClientError, Generation, ServiceError, Synthesis, SynthesisStatus
 
 _EPILOG = """\
 exit status:
@@ -136,7 +136,7 @@ def _synth(arguments: argparse.Namespace, client: Client) -> int:
         )
     finally:
         line.clear()
-    made = _made(synthesis.status, synthesis.diagnostics, synthesis.reason, synthesis.supervisor)
+    made = _made(synthesis, synthesis.supervisor)
     return report_synthesis(arguments, made, bundle)
 
 
@@ -149,24 +149,30 @@ def _generate(arguments: argparse.Namespace, client: Client) -> int:
         engine=arguments.engine,
         deadline_s=arguments.deadline,
     )
-    made = _made(generation.status, generation.diagnostics, generation.reason, b"")
+    made = _made(generation, b"")
     return report_generated(arguments, made, generation.files, bundle)
 
 
-def _made(status: SynthesisStatus, diagnostics: tuple[Diagnostic, ...], reason: str, content: bytes) -> Made:
+def _made(result: Synthesis | Generation, content: bytes) -> Made:
     """What the server made, as `robosc` itself reports it.
 
     Raises:
         UnsupportedModelError: The model is correct, but cannot be handled.
         ServiceError: The server's supervisor is no valid one.
     """
-    if status is SynthesisStatus.UNSUPPORTED_MODEL:
-        raise UnsupportedModelError(reason)
+    if result.status is SynthesisStatus.UNSUPPORTED_MODEL:
+        raise UnsupportedModelError(result.reason)
     try:
         supervisor = decode(content) if content else None
     except InvalidSupervisorError as error:
         raise ServiceError(f"the server's supervisor is refused: {error}") from error
-    return Made(MadeStatus(str(status)), supervisor, diagnostics, reason=reason)
+    return Made(
+        MadeStatus(str(result.status)),
+        supervisor,
+        result.diagnostics,
+        reason=result.reason,
+        explanation=result.explanation,
+    )
 
 
 if __name__ == "__main__":

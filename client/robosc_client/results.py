@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from robosc.errors import Diagnostic
+from robosc.explanation import EmptyExplanation
 from robosc.targets import GeneratedFiles
 
 
@@ -80,6 +81,7 @@ class Synthesis:
             `robosc.supervisor.decode`, which validates it.
         summary: The supervisor in figures and words, or None where there is none.
         statistics: Figures of the work, or None where there was no synthesis.
+        explanation: What is to blame that no supervisor exists, or None where there is nothing to explain.
     """
 
     status: SynthesisStatus
@@ -88,6 +90,7 @@ class Synthesis:
     supervisor: bytes
     summary: Summary | None
     statistics: Statistics | None
+    explanation: EmptyExplanation | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,9 +102,11 @@ class Generation:
         diagnostics: Every finding about the model, sorted by place.
         reason: Why there are no files, in one sentence; empty where there are.
         files: The files, or None where there are none; `robosc.targets.write_files` writes them.
+        explanation: What is to blame that no supervisor exists, or None where there is nothing to explain.
     """
 
     status: SynthesisStatus
     diagnostics: tuple[Diagnostic, ...]
     reason: str
     files: GeneratedFiles | None
+    explanation: EmptyExplanation | None = None

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from robosc.cli import synth
 from robosc.cli.arguments import add_deployment_argument, add_engine_argument, add_model_arguments, read_bundle
@@ -20,6 +21,9 @@ from robosc.cli.output import (
 from robosc.errors import Diagnostic, LanguageError, UnsupportedModelError
 from robosc.model.structure import Deployment
 from robosc.source import Bundle
+
+if TYPE_CHECKING:
+    from robosc.explanation import EmptyExplanation
 
 
 def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -74,12 +78,14 @@ class _Synthesized:
         status: What became of the synthesis.
         reason: Why there is no supervisor; empty where there is one.
         has_failed: Whether a robot without errors has no supervisor.
+        explanation: What is to blame where no supervisor exists.
     """
 
     diagnostics: tuple[Diagnostic, ...]
     status: str
     reason: str
     has_failed: bool
+    explanation: "EmptyExplanation | None" = None
 
 
 def _synthesized(arguments: argparse.Namespace, bundle: Bundle) -> _Synthesized:
@@ -90,15 +96,16 @@ def _synthesized(arguments: argparse.Namespace, bundle: Bundle) -> _Synthesized:
         made = synth.make(arguments, bundle)
     except UnsupportedModelError as error:
         return _Synthesized(_checked(bundle), "unsupported model", str(error), has_failed=True)
-    return _Synthesized(made.diagnostics, str(made.status), made.reason, has_failed=made.status is MadeStatus.EMPTY)
+    has_failed = made.status is MadeStatus.EMPTY
+    return _Synthesized(made.diagnostics, str(made.status), made.reason, has_failed, made.explanation)
 
 
 def _report_synthesized(arguments: argparse.Namespace, found: _Synthesized, bundle: Bundle) -> ExitCode:
     """Print the findings and what became of the synthesis as asked, and return the exit status."""
-    told = {"status": found.status, "reason": found.reason}
+    told = {"status": found.status, **synth.reasons_json(found)}
     status = report_check(arguments, found.diagnostics, bundle, told)
-    if found.reason and not arguments.json:
-        sys.stderr.write(f"{bundle.main.name}: {found.reason}\n")
+    if not arguments.json:
+        synth.report_reasons(found, bundle)
     return ExitCode.FAILED if found.has_failed else status
 
 

@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
     made = synth.make(arguments, bundle)
     if made.supervisor is None:
         if arguments.json:
-            print_json({"status": str(made.status), "reason": made.reason, **diagnostics_json(made.diagnostics)})
+            print_json({"status": str(made.status), **synth.reasons_json(made), **diagnostics_json(made.diagnostics)})
         else:
             synth.report_problems(made, bundle)
         return ExitCode.FAILED

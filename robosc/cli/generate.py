@@ -72,7 +72,7 @@ def report_generated(
         print_json(
             {
                 "status": str(made.status),
-                "reason": made.reason,
+                **synth.reasons_json(made),
                 "target": arguments.target,
                 "folder": str(arguments.output),
                 "files": written,

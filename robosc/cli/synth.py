@@ -3,7 +3,7 @@
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from robosc.cli.arguments import (
     add_deployment_argument,
@@ -17,7 +17,20 @@ from robosc.model.structure import Deployment
 from robosc.source import Bundle
 
 if TYPE_CHECKING:
+    from robosc.explanation import EmptyExplanation
     from robosc.supervisor import Made
+
+
+class Reasons(Protocol):
+    """Whatever knows why there is no supervisor."""
+
+    @property
+    def reason(self) -> str:
+        """Why, in one sentence; empty where there is one."""
+
+    @property
+    def explanation(self) -> "EmptyExplanation | None":
+        """What is to blame where none exists."""
 
 
 def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -71,7 +84,7 @@ def report_synthesis(arguments: argparse.Namespace, made: "Made", bundle: Bundle
         print_json(
             {
                 "status": str(made.status),
-                "reason": made.reason,
+                **reasons_json(made),
                 "summary": summary_json(made.supervisor) if made.supervisor else None,
                 "file": str(arguments.output) if made.supervisor and arguments.output else None,
                 **diagnostics_json(made.diagnostics),
@@ -89,5 +102,21 @@ def report_synthesis(arguments: argparse.Namespace, made: "Made", bundle: Bundle
 def report_problems(made: "Made", bundle: Bundle) -> None:
     """Findings and, where there is no supervisor, why, on standard error."""
     print_diagnostics(made.diagnostics, bundle)
+    report_reasons(made, bundle)
+
+
+def report_reasons(made: Reasons, bundle: Bundle) -> None:
+    """Where there is no supervisor, why, on standard error."""
+    from robosc.explanation import empty_text
+
     if made.reason:
         sys.stderr.write(f"{bundle.main.name}: {made.reason}\n")
+    if made.explanation is not None:
+        sys.stderr.write(empty_text(made.explanation))
+
+
+def reasons_json(made: Reasons) -> dict[str, object]:
+    """Why there is no supervisor, as JSON values."""
+    from robosc.explanation import document
+
+    return {"reason": made.reason, "explanation": document(made.explanation) if made.explanation else None}

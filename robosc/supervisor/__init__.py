@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from robosc.supervisor.codec import decode, encode
-    from robosc.supervisor.make import Made, MadeStatus, Progress, make_supervisor
+    from robosc.supervisor.make import Made, MadeStatus, Prepared, Progress, make_supervisor, prepare
     from robosc.supervisor.structure import (
         AddedCondition,
         Certificate,
@@ -25,11 +25,13 @@ _HOMES = {
     "DecisionNode": "structure",
     "Made": "make",
     "MadeStatus": "make",
+    "Prepared": "make",
     "Progress": "make",
     "Supervisor": "structure",
     "decode": "codec",
     "encode": "codec",
     "make_supervisor": "make",
+    "prepare": "make",
     "summary_json": "summary",
     "summary_text": "summary",
 }
@@ -41,11 +43,13 @@ __all__ = [
     "DecisionNode",
     "Made",
     "MadeStatus",
+    "Prepared",
     "Progress",
     "Supervisor",
     "decode",
     "encode",
     "make_supervisor",
+    "prepare",
     "summary_json",
     "summary_text",
 ]

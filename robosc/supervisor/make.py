@@ -5,16 +5,19 @@ bundle gives the same supervisor wherever it is made.
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
 
 from robosc._version import __version__
 from robosc.automata import System, to_automata
 from robosc.automata.controlled import TRANSITIONS_PER_STATE
-from robosc.errors import Diagnostic, InternalError, sorted_diagnostics
+from robosc.errors import Diagnostic, InternalError, NodeLimitError, sorted_diagnostics
+from robosc.explanation import EmptyExplanation, explain_empty
 from robosc.model import check
 from robosc.model.layers import layer_findings
-from robosc.model.structure import Deployment
+from robosc.model.places import Places
+from robosc.model.structure import Deployment, Model
 from robosc.source import Bundle
 from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.structure import Certificate, CheckResult, Supervisor
@@ -70,6 +73,7 @@ class Made:
             can tell.
         statistics: Figures of the synthesis, or None where there was none.
         reason: Why there is no supervisor, in one sentence; empty where there is one.
+        explanation: What is to blame where no supervisor exists.
     """
 
     status: MadeStatus
@@ -77,6 +81,41 @@ class Made:
     diagnostics: tuple[Diagnostic, ...]
     statistics: Statistics | None = None
     reason: str = ""
+    explanation: EmptyExplanation | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """A model without errors, ready for synthesis.
+
+    Attributes:
+        model: The model.
+        places: Where its parts stand.
+        system: Its automata.
+        diagnostics: Every finding about it.
+    """
+
+    model: Model
+    places: Places
+    system: System
+    diagnostics: tuple[Diagnostic, ...]
+
+
+def prepare(bundle: Bundle, deployment: Deployment) -> Prepared | Made:
+    """The automata of a bundle's model, or how the attempt to make a supervisor of it ends before synthesis.
+
+    Raises:
+        UnsupportedModelError: The model is outside what synthesis handles.
+    """
+    checked = check(bundle)
+    if checked.model is None or checked.places is None:
+        reason = "" if checked.has_errors else "a library has no robot to make a supervisor for"
+        return Made(MadeStatus.MODEL_ERRORS, None, checked.diagnostics, reason=reason)
+    if deployment is Deployment.LAYER:
+        ambiguous = layer_findings(checked.model, checked.places)
+        if ambiguous:
+            return Made(MadeStatus.MODEL_ERRORS, None, sorted_diagnostics((*checked.diagnostics, *ambiguous)))
+    return Prepared(checked.model, checked.places, to_automata(checked.model, deployment), checked.diagnostics)
 
 
 def make_supervisor(
@@ -103,15 +142,10 @@ def make_supervisor(
         InternalError: The verifier found fault with the result.
     """
     on_progress(Progress("check", bundle.main.name))
-    checked = check(bundle)
-    if checked.model is None or checked.places is None:
-        reason = "" if checked.has_errors else "a library has no robot to make a supervisor for"
-        return Made(MadeStatus.MODEL_ERRORS, None, checked.diagnostics, reason=reason)
-    if deployment is Deployment.LAYER:
-        ambiguous = layer_findings(checked.model, checked.places)
-        if ambiguous:
-            return Made(MadeStatus.MODEL_ERRORS, None, sorted_diagnostics((*checked.diagnostics, *ambiguous)))
-    system = to_automata(checked.model, deployment)
+    prepared = prepare(bundle, deployment)
+    if isinstance(prepared, Made):
+        return prepared
+    model, places, system = prepared.model, prepared.places, prepared.system
 
     def report(progress: SynthesisProgress) -> None:
         on_progress(Progress("synthesis", str(progress)))
@@ -119,17 +153,29 @@ def make_supervisor(
     result = synthesize(
         system,
         engine=engine,
-        questions=questions_about(checked.model, system, deployment),
+        questions=questions_about(model, system, deployment),
         should_stop=should_stop,
         on_progress=report,
     )
     if result.status is SynthesisStatus.EMPTY:
         reason = f"no supervisor exists: {result.reason}"
-        return Made(MadeStatus.EMPTY, None, checked.diagnostics, result.statistics, reason)
+        explanation = None
+        # Whatever the limit of nodes, that there is no supervisor is known.
+        with suppress(NodeLimitError):
+            explanation = explain_empty(
+                model,
+                places,
+                system,
+                deployment=deployment,
+                engine=engine,
+                should_stop=should_stop,
+                on_progress=report,
+            )
+        return Made(MadeStatus.EMPTY, None, prepared.diagnostics, result.statistics, reason, explanation)
     on_progress(Progress("verification", f"{result.statistics.states} states"))
     certificate = _certify(system, result, bundle, deployment, should_stop)
-    supervisor = Supervisor(checked.model, deployment, result.added, certificate)
-    diagnostics = sorted_diagnostics((*checked.diagnostics, *findings(checked.model, checked.places, result.answers)))
+    supervisor = Supervisor(model, deployment, result.added, certificate)
+    diagnostics = sorted_diagnostics((*prepared.diagnostics, *findings(model, places, result.answers)))
     return Made(MadeStatus.SUPERVISOR, supervisor, diagnostics, result.statistics)
 
 

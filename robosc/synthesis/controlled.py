@@ -161,8 +161,8 @@ class ControlledSystem:
         if not pairs:
             return ()
         possible = {name: self._reachable & allowed(steps, self._good) for name, steps in self._steps.items()}
-        initial = initial_states(self._encoding) & self._good
-        runs = ShortestRuns(self._encoding, self._watch, initial, self._problem.steps, possible)
+        start = initial_states(self._encoding) & self._good
+        runs = ShortestRuns(self._encoding, self._watch, self._problem.steps, possible, start)
         return tuple(Together(first, second, runs.trace_to(states)) for first, second, states in pairs)
 
     def _pairs(self, groups: Iterable[Sequence[str]]) -> Iterator[tuple[str, str, Any]]:

@@ -75,6 +75,11 @@ class EngineOptions:
     maximum_nodes: int | None = None
 
 
+def engine_options(engine: str | EngineOptions) -> EngineOptions:
+    """The options of an engine that may be given by its name alone."""
+    return EngineOptions(engine) if isinstance(engine, str) else engine
+
+
 class UnknownEngineError(RoboscError, LookupError):
     """An engine that is not known or not installed."""
 
@@ -171,22 +176,36 @@ def limited(manager: Manager, maximum_nodes: int | None) -> Iterator[None]:
         raise node_limit_error(maximum_nodes)
 
 
+def node_check(manager: Manager, maximum_nodes: int | None) -> Callable[[], None]:
+    """What raises NodeLimitError once a manager has more nodes in use than it may."""
+
+    def check() -> None:
+        if maximum_nodes is not None and len(manager) > maximum_nodes and node_count_of(manager) > maximum_nodes:
+            raise node_limit_error(maximum_nodes)
+
+    return check
+
+
 def node_limit_error(maximum_nodes: int) -> NodeLimitError:
     """What is told when diagrams have become too large."""
     return NodeLimitError(f"the decision diagrams need more than the {maximum_nodes} nodes that they may have")
 
 
 @contextmanager
-def reordering(manager: Manager, order: Sequence[str]) -> Iterator[None]:
-    """Let an engine change the order of variables meanwhile; afterwards it is the given one again.
+def reordering(manager: Manager, order: Sequence[str], *, is_wanted: bool = True) -> Iterator[None]:
+    """Let an engine change the order of variables meanwhile, if that is wanted; afterwards it is the given one again.
 
     Args:
         manager: A manager.
         order: Its variables, topmost first.
+        is_wanted: Whether to do anything at all.
 
     Raises:
         UnknownEngineError: The engine cannot do that.
     """
+    if not is_wanted:
+        yield
+        return
     module = importlib.import_module(type(manager).__module__)
     if not hasattr(module, "reorder") or not hasattr(manager, "configure"):
         raise UnknownEngineError("this engine cannot change the order of variables")

@@ -57,6 +57,11 @@ def initial_states(encoding: Encoding) -> Any:
     return encoding.initial_places() & Symbols(encoding).holds(encoding.system.initial)
 
 
+def marked_states(encoding: Encoding) -> Any:
+    """The marked states."""
+    return encoding.marked_locations() & Symbols(encoding).holds(encoding.system.marker)
+
+
 class FixedPoint:
     """Works out good states and controlled systems.
 
@@ -70,7 +75,7 @@ class FixedPoint:
         self._watch = watch
         self.initial = initial_states(encoding)
         """The initial states."""
-        self._marked = encoding.marked_locations() & Symbols(encoding).holds(encoding.system.marker)
+        self._marked = marked_states(encoding)
 
     def good_states(self, problem: Problem, known: Any) -> GoodStates:
         """The states from which a supervisor can solve a problem; `known` ones are told beforehand to be such."""
@@ -96,6 +101,10 @@ class FixedPoint:
             self._watch.tell("fixed point", rounds, good)
             if good == before or (is_closed and good == nonblocking):
                 return GoodStates(good, rounds)
+
+    def nonblocking_states(self, problem: Problem, states: Any) -> Any:
+        """Those of some states that reach a marked one through transitions that stay in them."""
+        return self._nonblocking(problem, states, self._encoding.manager.false)
 
     def _is_lost(self, good: Any) -> bool:
         return bool(self.initial & good == self._encoding.manager.false)

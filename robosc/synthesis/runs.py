@@ -12,8 +12,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from robosc.automata.compile import State
+from robosc.automata.state import subjects
 from robosc.errors import InternalError
-from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.encoding import Bits, Encoding
 from robosc.synthesis.nodes import cofactors, is_constant
 from robosc.synthesis.transitions import Steps
 from robosc.synthesis.watch import Watch
@@ -35,28 +37,49 @@ class _Layer:
     events: Sequence[Steps]
 
 
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A run of a system.
+
+    Attributes:
+        events: Its events.
+        states: The states before, between and after them.
+        is_shortest: Whether it is known that no run is shorter.
+    """
+
+    events: tuple[str, ...]
+    states: tuple[State, ...]
+    is_shortest: bool
+
+
 class ShortestRuns:
-    """Runs from an initial state; layers are made as far as they are needed, once for all runs.
+    """Runs from given states; layers are made as far as they are needed, once for all runs.
 
     Args:
         encoding: The variables.
         watch: Who waits.
-        initial: Where runs begin.
         steps: The events, in the order in which equally short runs are preferred.
-        possible: For each event the states of the controlled system in which it may happen.
+        possible: For each event the states in which it may happen, such as those of the controlled system.
+        start: Where runs begin.
     """
 
     def __init__(
-        self, encoding: Encoding, watch: Watch, initial: Any, steps: Sequence[Steps], possible: Mapping[str, Any]
+        self,
+        encoding: Encoding,
+        watch: Watch,
+        steps: Sequence[Steps],
+        possible: Mapping[str, Any],
+        start: Any,
     ) -> None:
         self._encoding = encoding
         self._manager = encoding.manager
         self._watch = watch
         self._steps = steps
         self._possible = possible
-        self._layers = [_Layer(initial, ())]
+        self._layers = [_Layer(start, ())]
         self._ring = self._layers[0].reached
         self._rounds = 0
+        self._rings = 0
         self._effort = 0
 
     def trace_to(self, states: Any) -> tuple[str, ...]:
@@ -67,17 +90,34 @@ class ShortestRuns:
         Raises:
             SynthesisCancelled: The work is to end.
         """
+        run = self.run_to(states)
+        if run is None:
+            raise InternalError("a run is looked for to states that are not reachable")
+        return run.events
+
+    def run_to(self, states: Any) -> Run | None:
+        """A run to one of some states, with the states on it, or None where none leads there.
+
+        It is the same for every engine, and as short as `trace_to` says.
+
+        Raises:
+            SynthesisCancelled: The work is to end.
+        """
         while self._layers[-1].reached & states == self._manager.false:
-            self._grow()
+            if not self._grow():
+                return None
         number = self._first_layer(states)
+        is_shortest = number <= self._rings
         state = self._one(self._layers[number].reached & states)
         events: list[str] = []
+        visited = [decoded(self._encoding, state)]
         while number:
             event, sources = self._before(number, state)
             events.append(event)
             number = self._first_layer(sources)
             state = self._one(self._layers[number].reached & sources)
-        return tuple(reversed(events))
+            visited.append(decoded(self._encoding, state))
+        return Run(tuple(reversed(events)), tuple(reversed(visited)), is_shortest)
 
     def _first_layer(self, states: Any) -> int:
         """Number of the first layer that has one of some states, which the last one has."""
@@ -87,8 +127,8 @@ class ShortestRuns:
             key=lambda number: self._layers[number].reached & states != self._manager.false,
         )
 
-    def _grow(self) -> None:
-        """One round outwards."""
+    def _grow(self) -> bool:
+        """One round outwards; whether it found more states."""
         self._effort += self._ring.dag_size * len(self._steps)
         before = self._layers[-1].reached
         if self._effort <= MAXIMUM_EFFORT:
@@ -96,9 +136,10 @@ class ShortestRuns:
         else:
             self._add_chain()
         if self._layers[-1].reached == before:
-            raise InternalError("a run is looked for to states that are not reachable")
+            return False
         self._rounds += 1
         self._watch.tell("shortest runs", self._rounds, self._layers[-1].reached)
+        return True
 
     def _add_ring(self) -> None:
         """All states one event after the last ring's."""
@@ -107,6 +148,7 @@ class ShortestRuns:
             found = found | self._image(steps, self._ring)
         self._ring = found & ~before
         self._layers.append(_Layer(found, self._steps))
+        self._rings += 1
 
     def _add_chain(self) -> None:
         """A layer for each event, which works on what the ones before it have found."""
@@ -131,13 +173,39 @@ class ShortestRuns:
         raise InternalError("a state of a layer has no predecessor in the layers before")
 
     def _one(self, states: Any) -> Any:
-        """One of some states: the one whose bits read as the lowest number, in the order of the variables."""
-        values = dict.fromkeys(self._encoding.state_names, False)
-        node = states
-        while not is_constant(self._manager, node):
-            low, high = cofactors(node)
-            values[node.var] = low == self._manager.false
-            node = high if values[node.var] else low
-        return self._encoding.all_of(
-            self._manager.var(name) if value else ~self._manager.var(name) for name, value in reversed(values.items())
-        )
+        """One of some states."""
+        return one_of(self._encoding, states)
+
+
+def one_of(encoding: Encoding, states: Any) -> Any:
+    """One of some states: the one whose bits read as the lowest number, in the order of the variables."""
+    manager = encoding.manager
+    return encoding.all_of(
+        manager.var(name) if value else ~manager.var(name)
+        for name, value in reversed(_lowest(encoding, states).items())
+    )
+
+
+def decoded(encoding: Encoding, states: Any) -> State:
+    """The values of the state that `one_of` chooses, in the order of `subjects`."""
+    values = _lowest(encoding, states)
+
+    def value(bits: Bits) -> int:
+        index = 0
+        for name in bits.names:
+            index = 2 * index + values[name]
+        return index
+
+    chosen = (encoding.subjects[subject] for subject in subjects(encoding.system))
+    return tuple(bits.domain[value(bits)] for bits in chosen)
+
+
+def _lowest(encoding: Encoding, states: Any) -> dict[str, bool]:
+    """The bits of the state with the lowest number."""
+    values = dict.fromkeys(encoding.state_names, False)
+    node = states
+    while not is_constant(encoding.manager, node):
+        low, high = cofactors(node)
+        values[node.var] = low == encoding.manager.false
+        node = high if values[node.var] else low
+    return values

@@ -1,7 +1,6 @@
 """Synthesis of the maximally permissive supervisor: encoding, fixed point, what the supervisor adds, figures."""
 
 from collections.abc import Callable
-from contextlib import nullcontext
 from typing import Any
 
 from robosc.automata.structure import System
@@ -11,10 +10,10 @@ from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import (
     EngineOptions,
     Manager,
+    engine_options,
     limited,
     make_manager,
-    node_count_of,
-    node_limit_error,
+    node_check,
     reordering,
     resolve_engine,
 )
@@ -60,17 +59,12 @@ def synthesize(
         UnknownEngineError: There is no such engine.
         UnsupportedModelError: An expression computes with too many doubles, or a condition would be too large.
     """
-    options = EngineOptions(engine) if isinstance(engine, str) else engine
+    options = engine_options(engine)
     name = resolve_engine(options.name)
     manager = make_manager(name)
-    watch = Watch(should_stop, on_progress, lambda: _check_nodes(manager, options.maximum_nodes))
+    watch = Watch(should_stop, on_progress, node_check(manager, options.maximum_nodes))
     with limited(manager, options.maximum_nodes):
         return _Synthesis(system, name, manager, watch, is_reordering=options.is_reordering).result(questions)
-
-
-def _check_nodes(manager: Manager, maximum: int | None) -> None:
-    if maximum is not None and len(manager) > maximum and node_count_of(manager) > maximum:
-        raise node_limit_error(maximum)
 
 
 class _Synthesis:
@@ -95,7 +89,7 @@ class _Synthesis:
     def result(self, questions: Questions) -> SynthesisResult:
         """The supervisor, or why there is none."""
         fixed_point = FixedPoint(self._encoding, self._watch)
-        with reordering(self._manager, self._encoding.order) if self._is_reordering else nullcontext():
+        with reordering(self._manager, self._encoding.order, is_wanted=self._is_reordering):
             good = fixed_point.good_states(self._problem, self._manager.false)
             reachable = None if good.reason else fixed_point.reachable_states(self._problem, good.states)
         if good.reason:

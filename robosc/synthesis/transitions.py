@@ -28,8 +28,8 @@ class Transition:
         event: The event.
         possible: Where every automaton takes an edge, for data that can come.
         out_of_range: Where, taking it, an update leaves its variable's range.
-        condition: Where its event conditions are true and every requirement automaton has an edge for it
-            (current-state variables only).
+        condition: Where its event conditions are true (current-state variables only).
+        watched: Where every requirement automaton has an edge for it (current-state variables only).
         functions: Value of each changed bit after it, right where the event is possible.
         hidden: Variables of received data and of choices between edges.
     """
@@ -38,6 +38,7 @@ class Transition:
     possible: Any
     out_of_range: Any
     condition: Any
+    watched: Any
     functions: dict[str, Any]
     hidden: tuple[str, ...]
 
@@ -59,7 +60,7 @@ def transition_of(encoding: Encoding, event: Event) -> Transition:
     # An event in no alphabet belongs to no plant, so it cannot happen.
     plants = [automaton for automaton in participants if automaton.role is Role.PLANT]
     possible = encoding.possible_inputs(event.name) if plants else manager.false
-    condition = _condition(encoding, symbols, system, event.name)
+    watched = manager.true
     hidden = list(encoding.input_names(event.name))
     functions: dict[str, Any] = {}
     out_of_range = manager.false
@@ -71,7 +72,7 @@ def transition_of(encoding: Encoding, event: Event) -> Transition:
         if automaton.role is Role.PLANT:
             possible = possible & encoding.any_of(arc.taken for arc in arcs)
         else:
-            condition = condition & is_taken
+            watched = watched & is_taken
             possible = possible & (~is_taken | encoding.any_of(arc.taken for arc in arcs))
             # Where it has no edge it stays as it is.
             arcs = [*arcs, _Arc(~is_taken, {}, manager.false)]
@@ -81,7 +82,8 @@ def transition_of(encoding: Encoding, event: Event) -> Transition:
         event=event,
         possible=possible,
         out_of_range=out_of_range,
-        condition=condition,
+        condition=_condition(encoding, symbols, system, event.name),
+        watched=watched,
         functions=functions,
         hidden=tuple(hidden),
     )
@@ -192,7 +194,8 @@ def _next_value(encoding: Encoding, arcs: Sequence[_Arc], name: str) -> Any:
 
 def _names(encoding: Encoding, transition: Transition) -> frozenset[str]:
     """The current-state variables that a transition reads or changes."""
-    predicates = (transition.possible, transition.out_of_range, transition.condition, *transition.functions.values())
+    conditions = transition.condition & transition.watched
+    predicates = (transition.possible, transition.out_of_range, conditions, *transition.functions.values())
     read = set().union(*(support(encoding.manager, predicate) for predicate in predicates))
     return frozenset(encoding.state_names) & (read | transition.functions.keys())
 
@@ -216,8 +219,8 @@ class Steps:
         self.event = transition.event
         self.plant = enabled & ~self._leaving if self.event.is_controllable else enabled
         """Where the plant enables the event; a controllable one must stay in every range."""
-        self.condition = transition.condition
-        """Where its event conditions are true."""
+        self.condition = transition.condition & transition.watched
+        """Where its event conditions are true, and no requirement automaton is against it."""
         self.is_deterministic = not transition.hidden
         """Whether it leads to one state at most."""
         self.names = _names(encoding, transition)
@@ -237,9 +240,9 @@ class Steps:
         return self._leaving | (self.plant & ~self.condition)
 
     def under(self, condition: Any) -> Self:
-        """The same event under another condition."""
+        """The same event under other event conditions."""
         other = copy(self)
-        other.condition = condition
+        other.condition = condition & self._transition.watched
         return other
 
     def some(self, predicate: Any) -> Any:

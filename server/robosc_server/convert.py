@@ -102,6 +102,7 @@ def synthesize_response(outcome: SynthesizeOutcome) -> pb.SynthesizeResponse:
             reason=outcome.reason,
             summary=_summary(outcome.figures) if outcome.figures else None,
             statistics=_statistics(outcome.statistics) if outcome.statistics else None,
+            explanation=outcome.explanation,
         )
     )
 
@@ -116,6 +117,7 @@ def generate_response(outcome: GenerateOutcome) -> pb.GenerateResponse:
             pb.GeneratedFile(path=path, content=content, executable=is_program)
             for path, content, is_program in outcome.files
         ],
+        explanation=outcome.explanation,
     )
 
 

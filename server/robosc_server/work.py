@@ -94,6 +94,7 @@ class SynthesizeOutcome:
         supervisor: The supervisor's file; empty where there is none.
         figures: The summary, or None where there is no supervisor.
         statistics: Figures of the work, or None where there was no synthesis.
+        explanation: What is to blame that no supervisor exists, as JSON; else empty.
     """
 
     status: str
@@ -102,6 +103,7 @@ class SynthesizeOutcome:
     supervisor: bytes = b""
     figures: Figures | None = None
     statistics: "Statistics | None" = None
+    explanation: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +114,7 @@ class GenerateOutcome:
     diagnostics: tuple[Diagnostic, ...]
     reason: str = ""
     files: tuple[tuple[str, str, bool], ...] = ()
+    explanation: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,13 +184,25 @@ def _synthesize(job: SynthesizeJob, on_report: Callable[[Report], None]) -> Synt
     if isinstance(made, SynthesizeOutcome | Refused):
         return made
     if made.supervisor is None:
-        return SynthesizeOutcome(str(made.status), made.diagnostics, made.reason, statistics=made.statistics)
+        return SynthesizeOutcome(
+            str(made.status),
+            made.diagnostics,
+            made.reason,
+            statistics=made.statistics,
+            explanation=_explanation(made),
+        )
     try:
         content = encode(made.supervisor)
     except UnsupportedModelError as error:
         return SynthesizeOutcome(UNSUPPORTED_MODEL, made.diagnostics, str(error))
     figures = _figures(made.supervisor)
     return SynthesizeOutcome(str(made.status), made.diagnostics, "", content, figures, made.statistics)
+
+
+def _explanation(made: "Made") -> str:
+    from robosc.explanation import to_text
+
+    return to_text(made.explanation) if made.explanation else ""
 
 
 def _figures(supervisor: "Supervisor") -> Figures:
@@ -220,7 +235,7 @@ def _generate(job: GenerateJob, on_report: Callable[[Report], None]) -> Generate
         return GenerateOutcome(str(made.status), made.diagnostics, made.reason)
     made = judged_for(made, job.target)
     if made.supervisor is None:
-        return GenerateOutcome(str(made.status), made.diagnostics, made.reason)
+        return GenerateOutcome(str(made.status), made.diagnostics, made.reason, explanation=_explanation(made))
     try:
         files = generate(made.supervisor, job.target)
     except UnsupportedModelError as error:

@@ -172,6 +172,9 @@ class TestHostileServers:
             result(status=pb.SYNTHESIS_STATUS_SUPERVISOR),
             result(status=pb.SYNTHESIS_STATUS_EMPTY, supervisor=b"x"),
             result(status=pb.SYNTHESIS_STATUS_EMPTY, diagnostics=[pb.Diagnostic()]),
+            result(status=pb.SYNTHESIS_STATUS_EMPTY, explanation="{"),
+            result(status=pb.SYNTHESIS_STATUS_EMPTY, explanation='{"blamed": []}'),
+            result(status=pb.SYNTHESIS_STATUS_EMPTY, explanation="[" * 100_000),
             result(status=pb.SYNTHESIS_STATUS_SUPERVISOR, supervisor=b"x", summary=pb.Summary(states="many")),
         ],
     )

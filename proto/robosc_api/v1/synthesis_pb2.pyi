@@ -141,20 +141,22 @@ class Progress(_message.Message):
     def __init__(self, stage: _Optional[str] = ..., message: _Optional[str] = ...) -> None: ...
 
 class SynthesisResult(_message.Message):
-    __slots__ = ("status", "diagnostics", "supervisor", "reason", "summary", "statistics")
+    __slots__ = ("status", "diagnostics", "supervisor", "reason", "summary", "statistics", "explanation")
     STATUS_FIELD_NUMBER: _ClassVar[int]
     DIAGNOSTICS_FIELD_NUMBER: _ClassVar[int]
     SUPERVISOR_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
     SUMMARY_FIELD_NUMBER: _ClassVar[int]
     STATISTICS_FIELD_NUMBER: _ClassVar[int]
+    EXPLANATION_FIELD_NUMBER: _ClassVar[int]
     status: SynthesisStatus
     diagnostics: _containers.RepeatedCompositeFieldContainer[Diagnostic]
     supervisor: bytes
     reason: str
     summary: Summary
     statistics: Statistics
-    def __init__(self, status: _Optional[_Union[SynthesisStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., supervisor: _Optional[bytes] = ..., reason: _Optional[str] = ..., summary: _Optional[_Union[Summary, _Mapping]] = ..., statistics: _Optional[_Union[Statistics, _Mapping]] = ...) -> None: ...
+    explanation: str
+    def __init__(self, status: _Optional[_Union[SynthesisStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., supervisor: _Optional[bytes] = ..., reason: _Optional[str] = ..., summary: _Optional[_Union[Summary, _Mapping]] = ..., statistics: _Optional[_Union[Statistics, _Mapping]] = ..., explanation: _Optional[str] = ...) -> None: ...
 
 class Statistics(_message.Message):
     __slots__ = ("engine", "state_bits", "iterations", "peak_nodes")
@@ -203,16 +205,18 @@ class GenerateRequest(_message.Message):
     def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., target: _Optional[str] = ...) -> None: ...
 
 class GenerateResponse(_message.Message):
-    __slots__ = ("status", "diagnostics", "reason", "files")
+    __slots__ = ("status", "diagnostics", "reason", "files", "explanation")
     STATUS_FIELD_NUMBER: _ClassVar[int]
     DIAGNOSTICS_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
     FILES_FIELD_NUMBER: _ClassVar[int]
+    EXPLANATION_FIELD_NUMBER: _ClassVar[int]
     status: SynthesisStatus
     diagnostics: _containers.RepeatedCompositeFieldContainer[Diagnostic]
     reason: str
     files: _containers.RepeatedCompositeFieldContainer[GeneratedFile]
-    def __init__(self, status: _Optional[_Union[SynthesisStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., reason: _Optional[str] = ..., files: _Optional[_Iterable[_Union[GeneratedFile, _Mapping]]] = ...) -> None: ...
+    explanation: str
+    def __init__(self, status: _Optional[_Union[SynthesisStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., reason: _Optional[str] = ..., files: _Optional[_Iterable[_Union[GeneratedFile, _Mapping]]] = ..., explanation: _Optional[str] = ...) -> None: ...
 
 class GeneratedFile(_message.Message):
     __slots__ = ("path", "content", "executable")

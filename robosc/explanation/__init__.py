@@ -1,0 +1,47 @@
+"""Explanation of synthesis: what is to blame for an empty supervisor, and what restricts events where there is one.
+
+The names are imported on use, so that who only reads an explanation does not load the synthesizer.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from robosc.explanation.blame import explain_empty
+    from robosc.explanation.explain import explain_synthesis
+    from robosc.explanation.requests import RequestError
+    from robosc.explanation.structure import EmptyExplanation, Explanation, document, from_text, to_text
+    from robosc.explanation.text import empty_text, explanation_text
+
+_HOMES = {
+    "EmptyExplanation": "structure",
+    "Explanation": "structure",
+    "RequestError": "requests",
+    "document": "structure",
+    "empty_text": "text",
+    "explain_empty": "blame",
+    "explain_synthesis": "explain",
+    "explanation_text": "text",
+    "from_text": "structure",
+    "to_text": "structure",
+}
+
+__all__ = [
+    "EmptyExplanation",
+    "Explanation",
+    "RequestError",
+    "document",
+    "empty_text",
+    "explain_empty",
+    "explain_synthesis",
+    "explanation_text",
+    "from_text",
+    "to_text",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name from its module on first use."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)

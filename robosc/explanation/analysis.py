@@ -1,0 +1,315 @@
+"""Why events cannot happen in states, and how states run into trouble: answers in terms of automata.
+
+*Trouble* is a state that is bad, or from which no marked state can be reached under the requirements without going
+through a bad one. Of a state that a supervisor has to avoid, a run into trouble is shown: where uncontrollable events
+alone lead there, a shortest run of these, which nothing can prevent; else a shortest run of anything that plants and
+requirements allow. One of both there always is: were no trouble within reach, what can be reached would be safe,
+nonblocking and closed under uncontrollable events, so the state were good.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import pairwise
+from typing import Any
+
+from robosc.automata.compile import State
+from robosc.automata.state import subjects
+from robosc.errors import InternalError
+from robosc.explanation.obstacles import Obstacle, ObstacleKind
+from robosc.explanation.problems import Problems
+from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.fixed_point import allowed, marked_states
+from robosc.synthesis.runs import Run, ShortestRuns
+from robosc.synthesis.symbolic import Symbols
+from robosc.synthesis.transitions import Steps
+from robosc.synthesis.watch import Watch
+
+
+class HindranceKind(StrEnum):
+    """What keeps an event from happening."""
+
+    BEHAVIOUR = "behaviour"
+    """An automaton has no edge for it there whose guard is true."""
+    RANGE = "range"
+    """An update would leave a variable's range."""
+    REQUIREMENT = "requirement"
+    """An event condition is not true."""
+    SUPERVISOR = "supervisor"
+    """It can lead to a state that must be avoided."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hindrance:
+    """Something that keeps an event from happening in some states.
+
+    Attributes:
+        kind: What it is.
+        event: The event.
+        where: Those of the states in which it does.
+        automaton: The one without an edge.
+        range: The range.
+        condition: Place in `System.conditions`.
+    """
+
+    kind: HindranceKind
+    event: str
+    where: Any
+    automaton: str | None = None
+    range: Obstacle | None = None
+    condition: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Trouble:
+    """A run into trouble, and what the trouble is.
+
+    Attributes:
+        run: The run.
+        is_forced: Whether all of its events are uncontrollable.
+        invariants: Places of the invariants that are not true there.
+        leaving: Uncontrollable events that can leave a range there.
+        forbidden: Uncontrollable events that can happen there against a condition (its place).
+        detour: Where the state is not bad, but blocks: the way that the plants by themselves would have to a marked
+            state; None where the plants have none either.
+        unmarked: Where it blocks: automata that are in no marked location.
+    """
+
+    run: Run
+    is_forced: bool
+    invariants: tuple[int, ...]
+    leaving: tuple[tuple[str, Obstacle], ...]
+    forbidden: tuple[tuple[str, int], ...]
+    detour: "Detour | None"
+    unmarked: tuple[str, ...]
+
+    @property
+    def is_blocking(self) -> bool:
+        """Whether the state is not bad, but has no way on to a marked state."""
+        return not (self.invariants or self.leaving or self.forbidden)
+
+
+@dataclass(frozen=True, slots=True)
+class Detour:
+    """A run of the plants alone, and its first event that is not allowed.
+
+    Attributes:
+        events: The events of the whole run.
+        stopped_at: Place of the first event that is not allowed, or that leads to a state to be avoided.
+        state: The state before it.
+        hindrances: What keeps it from happening there; none where it is uncontrollable and leads to trouble.
+    """
+
+    events: tuple[str, ...]
+    stopped_at: int
+    state: State
+    hindrances: tuple[Hindrance, ...]
+
+
+class Analysis:
+    """Questions about one problem.
+
+    Args:
+        encoding: The variables.
+        watch: Who waits.
+        problems: The problem and what is left of it without obstacles.
+        obstacles: All of them.
+        good: The states that a supervisor may be in.
+    """
+
+    def __init__(
+        self,
+        encoding: Encoding,
+        watch: Watch,
+        problems: Problems,
+        obstacles: Sequence[Obstacle],
+        good: Any,
+    ) -> None:
+        self._encoding = encoding
+        self._manager = encoding.manager
+        self._watch = watch
+        self._problems = problems
+        self._ranges = tuple(item for item in obstacles if item.kind is ObstacleKind.RANGE)
+        self._symbols = Symbols(encoding)
+        self._fixed_point, self._problem = problems.without(())
+        self._steps = {steps.event.name: steps for steps in self._problem.steps}
+        safe = self._problem.safe
+        for steps in self._problem.steps:
+            safe = safe & ~steps.bad
+        self.safe = safe
+        """The states that are not bad."""
+        self._troubled = ~self._fixed_point.nonblocking_states(self._problem, safe)
+        self.good = good
+        """The states that a supervisor may be in."""
+        free = tuple(item for item in obstacles if item.kind is not ObstacleKind.MARKING)
+        _, self._free = problems.without(free)
+        self._participants: dict[str, tuple[tuple[str, Any], ...]] = {}
+
+    # Why events cannot happen
+
+    def behaviours(self, event: str) -> tuple[tuple[str, Any], ...]:
+        """The automata that take part in an event, and where each has an edge for it whose guard is true."""
+        if event not in self._participants:
+            self._participants[event] = tuple(
+                (
+                    automaton.name,
+                    self._encoding.any_of(
+                        self._encoding.in_location(automaton.name, edge.source) & self._symbols.holds(edge.guard)
+                        for edge in automaton.edges
+                        if edge.event == event
+                    ),
+                )
+                for automaton in self._encoding.system.automata
+                if event in automaton.alphabet
+            )
+        return self._participants[event]
+
+    def wanted(self, event: str) -> Any:
+        """Where the plants would let an event happen if variables had no ranges."""
+        return self._problems.steps(event, self._ranges).plant
+
+    def possible(self, event: str, good: Any | None = None) -> Any:
+        """Where an event may happen and stays in good states: those that a supervisor may be in, or others."""
+        good = self.good if good is None else good
+        steps = self._steps[event]
+        return good & steps.plant & allowed(steps, good)
+
+    def hindrances(self, event: str, states: Any, good: Any | None = None) -> tuple[Hindrance, ...]:
+        """What keeps an event from happening in some of the states, whatever else does.
+
+        Args:
+            event: The event.
+            states: The states.
+            good: What a supervisor must not leave, if other than the states that it may be in.
+        """
+        good = self.good if good is None else good
+        steps = self._steps[event]
+        found = [
+            Hindrance(HindranceKind.BEHAVIOUR, event, states & ~enabled, automaton=automaton)
+            for automaton, enabled in self.behaviours(event)
+        ]
+        if steps.event.is_controllable:
+            wanted = states & self.wanted(event)
+            found += [
+                Hindrance(HindranceKind.RANGE, event, wanted & leaving, range=item)
+                for item, leaving in self._leaving(event)
+            ]
+            found += [
+                Hindrance(HindranceKind.REQUIREMENT, event, wanted & ~self._problems.condition(place), condition=place)
+                for place in self._problems.conditions_on(event)
+            ]
+            lost = states & steps.plant & steps.condition & ~steps.only(good)
+            found.append(Hindrance(HindranceKind.SUPERVISOR, event, lost))
+        return tuple(item for item in found if item.where != self._manager.false)
+
+    def _leaving(self, event: str) -> Iterable[tuple[Obstacle, Any]]:
+        """Where an event leaves each of the ranges that it can leave."""
+        mine = self._problems.written_by(event, self._ranges)
+        for item in mine:
+            others = self._problems.steps(event, [other for other in mine if other != item])
+            if others.event.is_controllable:
+                yield item, self.wanted(event) & ~others.plant
+            else:
+                yield item, others.under(self._manager.true).bad
+
+    # Runs
+
+    def runs(self, start: Any, possible: Mapping[str, Any]) -> ShortestRuns:
+        """Shortest runs from some states through events where they are possible."""
+        steps = [steps for steps in self._problem.steps if steps.event.name in possible]
+        return ShortestRuns(self._encoding, self._watch, steps, possible, start)
+
+    def trouble_after(self, start: Any) -> Trouble:
+        """How one of some states that must be avoided runs into trouble."""
+        uncontrollable = {
+            name: self._manager.true for name, steps in self._steps.items() if not steps.event.is_controllable
+        }
+        run = self.runs(start, uncontrollable).run_to(self._troubled)
+        is_forced = run is not None
+        if run is None:
+            anything = {name: steps.plant & self._restricted(steps) for name, steps in self._steps.items()}
+            run = self.runs(start, anything).run_to(self._troubled)
+        if run is None:
+            raise InternalError("a state that must be avoided does not run into trouble")
+        return self._named(run, is_forced)
+
+    def _restricted(self, steps: Steps) -> Any:
+        return steps.condition if steps.event.is_controllable else self._manager.true
+
+    def _named(self, run: Run, is_forced: bool) -> Trouble:
+        state = self.predicate(run.states[-1])
+        false = self._manager.false
+        invariants = tuple(
+            place
+            for place in range(len(self._encoding.system.invariants))
+            if self._problems.invariant(place) & state == false
+        )
+        harmful = [steps for steps in self._problem.steps if steps.bad & state != false]
+        leaving = tuple(
+            (steps.event.name, item)
+            for steps in harmful
+            for item, where in self._leaving(steps.event.name)
+            if where & state != false
+        )
+        forbidden = tuple(
+            (steps.event.name, place)
+            for steps in harmful
+            if steps.plant & state != false
+            for place in self._problems.conditions_on(steps.event.name)
+            if self._problems.condition(place) & state == false
+        )
+        is_blocking = self.safe & state != false
+        marked = marked_states(self._encoding)
+        return Trouble(
+            run,
+            is_forced,
+            invariants,
+            leaving,
+            forbidden,
+            self.detour(state, marked, self.safe) if is_blocking else None,
+            self._unmarked(state) if is_blocking else (),
+        )
+
+    def _unmarked(self, state: Any) -> tuple[str, ...]:
+        return tuple(
+            item.name
+            for item in self._encoding.system.automata
+            if not any(
+                self._encoding.in_location(item.name, location) & state != self._manager.false
+                for location in item.marked
+            )
+        )
+
+    def detour(self, start: Any, goal: Any, good: Any) -> Detour | None:
+        """A shortest run of the plants alone from some states to a goal, and where it is stopped; None without any.
+
+        No run that stays in good states may lead there.
+        """
+        possible = {steps.event.name: steps.plant for steps in self._free.steps}
+        steps = {item.event.name: item for item in self._free.steps}
+        runs = ShortestRuns(self._encoding, self._watch, tuple(steps.values()), possible, start)
+        run = runs.run_to(goal)
+        if run is None:
+            return None
+        for place, (event, (before, after)) in enumerate(zip(run.events, pairwise(run.states), strict=True)):
+            here, there = self.predicate(before), self.predicate(after)
+            is_allowed = here & self.possible(event, good) & self._steps[event].some(there & good)
+            if is_allowed == self._manager.false:
+                return Detour(run.events, place, before, self.hindrances(event, here, good))
+        raise InternalError("a run is stopped nowhere that must be")
+
+    def predicate(self, state: State) -> Any:
+        """Where the state is this one."""
+        values = zip(subjects(self._encoding.system), state, strict=True)
+        return self._encoding.all_of(
+            self._encoding.equals(self._encoding.subjects[subject], value) for subject, value in values
+        )
+
+    def image(self, event: str, states: Any) -> Any:
+        """The states that an event leads to from some states."""
+        return self._steps[event].image(states)
+
+    def lost_after(self, event: str, states: Any, good: Any) -> Any:
+        """The states that are not good to which an event leads from some states."""
+        steps = self._steps[event]
+        return steps.image(states & steps.plant) & ~good

@@ -1,0 +1,188 @@
+"""Why a problem has no supervisor: a run into trouble, what is to blame, and what would have to go."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from robosc.automata.structure import System
+from robosc.explanation.analysis import Analysis
+from robosc.explanation.conflict import minimal_conflict, minimal_removal
+from robosc.explanation.obstacles import Obstacle, ObstacleKind, obstacles_of
+from robosc.explanation.problems import BoundedWatch, EffortSpentError, Problems
+from robosc.explanation.reports import Reporter
+from robosc.explanation.structure import Blamed, EmptyExplanation
+from robosc.explanation.terms import Terms
+from robosc.model.places import Places
+from robosc.model.structure import Deployment, Model
+from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.engines import (
+    EngineOptions,
+    engine_options,
+    limited,
+    make_manager,
+    node_check,
+    reordering,
+    resolve_engine,
+)
+from robosc.synthesis.findings import questions_about
+from robosc.synthesis.result import Progress
+from robosc.synthesis.watch import Watch
+
+EFFORT = 100
+"""Steps that the search for what is to blame may take, as a multiple of those of one synthesis."""
+
+LEAST_EFFORT = 20_000
+"""Steps that it may take in any case."""
+
+MAXIMUM_PARTS = 200
+"""Parts of the model that an explanation lists: a search that was given up early may leave thousands."""
+
+_ASKED = (ObstacleKind.REQUIREMENT, ObstacleKind.INVARIANT)
+"""What is asked of the robot; the others are what it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Blame:
+    """What is to blame that there is no supervisor: places in a list of obstacles, in its order.
+
+    Attributes:
+        conflict: Those that, without any other, leave none.
+        is_minimal: Whether it is known that none of them can be missing.
+        sufficing: Those of the conflict without which alone there is a supervisor, beside all others; None where
+            that was not found out.
+        removal: Those without which there is a supervisor, none of which can stay; None where that was not found out.
+    """
+
+    conflict: tuple[int, ...]
+    is_minimal: bool
+    sufficing: tuple[int, ...] | None
+    removal: tuple[int, ...] | None
+
+
+def find_blame(problems: Problems, obstacles: Sequence[Obstacle], false: Any, watch: BoundedWatch) -> Blame:
+    """What is to blame for a problem without a supervisor.
+
+    Args:
+        problems: The problem.
+        obstacles: What it could be without; those to be blamed rather than others first.
+        false: The predicate that is true nowhere.
+        watch: Bounds the work; beyond its limit what has been found so far is told.
+
+    Raises:
+        SynthesisCancelled: The work is to end.
+    """
+    search = _Search(problems, obstacles, false, watch)
+    conflict, sufficing, removal = None, None, None
+    try:
+        conflict = minimal_conflict(range(len(obstacles)), search.is_empty)
+        everything = frozenset(search.everything)
+        sufficing = tuple(item for item in conflict if not search.is_empty(everything - {item}))
+        asked = tuple(item for item in sufficing if obstacles[item].kind in _ASKED)
+        removal = asked[:1] or minimal_removal(_to_keep(obstacles, conflict), search.is_empty)
+    except EffortSpentError:
+        pass
+    found = search.smallest if conflict is None else conflict
+    return Blame(
+        tuple(sorted(found)), conflict is not None, sufficing, None if removal is None else tuple(sorted(removal))
+    )
+
+
+def _to_keep(obstacles: Sequence[Obstacle], conflict: Sequence[int]) -> tuple[int, ...]:
+    """What the robot is stays, before what is asked of it; of this, what is not blamed first."""
+    blamed = set(conflict)
+    return tuple(sorted(range(len(obstacles)), key=lambda item: (obstacles[item].kind in _ASKED, item in blamed)))
+
+
+class _Search:
+    """Remembers what was asked, and the smallest set that was found to leave no supervisor."""
+
+    def __init__(self, problems: Problems, obstacles: Sequence[Obstacle], false: Any, watch: BoundedWatch) -> None:
+        self._problems = problems
+        self._obstacles = obstacles
+        self._false = false
+        self._watch = watch
+        self.everything = range(len(obstacles))
+        self.smallest = frozenset(self.everything)
+        self._known: dict[frozenset[int], bool] = {}
+
+    def is_empty(self, kept: frozenset[int]) -> bool:
+        """Whether there is no supervisor with these obstacles alone."""
+        found = self._known.get(kept)
+        if found is None:
+            found = self._known[kept] = self._solve(kept)
+            if found and len(kept) < len(self.smallest):
+                self.smallest = kept
+        return found
+
+    def _solve(self, kept: frozenset[int]) -> bool:
+        dropped = (item for place, item in enumerate(self._obstacles) if place not in kept)
+        fixed_point, problem = self._problems.without(dropped)
+        return bool(fixed_point.good_states(problem, self._false).reason)
+
+
+def explain_empty(
+    model: Model,
+    places: Places,
+    system: System,
+    *,
+    deployment: Deployment,
+    engine: str | EngineOptions = "auto",
+    should_stop: Callable[[], bool] = lambda: False,
+    on_progress: Callable[[Progress], None] = lambda progress: None,
+) -> EmptyExplanation:
+    """Why a model has no supervisor.
+
+    Args:
+        model: The model.
+        places: Where its parts stand.
+        system: Its automata, for which synthesis has found no supervisor.
+        deployment: Where the supervisor was to stand.
+        engine: Name of the engine for decision diagrams, or more about it.
+        should_stop: Asked before each step; once true, the work ends.
+        on_progress: Told where the work is.
+
+    Raises:
+        SynthesisCancelled: `should_stop` became true.
+    """
+    options = engine_options(engine)
+    manager = make_manager(resolve_engine(options.name))
+    watch = BoundedWatch(Watch(should_stop, on_progress, node_check(manager, options.maximum_nodes)))
+    with limited(manager, options.maximum_nodes):
+        encoding = Encoding(system, manager)
+        obstacles = obstacles_of(system, questions_about(model, system, deployment).restrictions)
+        problems = Problems(encoding, watch)
+        terms = Terms(model, places, system, obstacles)
+        return explain_lost(encoding, watch, problems, obstacles, terms, is_reordering=options.is_reordering)
+
+
+def explain_lost(
+    encoding: Encoding,
+    watch: BoundedWatch,
+    problems: Problems,
+    obstacles: Sequence[Obstacle],
+    terms: Terms,
+    *,
+    is_reordering: bool,
+) -> EmptyExplanation:
+    """Why a problem has no supervisor, in the words of its model."""
+    false = encoding.manager.false
+    fixed_point, problem = problems.without(())
+    fixed_point.good_states(problem, false)
+    # What one synthesis takes, encoding and all, tells how large the problem is.
+    watch.limit = max(LEAST_EFFORT, EFFORT * watch.steps)
+    with reordering(encoding.manager, encoding.order, is_wanted=is_reordering):
+        blame = find_blame(problems, obstacles, false, watch)
+    watch.limit = None
+    analysis = Analysis(encoding, watch, problems, obstacles, false)
+    trouble = Reporter(analysis, terms).trouble(analysis.trouble_after(fixed_point.initial))
+    sufficing, removal = blame.sufficing, blame.removal or ()
+    return EmptyExplanation(
+        trouble=trouble,
+        blamed=tuple(
+            Blamed(terms.part(obstacles[item]), None if sufficing is None else item in sufficing)
+            for item in blame.conflict[:MAXIMUM_PARTS]
+        ),
+        is_minimal=blame.is_minimal,
+        removal=tuple(terms.part(obstacles[item]) for item in removal) if len(removal) <= MAXIMUM_PARTS else (),
+        left_out=max(0, len(blame.conflict) - MAXIMUM_PARTS),
+    )

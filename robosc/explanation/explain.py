@@ -1,0 +1,330 @@
+"""What synthesis did to a model: what restricts each event, why one cannot happen in a state, and warnings.
+
+Everything is found on predicates over the states of the controlled system; each answer comes with a shortest run.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+from robosc.automata.state import subjects
+from robosc.automata.structure import System
+from robosc.errors import Diagnostic, InternalError
+from robosc.explanation.analysis import Analysis, Hindrance, HindranceKind
+from robosc.explanation.blame import explain_lost
+from robosc.explanation.conflict import minimal_conflict
+from robosc.explanation.obstacles import obstacles_of
+from robosc.explanation.problems import BoundedWatch, Problems
+from robosc.explanation.reports import Reporter
+from robosc.explanation.requests import MAXIMUM_SHOWN, RequestError, asked_event, asked_run, asked_state
+from robosc.explanation.structure import EventHere, EventReport, Explanation, Reason, Remark, StateReport
+from robosc.explanation.terms import Terms
+from robosc.explanation.words import events_text
+from robosc.model.places import Places
+from robosc.model.structure import Deployment, Model
+from robosc.source import visible
+from robosc.synthesis.controlled import ControlledSystem
+from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.engines import (
+    EngineOptions,
+    engine_options,
+    limited,
+    make_manager,
+    node_check,
+    reordering,
+    resolve_engine,
+)
+from robosc.synthesis.findings import findings, questions_about
+from robosc.synthesis.nodes import count_models
+from robosc.synthesis.result import Progress
+from robosc.synthesis.runs import Run, decoded
+from robosc.synthesis.symbolic import Symbols
+from robosc.synthesis.watch import Watch
+
+MAXIMUM_STATES = 5
+"""States of one kind that warnings show: all of them could be too many to read."""
+
+_TOLD = frozenset({"never-enabled", "unused-requirement"})
+"""The findings of `robosc synth` that belong to an explanation."""
+
+
+def explain_synthesis(
+    model: Model,
+    places: Places,
+    system: System,
+    *,
+    deployment: Deployment,
+    engine: str | EngineOptions = "auto",
+    event: str | None = None,
+    state: str | None = None,
+    after: str | None = None,
+    should_stop: Callable[[], bool] = lambda: False,
+    on_progress: Callable[[Progress], None] = lambda progress: None,
+) -> Explanation:
+    """What synthesis did to a model.
+
+    Args:
+        model: The checked model.
+        places: Where its parts stand.
+        system: Its automata.
+        deployment: Where the supervisor will stand.
+        engine: Name of the engine for decision diagrams, or more about it.
+        event: The event to explain; none: all of them, and warnings.
+        state: Explain what can happen in a state that fits this, such as `Door.closed, Lift.n = 2`.
+        after: Explain what can happen after this run, such as `open, jam.response`.
+        should_stop: Asked before each step; once true, the work ends.
+        on_progress: Told where the work is.
+
+    Raises:
+        RequestError: What is asked about is not there: an event, a part of the model, a state, a run.
+        SynthesisCancelled: `should_stop` became true.
+        NodeLimitError: Diagrams became larger than the engine's options allow.
+        UnknownEngineError: There is no such engine.
+        UnsupportedModelError: The model is outside what synthesis handles.
+    """
+    name = None if event is None else asked_event(system, model, event)
+    condition = None if state is None else asked_state(system, model, state)
+    run = None if after is None else asked_run(system, model, after)
+    options = engine_options(engine)
+    manager = make_manager(resolve_engine(options.name))
+    watch = BoundedWatch(Watch(should_stop, on_progress, node_check(manager, options.maximum_nodes)))
+    with limited(manager, options.maximum_nodes):
+        encoding = Encoding(system, manager)
+        obstacles = obstacles_of(system, questions_about(model, system, deployment).restrictions)
+        problems = Problems(encoding, watch)
+        terms = Terms(model, places, system, obstacles)
+        fixed_point, problem = problems.without(())
+        with reordering(manager, encoding.order, is_wanted=options.is_reordering):
+            good = fixed_point.good_states(problem, manager.false)
+            reachable = manager.false if good.reason else fixed_point.reachable_states(problem, good.states)
+        if good.reason:
+            lost = explain_lost(encoding, watch, problems, obstacles, terms, is_reordering=options.is_reordering)
+            return Explanation(empty=lost)
+        analysis = Analysis(encoding, watch, problems, obstacles, good.states)
+        explainer = _Explainer(
+            encoding, watch, system, analysis, Reporter(analysis, terms), reachable, fixed_point.initial
+        )
+        if condition is not None or run is not None:
+            fitting = reachable
+            if run is not None:
+                fitting = explainer.after(run)
+            if condition is not None:
+                fitting = explainer.fitting(fitting, Symbols(encoding).holds(condition), str(state))
+            return Explanation(state=explainer.state(fitting, name))
+        if name is not None:
+            return Explanation(events=(explainer.event(name, has_behaviours=True),))
+        controlled = ControlledSystem(encoding, watch, problem, good.states, reachable)
+        diagnostics = findings(model, places, controlled.answers(questions_about(model, system, deployment)))
+        return Explanation(
+            events=tuple(explainer.event(item.name) for item in system.events if item.is_controllable),
+            remarks=(
+                *_found(diagnostics),
+                *explainer.unreachable_states(model, places),
+                *explainer.left_to_the_environment(),
+            ),
+        )
+
+
+def _found(diagnostics: tuple[Diagnostic, ...]) -> Iterator[Remark]:
+    for item in diagnostics:
+        if item.code in _TOLD:
+            yield Remark(item.code, item.message, item.location)
+
+
+class _Explainer:
+    """Answers about one controlled system."""
+
+    def __init__(
+        self,
+        encoding: Encoding,
+        watch: Watch,
+        system: System,
+        analysis: Analysis,
+        reporter: Reporter,
+        reachable: Any,
+        initial: Any,
+    ) -> None:
+        self._encoding = encoding
+        self._watch = watch
+        self._false = encoding.manager.false
+        self._system = system
+        self._analysis = analysis
+        self._reporter = reporter
+        self._reachable = reachable
+        self._initial = initial
+        self._possible = {event.name: reachable & analysis.possible(event.name) for event in system.events}
+        self._runs = analysis.runs(initial, self._possible)
+
+    def _run_to(self, states: Any) -> Run:
+        run = self._runs.run_to(states)
+        if run is None:
+            raise InternalError("a state of the controlled system is not reachable")
+        return run
+
+    # Events
+
+    def event(self, event: str, *, has_behaviours: bool = False) -> EventReport:
+        """What restricts an event, with behaviours or only what restricts it beside them."""
+        possible, wanted = self._possible[event], self._reachable & self._analysis.wanted(event)
+        found = [
+            item
+            for item in self._analysis.hindrances(event, self._reachable)
+            if item.kind is not HindranceKind.BEHAVIOUR or has_behaviours
+        ]
+        is_never = possible == self._false
+        status = "never" if is_never else "free" if possible == wanted else "restricted"
+        if is_never:
+            found = self._decisive(event, found, wanted)
+        stopped = None
+        if is_never and wanted == self._false:
+            detour = self._analysis.detour(self._initial, self._analysis.wanted(event), self._analysis.good)
+            stopped = None if detour is None else self._reporter.stopped(detour, self._analysis.good)
+        return EventReport(
+            event=event,
+            is_controllable=self._system.event(event).is_controllable,
+            status=status,
+            reasons=tuple(self._reason(item) for item in found),
+            stopped=stopped,
+        )
+
+    def _decisive(self, event: str, found: list[Hindrance], wanted: Any) -> list[Hindrance]:
+        """Of what keeps an event from ever happening, what is needed for that; behaviours where they alone do it."""
+        candidates = [item for item in found if item.kind is not HindranceKind.BEHAVIOUR]
+        if wanted == self._false:
+            candidates = found or list(self._analysis.hindrances(event, self._reachable))
+            wanted = self._reachable
+
+        def is_never(kept: frozenset[int]) -> bool:
+            left = wanted
+            for place in kept:
+                left = left & ~candidates[place].where
+            return bool(left == self._false)
+
+        if not is_never(frozenset(range(len(candidates)))):
+            return candidates
+        return [candidates[place] for place in minimal_conflict(range(len(candidates)), is_never)]
+
+    def _reason(self, item: Hindrance) -> Reason:
+        run = self._run_to(item.where)
+        return self._reporter.reason(item, run.states[-1], self._analysis.good, run)
+
+    # States
+
+    def after(self, run: tuple[str, ...]) -> Any:
+        """The states that a run leads to.
+
+        Raises:
+            RequestError: The run is not possible.
+        """
+        states = self._initial
+        for place, event in enumerate(run):
+            following = self._analysis.image(event, states & self._possible[event])
+            if following == self._false:
+                before = f"after {events_text(run[:place])}" if place else "in the initial state"
+                here = decoded(self._encoding, states)
+                hindrances = self._analysis.hindrances(event, self._analysis.predicate(here))
+                reasons = [self._reporter.reason(item, here, self._analysis.good) for item in hindrances]
+                raise RequestError(f"'{event}' cannot happen {before}: {_messages(reasons)}")
+            states = following
+        return states
+
+    def fitting(self, states: Any, condition: Any, text: str) -> Any:
+        """Those of some states where a condition is true.
+
+        Raises:
+            RequestError: There is none.
+        """
+        found = states & condition
+        if found != self._false:
+            return found
+        problem = f"the controlled system is never in a state that fits '{visible(text[:MAXIMUM_SHOWN])}'"
+        detour = (
+            self._analysis.detour(self._initial, condition, self._analysis.good) if states == self._reachable else None
+        )
+        if detour is not None:
+            stopped = self._reporter.stopped(detour, self._analysis.good)
+            event = stopped.events[stopped.stopped_at]
+            problem += (
+                f": the behaviours would have the way {events_text(stopped.events)}, but {event} must not happen: "
+                f"{_messages(stopped.reasons) or 'it leads into trouble'}"
+            )
+        raise RequestError(problem)
+
+    def state(self, states: Any, event: str | None) -> StateReport:
+        """What can happen in one of some states; where an event is asked for, rather where it cannot."""
+        chosen = states
+        if event is not None and states & ~self._possible[event] != self._false:
+            chosen = states & ~self._possible[event]
+        run = self._run_to(chosen)
+        here = self._analysis.predicate(run.states[-1])
+        names = [item.name for item in self._system.events] if event is None else [event]
+        return StateReport(
+            way=self._reporter.way(run),
+            fitting=str(count_models(self._encoding.manager, states, self._encoding.state_names)),
+            events=tuple(self._here(name, here, run.states[-1]) for name in names),
+        )
+
+    def _here(self, event: str, here: Any, state: Any) -> EventHere:
+        can_happen = here & self._possible[event] != self._false
+        reasons = () if can_happen else self._analysis.hindrances(event, here)
+        return EventHere(
+            event=event,
+            is_controllable=self._system.event(event).is_controllable,
+            can_happen=can_happen,
+            reasons=tuple(self._reporter.reason(item, state, self._analysis.good) for item in reasons),
+        )
+
+    # Warnings
+
+    def unreachable_states(self, model: Model, places: Places) -> Iterator[Remark]:
+        """States of components that the controlled system never gets to."""
+        for component in model.components:
+            for location in component.behaviour.states if component.behaviour else ():
+                self._watch.check_stop()
+                goal = self._encoding.in_location(component.name, location.name)
+                if goal & self._reachable != self._false:
+                    continue
+                detour = self._analysis.detour(self._initial, goal, self._analysis.good)
+                yield Remark(
+                    "unreachable-state",
+                    f"{component.name} never gets to '{location.name}'"
+                    + ("" if detour else ": its behaviour has no way there"),
+                    places.states[component.name, location.name],
+                    stopped=None if detour is None else self._reporter.stopped(detour, self._analysis.good),
+                )
+
+    def left_to_the_environment(self) -> Iterator[Remark]:
+        """States from which no controllable event can move on, by the states of components and communications."""
+        controllable, uncontrollable = (
+            self._encoding.any_of(
+                self._possible[event.name] for event in self._system.events if event.is_controllable is kind
+            )
+            for kind in (True, False)
+        )
+        waiting = self._reachable & ~controllable
+        yield from self._shown("only-uncontrollable", waiting & uncontrollable, "only the environment can move on")
+        yield from self._shown("deadlock", waiting & ~uncontrollable, "nothing at all can happen")
+
+    def _shown(self, kind: str, states: Any, what: str) -> Iterator[Remark]:
+        count = count_models(self._encoding.manager, states, self._encoding.state_names)
+        left, shown = states, 0
+        while left != self._false and shown < MAXIMUM_STATES:
+            self._watch.check_stop()
+            run = self._run_to(left)
+            shown += 1
+            where = f"after {events_text(run.events)}" if run.events else "in the initial state"
+            of_all = f" (one of {count} such states)" if count > 1 else ""
+            yield Remark(kind, f"{where} {what}{of_all}", None, self._reporter.way(run))
+            left = left & ~self._locations(run.states[-1])
+
+    def _locations(self, state: Any) -> Any:
+        """The states in which every automaton is where it is in this one."""
+        values = zip(subjects(self._system), state, strict=True)
+        return self._encoding.all_of(
+            self._encoding.in_location(subject.automaton, value)
+            for subject, value in values
+            if subject.variable is None
+        )
+
+
+def _messages(reasons: Iterable[Reason]) -> str:
+    return "; ".join(item.message for item in reasons)

@@ -1,0 +1,147 @@
+"""What a synthesis problem could be without: requirements, ranges and markings, and the problem that is left.
+
+Leaving an obstacle out never takes anything from a supervisor: where one keeps the system safe and nonblocking, it
+still does. A condition or an invariant less forbids less, and a location more that is marked is one more to get to.
+A range counts as left out when an update beyond it stops at its end, as `clamp` does: in a state from which the
+variable is not led out of its range nothing changes, and the others become safe. So emptiness is monotone, which is
+all that finding a minimal set needs (see `conflict`), and without any obstacle every system has a supervisor.
+"""
+
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+from robosc.automata.state import Subject
+from robosc.automata.structure import Assignment, Automaton, System
+from robosc.expressions import Call, Constant, Expression, IntegerType
+from robosc.synthesis.questions import Restriction
+
+
+class ObstacleKind(StrEnum):
+    """What an obstacle is; in this order the earlier are blamed rather than the later."""
+
+    REQUIREMENT = "requirement"
+    """On events."""
+    INVARIANT = "invariant"
+    """What must be true in every state."""
+    CONDITION = "condition"
+    """An event condition that no single requirement brings, such as the one on cancel."""
+    RANGE = "range"
+    """Of a variable."""
+    MARKING = "marking"
+    """That an automaton has to get back to its marked locations."""
+
+
+@dataclass(frozen=True, slots=True)
+class Obstacle:
+    """Something that a problem could be without.
+
+    Attributes:
+        kind: What it is.
+        conditions: Places in `System.conditions`.
+        invariants: Places in `System.invariants`.
+        range: The variable whose range it is.
+        marking: The automaton whose marking it is.
+    """
+
+    kind: ObstacleKind
+    conditions: tuple[int, ...] = ()
+    invariants: tuple[int, ...] = ()
+    range: Subject | None = None
+    marking: str | None = None
+
+
+def obstacles_of(system: System, restrictions: Sequence[Restriction] = ()) -> tuple[Obstacle, ...]:
+    """Every obstacle of a system, the earlier ones to be blamed rather than the later ones.
+
+    Args:
+        system: The system.
+        restrictions: Conditions and invariants that stand or fall together; the others stand alone.
+    """
+    found = [
+        Obstacle(
+            ObstacleKind.INVARIANT if item.invariants else ObstacleKind.REQUIREMENT, item.conditions, item.invariants
+        )
+        for item in restrictions
+    ]
+    conditions = {place for item in found for place in item.conditions}
+    invariants = {place for item in found for place in item.invariants}
+    found += [
+        Obstacle(ObstacleKind.CONDITION, conditions=(place,))
+        for place in range(len(system.conditions))
+        if place not in conditions
+    ]
+    found += [
+        Obstacle(ObstacleKind.INVARIANT, invariants=(place,))
+        for place in range(len(system.invariants))
+        if place not in invariants
+    ]
+    found += [Obstacle(ObstacleKind.RANGE, range=subject) for subject in _ranged(system)]
+    found += [
+        Obstacle(ObstacleKind.MARKING, marking=item.name)
+        for item in system.automata
+        if not item.marked.issuperset(item.locations)
+    ]
+    ranks = list(ObstacleKind)
+    return tuple(sorted(found, key=lambda item: ranks.index(item.kind)))
+
+
+def _ranged(system: System) -> Iterator[Subject]:
+    """The integer variables that get more than constants."""
+    for automaton in system.automata:
+        computed = {
+            update.variable
+            for edge in automaton.edges
+            for update in edge.updates
+            if not isinstance(update.expression, Constant)
+        }
+        for variable in automaton.variables:
+            if isinstance(variable.type, IntegerType) and variable.name in computed:
+                yield Subject(automaton.name, variable.name)
+
+
+def without(system: System, obstacles: Iterable[Obstacle]) -> System:
+    """The system that is left without some obstacles."""
+    dropped = tuple(obstacles)
+    conditions = {place for item in dropped for place in item.conditions}
+    invariants = {place for item in dropped for place in item.invariants}
+    return replace(
+        without_marks(without_ranges(system, dropped), dropped),
+        conditions=tuple(item for place, item in enumerate(system.conditions) if place not in conditions),
+        invariants=tuple(item for place, item in enumerate(system.invariants) if place not in invariants),
+    )
+
+
+def without_marks(system: System, obstacles: Iterable[Obstacle]) -> System:
+    """The system in which every location of some automata is marked."""
+    dropped = {item.marking for item in obstacles}
+    automata = (
+        replace(item, marked=frozenset(item.locations)) if item.name in dropped else item for item in system.automata
+    )
+    return replace(system, automata=tuple(automata))
+
+
+def without_ranges(system: System, obstacles: Iterable[Obstacle]) -> System:
+    """The system in which updates of some variables stop at the ends of their ranges."""
+    dropped = {item.range for item in obstacles if item.range is not None}
+    touched = {subject.automaton for subject in dropped}
+    automata = (_clamped(item, dropped) if item.name in touched else item for item in system.automata)
+    return replace(system, automata=tuple(automata))
+
+
+def _clamped(automaton: Automaton, dropped: Collection[Subject]) -> Automaton:
+    types = {item.name: item.type for item in automaton.variables if Subject(automaton.name, item.name) in dropped}
+
+    def clamped(update: Assignment) -> Assignment:
+        match types.get(update.variable):
+            case IntegerType(low=int(low), high=int(high)):
+                return replace(update, expression=_clamp(update.expression, low, high))
+            case _:
+                return update
+
+    edges = tuple(replace(edge, updates=tuple(map(clamped, edge.updates))) for edge in automaton.edges)
+    return replace(automaton, edges=edges)
+
+
+def _clamp(expression: Expression, low: int, high: int) -> Expression:
+    return Call("clamp", (expression, Constant(low), Constant(high)))

@@ -1,0 +1,145 @@
+"""The problems that are left of one problem without some of its obstacles, over one set of Boolean variables.
+
+What an event does depends on few obstacles, so it is encoded once for each choice of the ranges that it could leave,
+and a condition once for all events and problems.
+"""
+
+from collections.abc import Iterable
+from copy import copy
+from typing import Any
+
+from robosc.automata.state import Subject
+from robosc.automata.structure import System
+from robosc.explanation.obstacles import Obstacle, without_marks, without_ranges
+from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.fixed_point import FixedPoint, Problem
+from robosc.synthesis.symbolic import Symbols
+from robosc.synthesis.transitions import Steps, transition_of
+from robosc.synthesis.watch import Watch
+
+
+class EffortSpentError(Exception):
+    """The work has taken more steps than it may."""
+
+
+class BoundedWatch(Watch):
+    """A watch that counts steps, and ends the work at a limit once one is set.
+
+    Args:
+        watch: Who waits.
+    """
+
+    def __init__(self, watch: Watch) -> None:
+        super().__init__(lambda: False, lambda progress: None)
+        self._watch = watch
+        self.steps = 0
+        """Steps so far; the same for every engine."""
+        self.limit: int | None = None
+        """Steps beyond which the work ends."""
+
+    def check_stop(self) -> None:
+        """Before each step.
+
+        Raises:
+            SynthesisCancelled: The work is to end.
+            EffortSpentError: It has taken more steps than it may.
+        """
+        self._watch.check_stop()
+        self.steps += 1
+        if self.limit is not None and self.steps > self.limit:
+            raise EffortSpentError
+
+    def tell(self, phase: str, rounds: int, states: Any) -> None:
+        """Pass on progress."""
+        self._watch.tell(phase, rounds, states)
+
+
+class Problems:
+    """What is left of a problem without some of its obstacles.
+
+    Args:
+        encoding: The variables.
+        watch: Who waits.
+    """
+
+    def __init__(self, encoding: Encoding, watch: Watch) -> None:
+        self._encoding = encoding
+        self._watch = watch
+        # Copies share the manager and its variables; only what their automata may do and have marked differs.
+        self._variant = copy(encoding)
+        self._symbols = Symbols(encoding)
+        self._events = {event.name: event for event in encoding.system.events}
+        self._written = _written(encoding.system)
+        self._base: dict[tuple[str, frozenset[Obstacle]], Steps] = {}
+        self._conditions: dict[int, Any] = {}
+        self._invariants: dict[int, Any] = {}
+        self._on_event: dict[str, list[int]] = {}
+        for place, item in enumerate(encoding.system.conditions):
+            self._on_event.setdefault(item.event, []).append(place)
+
+    def without(self, dropped: Iterable[Obstacle]) -> tuple[FixedPoint, Problem]:
+        """The problem without some obstacles, and what solves it.
+
+        Raises:
+            SynthesisCancelled: The work is to end.
+        """
+        obstacles = tuple(dropped)
+        conditions = {place for item in obstacles for place in item.conditions}
+        invariants = {place for item in obstacles for place in item.invariants}
+        ranges = frozenset(item for item in obstacles if item.range is not None)
+        steps = tuple(
+            self.steps(event, ranges).under(
+                self._encoding.all_of(
+                    self.condition(place) for place in self.conditions_on(event) if place not in conditions
+                )
+            )
+            for event in self._events
+        )
+        kept = (place for place in range(len(self._encoding.system.invariants)) if place not in invariants)
+        safe = self._encoding.all_of([self._encoding.valid_states(), *(self.invariant(place) for place in kept)])
+        marked = copy(self._encoding)
+        marked.system = without_marks(self._encoding.system, obstacles)
+        return FixedPoint(marked, self._watch), Problem(steps, safe)
+
+    def steps(self, event: str, ranges: Iterable[Obstacle] = ()) -> Steps:
+        """What an event does without some ranges, under its event conditions."""
+        mine = frozenset(item for item in ranges if item.range in self._written.get(event, ()))
+        found = self._base.get((event, mine))
+        if found is None:
+            self._watch.check_stop()
+            self._variant.system = without_ranges(self._encoding.system, mine)
+            transition = transition_of(self._variant, self._events[event])
+            found = self._base[event, mine] = Steps(self._encoding, transition)
+        return found
+
+    def conditions_on(self, event: str) -> tuple[int, ...]:
+        """Places of the conditions on an event."""
+        return tuple(self._on_event.get(event, ()))
+
+    def condition(self, place: int) -> Any:
+        """Where an event condition is true."""
+        if place not in self._conditions:
+            self._watch.check_stop()
+            self._conditions[place] = self._symbols.holds(self._encoding.system.conditions[place].condition)
+        return self._conditions[place]
+
+    def invariant(self, place: int) -> Any:
+        """Where an invariant is true."""
+        if place not in self._invariants:
+            self._watch.check_stop()
+            self._invariants[place] = self._symbols.holds(self._encoding.system.invariants[place])
+        return self._invariants[place]
+
+    def written_by(self, event: str, ranges: Iterable[Obstacle]) -> tuple[Obstacle, ...]:
+        """The ranges that an event could leave."""
+        return tuple(item for item in ranges if item.range in self._written.get(event, ()))
+
+
+def _written(system: System) -> dict[str, frozenset[Subject]]:
+    """The variables that each event updates."""
+    found: dict[str, set[Subject]] = {}
+    for automaton in system.automata:
+        for edge in automaton.edges:
+            places = (Subject(automaton.name, update.variable) for update in edge.updates)
+            found.setdefault(edge.event, set()).update(places)
+    return {event: frozenset(places) for event, places in found.items()}

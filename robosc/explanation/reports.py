@@ -1,0 +1,80 @@
+"""From answers about automata to explanations in the model's words."""
+
+from typing import Any
+
+from robosc.automata.compile import State
+from robosc.explanation.analysis import Analysis, Detour, Hindrance, HindranceKind, Trouble
+from robosc.explanation.structure import Reason, Stopped, TroubleReport, Way
+from robosc.explanation.terms import Terms
+from robosc.explanation.words import value_text
+from robosc.synthesis.runs import Run
+
+MAXIMUM_REASONS = 20
+"""Reasons, and parts that are broken, that are told of one state: thousands would tell nothing more."""
+
+
+class Reporter:
+    """Words for the answers of one analysis.
+
+    Args:
+        analysis: The answers.
+        terms: The words.
+    """
+
+    def __init__(self, analysis: Analysis, terms: Terms) -> None:
+        self._analysis = analysis
+        self._terms = terms
+
+    def way(self, run: Run) -> Way:
+        """A run."""
+        return Way(run.events, run.is_shortest, self._terms.state(run.states[-1]))
+
+    def reason(self, item: Hindrance, state: State, good: Any, run: Run | None = None) -> Reason:
+        """Why an event cannot happen in a state, to which a run leads."""
+        message, part = self._terms.hindered(item, state)
+        trouble = None
+        if item.kind is HindranceKind.SUPERVISOR:
+            lost = self._analysis.lost_after(item.event, self._analysis.predicate(state), good)
+            trouble = self.trouble(self._analysis.trouble_after(lost))
+        return Reason(str(item.kind), message, part, self.way(run) if run else None, trouble)
+
+    def stopped(self, item: Detour, good: Any) -> Stopped:
+        """A way of the behaviours, and where it is stopped."""
+        reasons = tuple(self.reason(hindrance, item.state, good) for hindrance in item.hindrances[:MAXIMUM_REASONS])
+        return Stopped(item.events, item.stopped_at, self._terms.state(item.state), reasons)
+
+    def trouble(self, item: Trouble) -> TroubleReport:
+        """A run into trouble."""
+        state = item.run.states[-1]
+        parts = [self._terms.invariant_part(place) for place in item.invariants[:MAXIMUM_REASONS]]
+        messages = [f"'{part.text}' is broken" for part in parts]
+        for event, obstacle in item.leaving[:MAXIMUM_REASONS]:
+            part = self._terms.part(obstacle)
+            subject = str(obstacle.range)
+            value = self._terms.state(state).variables[subject]
+            messages.append(f"{event} can take {subject}, which is {value_text(value)}, out of its range")
+            parts.append(part)
+        for event, place in item.forbidden[:MAXIMUM_REASONS]:
+            part = self._terms.condition_part(place)
+            messages.append(f"{event} cannot be prevented, against '{part.text}'")
+            parts.append(part)
+        stopped = None
+        if item.is_blocking:
+            unmarked = item.unmarked[:MAXIMUM_REASONS]
+            names = [self._terms.automaton(name) for name in unmarked]
+            names += ["..."] if len(unmarked) < len(item.unmarked) else []
+            parts += [self._terms.automaton_part(name) for name in unmarked]
+            whose = f"; not marked now: {', '.join(names)}" if names else ""
+            messages.append(f"no marked state can be reached from there{whose}")
+            if item.detour is None:
+                messages.append("the behaviours by themselves have no way to one")
+            else:
+                stopped = self.stopped(item.detour, self._analysis.safe)
+        return TroubleReport(
+            kind="blocking" if item.is_blocking else "bad",
+            way=self.way(item.run),
+            is_forced=item.is_forced,
+            messages=tuple(messages),
+            parts=tuple(dict.fromkeys(parts)),
+            stopped=stopped,
+        )

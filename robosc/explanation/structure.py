@@ -1,0 +1,253 @@
+"""Explanations as values: what commands print, services send and programs read; `document` makes JSON values of them.
+
+They travel from a service to its client, so they are frozen values of plain types that msgspec can validate.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+
+from robosc.expressions import Value
+from robosc.source import Location
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A part of the model.
+
+    Attributes:
+        kind: `requirement`, `invariant`, `condition`, `range`, `marking`; `component`, `communication`, `state`.
+        text: What it is, in the model's words.
+        location: Where it stands.
+    """
+
+    kind: str
+    text: str
+    location: Location | None
+
+
+@dataclass(frozen=True, slots=True)
+class StateValues:
+    """One state, as `robosc explore` names it.
+
+    Attributes:
+        components: State of every component with a behaviour.
+        variables: Value of every synthesis variable, by `Component.variable`.
+        communications: Location of every service and action.
+    """
+
+    components: dict[str, str]
+    variables: dict[str, Value]
+    communications: dict[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """A run, and where it ends.
+
+    Attributes:
+        events: Its events.
+        is_shortest: Whether it is known that no run is shorter.
+        state: Its last state.
+    """
+
+    events: tuple[str, ...]
+    is_shortest: bool
+    state: StateValues
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """Why an event cannot happen in some state.
+
+    Attributes:
+        kind: `behaviour`, `range`, `requirement` or `supervisor`.
+        message: Why, in one sentence.
+        part: The part of the model, or None where it is the supervisor.
+        way: A shortest run to a state where it is so, or None where the state is given.
+        trouble: What would follow, where the supervisor forbids it.
+    """
+
+    kind: str
+    message: str
+    part: Part | None
+    way: Way | None = None
+    trouble: "TroubleReport | None" = None
+
+
+@dataclass(frozen=True, slots=True)
+class Stopped:
+    """A shortest way to some goal by the behaviours alone, and where it is stopped.
+
+    Attributes:
+        events: Events of the whole way.
+        stopped_at: Place of the event, from 0, that must not happen.
+        state: The state before that event.
+        reasons: Why it must not happen; none where it is uncontrollable and leads into trouble.
+    """
+
+    events: tuple[str, ...]
+    stopped_at: int
+    state: StateValues
+    reasons: tuple[Reason, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TroubleReport:
+    """A run into trouble.
+
+    Attributes:
+        kind: `bad`, where an invariant, a range or a condition is broken at the end, or `blocking`, where no marked
+            state can be reached from there.
+        way: The run.
+        is_forced: Whether nothing can prevent it: all of its events are uncontrollable.
+        messages: What the trouble is, in sentences.
+        parts: Parts of the model that are broken.
+        stopped: Of a state that blocks: the way that the behaviours would have to a marked state; None where they have
+            none.
+    """
+
+    kind: str
+    way: Way
+    is_forced: bool
+    messages: tuple[str, ...]
+    parts: tuple[Part, ...]
+    stopped: Stopped | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Blamed:
+    """A part of the model that is to blame.
+
+    Attributes:
+        part: The part.
+        suffices: Whether there is a supervisor without this part alone; None where that was not found out.
+    """
+
+    part: Part
+    suffices: bool | None
+
+
+@dataclass(frozen=True, slots=True)
+class EmptyExplanation:
+    """Why there is no supervisor.
+
+    Attributes:
+        trouble: A run into trouble.
+        blamed: Parts of the model that, without any other requirement, range or marking, leave no supervisor.
+        is_minimal: Whether it is known that each of them is needed for that.
+        removal: The fewest parts, in the sense that none of them can stay, without which there is a supervisor; empty
+            where that was not found out, or there are very many.
+        left_out: How many more parts are blamed than are listed.
+    """
+
+    trouble: TroubleReport
+    blamed: tuple[Blamed, ...]
+    is_minimal: bool
+    removal: tuple[Part, ...]
+    left_out: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class EventReport:
+    """What restricts an event.
+
+    Attributes:
+        event: The event.
+        is_controllable: Whether the supervisor may disable it.
+        status: `free`, where it can happen wherever the behaviours let it; `restricted`; `never`, where it can happen
+            nowhere.
+        reasons: What keeps it from happening, each with a shortest run to a state where it does.
+        stopped: Of an event that the behaviours never let happen: a way to where they would, and why that is stopped.
+    """
+
+    event: str
+    is_controllable: bool
+    status: str
+    reasons: tuple[Reason, ...]
+    stopped: Stopped | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class EventHere:
+    """Whether an event can happen in one state, and why not."""
+
+    event: str
+    is_controllable: bool
+    can_happen: bool
+    reasons: tuple[Reason, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class StateReport:
+    """What can happen in one state.
+
+    Attributes:
+        way: A run to it.
+        fitting: How many states of the controlled system fit what was asked, as a decimal number.
+        events: The events asked for.
+    """
+
+    way: Way
+    fitting: str
+    events: tuple[EventHere, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Remark:
+    """Something about the controlled system that its author should know.
+
+    Attributes:
+        kind: `never-enabled`, `unused-requirement`, `unreachable-state`, `only-uncontrollable` or `deadlock`.
+        message: One sentence.
+        location: Where, or None where it is about no single part.
+        way: A shortest run to such a state, where there is one.
+        stopped: Of a state that is not reachable: a way that the behaviours would have, and where it is stopped.
+    """
+
+    kind: str
+    message: str
+    location: Location | None
+    way: Way | None = None
+    stopped: Stopped | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """What synthesis did to a model.
+
+    Attributes:
+        empty: Why there is no supervisor, or None where there is one.
+        events: The events asked for; where none was, every controllable event. Empty where a state was asked for.
+        state: What can happen in the state asked for.
+        remarks: Warnings, where neither an event nor a state was asked for.
+    """
+
+    empty: EmptyExplanation | None = None
+    events: tuple[EventReport, ...] = ()
+    state: StateReport | None = None
+    remarks: tuple[Remark, ...] = ()
+
+
+def document(explanation: Explanation | EmptyExplanation) -> dict[str, Any]:
+    """An explanation as JSON values: objects with the names of the attributes."""
+    result: dict[str, Any] = msgspec.to_builtins(explanation)
+    return result
+
+
+def to_text(explanation: EmptyExplanation) -> str:
+    """An explanation as one JSON text, which `from_text` reads."""
+    return msgspec.json.encode(explanation).decode()
+
+
+def from_text(text: str) -> EmptyExplanation:
+    """The explanation that a text holds, validated.
+
+    Raises:
+        ValueError: It holds none.
+    """
+    try:
+        return msgspec.json.decode(text, type=EmptyExplanation)
+    except (msgspec.MsgspecError, RecursionError) as error:
+        raise ValueError(f"no explanation: {error}") from error

@@ -1,0 +1,169 @@
+"""Automata in the model's words: states, parts with their places, and why events cannot happen."""
+
+from collections.abc import Sequence
+
+from robosc.automata.compile import State, subjects_read
+from robosc.automata.plants import communication_plant_name
+from robosc.automata.state import Subject, subject_type, subjects
+from robosc.automata.structure import System
+from robosc.explanation.analysis import Hindrance, HindranceKind
+from robosc.explanation.obstacles import Obstacle, ObstacleKind
+from robosc.explanation.structure import Part, StateValues
+from robosc.explanation.words import value_text
+from robosc.expressions import TRUE, Expression, Value, type_text
+from robosc.expressions.text import expression_text
+from robosc.model.places import Places
+from robosc.model.structure import CommunicationKind, Model, RequirementForm
+from robosc.source import Location
+
+MAXIMUM_TEXT = 300
+"""Characters of a text of the model that are shown."""
+
+MAXIMUM_NAMES = 8
+"""Names, and values, that a sentence lists."""
+
+
+class Terms:
+    """The words of one model.
+
+    Args:
+        model: The model.
+        places: Where its parts stand.
+        system: Its automata.
+        obstacles: What its problem could be without; requirements and invariants in the model's order.
+    """
+
+    def __init__(self, model: Model, places: Places, system: System, obstacles: Sequence[Obstacle]) -> None:
+        self._model = model
+        self._places = places
+        self._system = system
+        self._obstacles = tuple(obstacles)
+        self._subjects = {subject: place for place, subject in enumerate(subjects(system))}
+        self._plants = {communication_plant_name(item): item for item in model.communications}
+        requirements = [item for item in obstacles if item.kind is ObstacleKind.REQUIREMENT]
+        self._requirements = {item: number for number, item in enumerate(requirements)}
+        self._by_condition = {place: item for item in obstacles for place in item.conditions}
+        self._by_invariant = {place: item for item in obstacles for place in item.invariants}
+
+    # States
+
+    def state(self, state: State) -> StateValues:
+        """A state, as `robosc explore` names it."""
+        values = dict(zip(self._subjects, state, strict=True))
+        return StateValues(
+            components={
+                item.name: str(values[Subject(item.name)]) for item in self._model.components if item.behaviour
+            },
+            variables={str(subject): value for subject, value in values.items() if subject.variable is not None},
+            communications={
+                item.name: str(values[Subject(name)])
+                for name, item in self._plants.items()
+                if item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
+            },
+        )
+
+    def values_read(self, expression: Expression, state: State) -> str:
+        """What a condition reads, with its values in a state; empty if it reads nothing."""
+        read = sorted(subjects_read(expression), key=self._subjects.__getitem__)
+        found = [self._value(subject, state[self._subjects[subject]]) for subject in read[:MAXIMUM_NAMES]]
+        return ", ".join(found) + (", ..." if len(read) > MAXIMUM_NAMES else "")
+
+    def _value(self, subject: Subject, value: Value) -> str:
+        if subject.variable is None:
+            return f"{self.automaton(subject.automaton)} is {value}"
+        return f"{subject} is {value_text(value)}"
+
+    def automaton(self, name: str) -> str:
+        """What an automaton is called in the model."""
+        return self._plants[name].name if name in self._plants else name
+
+    # Parts
+
+    def part(self, obstacle: Obstacle) -> Part:
+        """What an obstacle is in the model."""
+        text, location = self._described(obstacle)
+        return Part(str(obstacle.kind), _cut(text), location)
+
+    def _described(self, item: Obstacle) -> tuple[str, Location]:
+        if item.kind is ObstacleKind.REQUIREMENT:
+            number = self._requirements[item]
+            return self._requirement(number), self._places.requirements[number]
+        if item.invariants:
+            (place,) = item.invariants
+            invariant = self._model.invariants[place]
+            word = "never" if invariant.is_never else "always"
+            return f"requirement {word} {expression_text(invariant.expression)}", self._places.invariants[place]
+        if item.conditions:
+            (place,) = item.conditions
+            event = self._system.conditions[place].event
+            name = event.rpartition(".")[0]
+            return f"{event} only where a requirement on {name} does not hold", self._places.communications[name]
+        if item.range is not None:
+            component, variable = item.range.automaton, item.range.variable or ""
+            text = f"the range of {item.range}: {type_text(subject_type(self._system, item.range))}"
+            return text, self._places.variables[component, variable]
+        return self._marking(str(item.marking))
+
+    def _requirement(self, number: int) -> str:
+        item = self._model.requirements[number]
+        names = item.communications
+        shown = names[0] if len(names) == 1 else f"{{{', '.join(names)}}}"
+        expression = expression_text(item.expression)
+        if item.form is RequirementForm.NEEDS:
+            return f"requirement {shown} needs {expression}"
+        return f"requirement {expression} disables {shown}"
+
+    def _marking(self, automaton: str) -> tuple[str, Location]:
+        if automaton in self._plants:
+            name = self._plants[automaton].name
+            return f"that {name} gets back to idle", self._places.communications[name]
+        marked = sorted(self._system.automaton(automaton).marked)
+        shown = ", ".join(marked[:MAXIMUM_NAMES]) + (", ..." if len(marked) > MAXIMUM_NAMES else "")
+        return f"that {automaton} gets to a marked state ({shown or 'none'})", self._places.components[automaton]
+
+    def condition_part(self, place: int) -> Part:
+        """The part of the model that brings an event condition."""
+        return self.part(self._by_condition[place])
+
+    def invariant_part(self, place: int) -> Part:
+        """The part of the model that brings an invariant."""
+        return self.part(self._by_invariant[place])
+
+    def automaton_part(self, name: str) -> Part:
+        """The component or communication that an automaton stands for."""
+        if name in self._plants:
+            communication = self._plants[name].name
+            return Part("communication", communication, self._places.communications[communication])
+        return Part("component", name, self._places.components[name])
+
+    # Sentences
+
+    def hindered(self, item: Hindrance, state: State) -> tuple[str, Part | None]:
+        """Why an event cannot happen in a state, and the part of the model that is the cause."""
+        match item.kind:
+            case HindranceKind.BEHAVIOUR:
+                name = str(item.automaton)
+                return self._behaviour(name, item.event, state), self.automaton_part(name)
+            case HindranceKind.RANGE if item.range is not None and item.range.range is not None:
+                subject = item.range.range
+                now = value_text(state[self._subjects[subject]])
+                return f"it would take {subject}, which is {now}, out of its range", self.part(item.range)
+            case HindranceKind.REQUIREMENT if item.condition is not None:
+                part = self.condition_part(item.condition)
+                values = self.values_read(self._system.conditions[item.condition].condition, state)
+                return f"'{part.text}' forbids it" + (f": {values}" if values else ""), part
+            case _:
+                return "synthesis forbids it, because of what can follow", None
+
+    def _behaviour(self, name: str, event: str, state: State) -> str:
+        location = state[self._subjects[Subject(name)]]
+        edges = [edge for edge in self._system.automaton(name).edges if edge.event == event and edge.source == location]
+        where = f"{self.automaton(name)} is {location}"
+        if not edges:
+            return f"{where}, where it has no transition on {event}"
+        guards = [_cut(expression_text(edge.guard)) for edge in edges if edge.guard != TRUE]
+        return f"{where}, where {' and '.join(guards[:MAXIMUM_NAMES])} is not true"
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= MAXIMUM_TEXT else text[: MAXIMUM_TEXT - 4] + " ..."

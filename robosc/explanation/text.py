@@ -1,0 +1,179 @@
+"""Explanations as texts for a terminal: a thought a line, places as `file:line:column`."""
+
+from collections.abc import Iterator
+
+from robosc.explanation.structure import (
+    EmptyExplanation,
+    EventHere,
+    EventReport,
+    Explanation,
+    Part,
+    Reason,
+    Remark,
+    StateReport,
+    StateValues,
+    Stopped,
+    TroubleReport,
+    Way,
+)
+from robosc.explanation.words import events_text, value_text
+from robosc.source import visible
+
+MAXIMUM_VALUES = 30
+"""Values of a state that are shown."""
+
+
+def explanation_text(explanation: Explanation) -> str:
+    """What synthesis did to a model."""
+    return _joined(_explained(explanation))
+
+
+def empty_text(explanation: EmptyExplanation) -> str:
+    """Why there is no supervisor."""
+    return _joined(_empty(explanation))
+
+
+def _joined(lines: Iterator[str]) -> str:
+    return "".join(f"{visible(line)}\n" for line in lines)
+
+
+def _explained(item: Explanation) -> Iterator[str]:
+    if item.empty is not None:
+        yield from _empty(item.empty)
+    if item.state is not None:
+        yield from _state_report(item.state)
+    for event in item.events:
+        yield from _event(event)
+    for remark in item.remarks:
+        yield from _remark(remark)
+
+
+# No supervisor
+
+
+def _empty(item: EmptyExplanation) -> Iterator[str]:
+    yield "trouble:"
+    yield from _indented(_trouble(item.trouble, "from the initial state", "in the initial state already"))
+    if not item.blamed:
+        return
+    if not item.is_minimal:
+        yield "to blame is something among these (the search for the least of them was given up):"
+    elif len(item.blamed) == 1:
+        yield "to blame: this alone leaves no supervisor"
+    else:
+        yield "to blame: these together leave no supervisor, and each of them is needed for that"
+    for blamed in item.blamed:
+        yield f"  {_part(blamed.part)}"
+    if item.left_out:
+        yield f"  and {item.left_out} more"
+    if item.is_minimal and all(blamed.suffices for blamed in item.blamed):
+        yield f"there is a supervisor without {'it' if len(item.blamed) == 1 else 'any one of them'}"
+    elif item.removal:
+        yield "there is a supervisor without:"
+        for part in item.removal:
+            yield f"  {_part(part)}"
+
+
+def _part(part: Part) -> str:
+    return part.text if part.location is None else f"{part.location}: {part.text}"
+
+
+def _trouble(item: TroubleReport, start: str, here: str) -> Iterator[str]:
+    """A run into trouble.
+
+    Args:
+        item: The trouble.
+        start: Where a run begins, in words.
+        here: The place where there is no run, in words.
+    """
+    if not item.way.events:
+        yield f"{here}:"
+    elif item.is_forced:
+        yield f"{start} {events_text(item.way.events)} can follow, and nothing can prevent it"
+    else:
+        yield f"{start} every way on to a marked state is closed by trouble such as after {_run(item.way)}"
+    yield f"  there: {_state(item.way.state)}"
+    for message in item.messages:
+        yield f"  {message}"
+    if item.stopped is not None:
+        yield from _indented(_stopped(item.stopped, "the behaviours would have the way"))
+
+
+def _run(way: Way) -> str:
+    return events_text(way.events) + ("" if way.is_shortest else " (perhaps not the shortest way)")
+
+
+def _stopped(item: Stopped, what: str) -> Iterator[str]:
+    event = item.events[item.stopped_at]
+    if len(item.events) == 1:
+        yield f"{what} {event}, but it must not happen:"
+    else:
+        before = f" after {events_text(item.events[: item.stopped_at])}" if item.stopped_at else ""
+        yield f"{what} {events_text(item.events)}, but {event} must not happen{before}:"
+    for reason in item.reasons:
+        yield from _indented(_reason(reason))
+    if not item.reasons:
+        yield "  it leads into trouble"
+
+
+def _reason(item: Reason) -> Iterator[str]:
+    place = f" ({item.part.location})" if item.part is not None and item.part.location is not None else ""
+    when = ""
+    if item.way is not None:
+        when = f"; for instance after {_run(item.way)}" if item.way.events else "; for instance in the initial state"
+    yield f"{item.message}{place}{when}"
+    if item.trouble is not None:
+        yield from _indented(_trouble(item.trouble, "then", "it leads into trouble at once"))
+
+
+def _state(state: StateValues) -> str:
+    parts = [f"{name} is {value}" for name, value in (*state.components.items(), *state.communications.items())]
+    parts += [f"{name} = {value_text(value)}" for name, value in state.variables.items()]
+    return ", ".join(parts[:MAXIMUM_VALUES]) + (", ..." if len(parts) > MAXIMUM_VALUES else "")
+
+
+# With a supervisor
+
+_STATUSES = {
+    "free": "free: it can happen wherever the behaviours let it",
+    "restricted": "restricted",
+    "never": "can never happen",
+}
+
+
+def _event(item: EventReport) -> Iterator[str]:
+    kind = "" if item.is_controllable else " (uncontrollable)"
+    yield f"{item.event}{kind}: {_STATUSES[item.status]}"
+    for reason in item.reasons:
+        yield from _indented(_reason(reason))
+    if item.stopped is not None:
+        yield from _indented(_stopped(item.stopped, "the shortest way that the behaviours would have to it is"))
+
+
+def _state_report(item: StateReport) -> Iterator[str]:
+    where = f"after {_run(item.way)}" if item.way.events else "in the initial state"
+    more = "" if item.fitting == "1" else f" (one of {item.fitting} states that fit)"
+    yield f"{where}{more}:"
+    yield f"  {_state(item.way.state)}"
+    for event in item.events:
+        yield from _here(event)
+
+
+def _here(item: EventHere) -> Iterator[str]:
+    kind = "" if item.is_controllable else " (uncontrollable)"
+    yield f"{item.event}{kind}: {'can happen' if item.can_happen else 'cannot happen'}"
+    for reason in item.reasons:
+        yield from _indented(_reason(reason))
+
+
+def _remark(item: Remark) -> Iterator[str]:
+    place = "" if item.location is None else f"{item.location}: "
+    yield f"{place}warning: {item.message} [{item.kind}]"
+    if item.way is not None:
+        yield f"  {_state(item.way.state)}"
+    if item.stopped is not None:
+        yield from _indented(_stopped(item.stopped, "the shortest way that the behaviours would have there is"))
+
+
+def _indented(lines: Iterator[str]) -> Iterator[str]:
+    return (f"  {line}" for line in lines)

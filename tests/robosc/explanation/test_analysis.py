@@ -1,0 +1,148 @@
+"""Why events cannot happen in the states of random systems, against their explicit meaning."""
+
+import os
+from collections import Counter
+
+import pytest
+
+from robosc.automata import Semantics
+from robosc.automata.compile import NO_DATA, State, compile_expression
+from robosc.automata.state import Subject, subjects
+from robosc.explanation.analysis import Analysis, Hindrance, HindranceKind
+from robosc.explanation.obstacles import Obstacle, ObstacleKind, obstacles_of, without_ranges
+from robosc.explanation.problems import BoundedWatch, Problems
+from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.engines import make_manager
+from robosc.synthesis.watch import Watch
+from robosc.verification import synthesize_explicit
+from support.random_systems import random_system
+
+EXAMPLES = int(os.environ.get("ROBOSC_RANDOM_SYSTEMS", "40"))
+STATES = 6
+"""States of a system that are looked at."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _needs_cudd() -> None:
+    pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+
+
+class Twin:
+    """One system, symbolic and state by state."""
+
+    def __init__(self, seed: int) -> None:
+        self.system = random_system(seed)
+        supervisor = synthesize_explicit(self.system, limit=50_000)
+        assert supervisor is not None
+        self.supervisor = supervisor
+        self.semantics = Semantics(self.system)
+        self.obstacles = obstacles_of(self.system)
+        self.ranges = [item for item in self.obstacles if item.kind is ObstacleKind.RANGE]
+        self.unbounded = Semantics(without_ranges(self.system, self.ranges))
+        self.places = {subject: place for place, subject in enumerate(subjects(self.system))}
+        manager = make_manager("cudd")
+        watch = BoundedWatch(Watch(lambda: False, lambda progress: None))
+        encoding = Encoding(self.system, manager)
+        problems = Problems(encoding, watch)
+        fixed_point, problem = problems.without(())
+        good = fixed_point.good_states(problem, manager.false)
+        assert bool(good.reason) == supervisor.is_empty
+        self.false = manager.false
+        self.analysis = Analysis(encoding, watch, problems, self.obstacles, good.states)
+
+    def check(self, state: State, event: str, met: Counter[str]) -> None:
+        here = self.analysis.predicate(state)
+        found = self.analysis.hindrances(event, here)
+        assert all(item.event == event and item.where == here for item in found)
+        expected = [*self._behaviours(state, event)]
+        if self.system.event(event).is_controllable:
+            expected += [*self._ranges(state, event), *self._conditions(state, event)]
+            if self.semantics.enabled(state, event) and self.semantics.condition(state, event):
+                is_lost = not self.supervisor.good.issuperset(self.semantics.targets(state, event))
+                expected += [(HindranceKind.SUPERVISOR, None)] if is_lost else []
+                assert self.supervisor.allows(state, event) == (not is_lost)
+        assert [(item.kind, _cause(item)) for item in found] == expected
+        met.update(str(kind) for kind, _ in expected)
+        met["several ranges"] += sum(kind is HindranceKind.RANGE for kind, _ in expected) > 1
+        # Whatever keeps it from happening is named, and nothing where it can happen.
+        can_happen = here & self.analysis.possible(event) != self.false
+        assert can_happen == (not expected)
+        if can_happen and self.system.event(event).is_controllable:
+            assert self.supervisor.allows(state, event)
+        met["can happen"] += can_happen
+
+    def _behaviours(self, state: State, event: str) -> list[tuple[HindranceKind, object]]:
+        return [
+            (HindranceKind.BEHAVIOUR, item.name)
+            for item in self.system.automata
+            if event in item.alphabet
+            and not any(
+                edge.event == event
+                and edge.source == state[self.places[Subject(item.name)]]
+                and compile_expression(edge.guard, self.places)(state, NO_DATA) is True
+                for edge in item.edges
+            )
+        ]
+
+    def _ranges(self, state: State, event: str) -> list[tuple[HindranceKind, object]]:
+        """The ranges each of which alone, the others left out, keeps the event from happening."""
+        if not self.unbounded.enabled(state, event):
+            return []
+        return [
+            (HindranceKind.RANGE, item)
+            for item in self.ranges
+            if not Semantics(without_ranges(self.system, [r for r in self.ranges if r != item])).enabled(state, event)
+        ]
+
+    def _conditions(self, state: State, event: str) -> list[tuple[HindranceKind, object]]:
+        if not self.unbounded.enabled(state, event):
+            return []
+        return [
+            (HindranceKind.REQUIREMENT, place)
+            for place, item in enumerate(self.system.conditions)
+            if item.event == event and compile_expression(item.condition, self.places)(state, NO_DATA) is not True
+        ]
+
+
+def _cause(item: Hindrance) -> str | Obstacle | int | None:
+    return {
+        HindranceKind.BEHAVIOUR: item.automaton,
+        HindranceKind.RANGE: item.range,
+        HindranceKind.REQUIREMENT: item.condition,
+        HindranceKind.SUPERVISOR: None,
+    }[item.kind]
+
+
+def test_hindrances_in_reachable_states() -> None:
+    met: Counter[str] = Counter()
+    for seed in range(EXAMPLES):
+        twin = Twin(seed)
+        for state in sorted(twin.supervisor.reachable)[:STATES]:
+            for event in twin.system.events:
+                twin.check(state, event.name, met)
+    assert all(met[name] for name in (*map(str, HindranceKind), "can happen")), met
+
+
+def test_what_would_follow_runs_into_trouble() -> None:
+    """Of every event that the supervisor forbids: the states that it would lead to, and that they are lost."""
+    met: Counter[str] = Counter()
+    for seed in range(EXAMPLES):
+        twin = Twin(seed)
+        for state in sorted(twin.supervisor.reachable)[:STATES]:
+            here = twin.analysis.predicate(state)
+            for event in twin.system.events:
+                kinds = {item.kind for item in twin.analysis.hindrances(event.name, here)}
+                if HindranceKind.SUPERVISOR in kinds:
+                    trouble = twin.analysis.trouble_after(
+                        twin.analysis.lost_after(event.name, here, twin.analysis.good)
+                    )
+                    start = trouble.run.states[0]
+                    assert start in twin.semantics.targets(state, event.name)
+                    assert start not in twin.supervisor.good
+                    assert trouble.run.states[-1] not in twin.supervisor.good
+                    assert trouble.is_blocking == (not twin.semantics.bad(trouble.run.states[-1]))
+                    forced = all(not twin.system.event(name).is_controllable for name in trouble.run.events)
+                    assert trouble.is_forced == forced
+                    met["forced" if forced else "not forced"] += 1
+                    met["blocking" if trouble.is_blocking else "bad"] += 1
+    assert all(met[name] for name in ("forced", "blocking", "bad")), met

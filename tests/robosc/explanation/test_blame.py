@@ -1,0 +1,268 @@
+"""What is to blame and how trouble comes about, against explicit synthesis and search on random systems."""
+
+import os
+from collections import Counter, deque
+from collections.abc import Iterable
+from functools import cache
+from itertools import chain, combinations, pairwise
+
+import pytest
+
+from robosc.automata import Semantics, System
+from robosc.automata.compile import NO_DATA, State, compile_expression
+from robosc.automata.state import subjects
+from robosc.errors import SynthesisCancelled
+from robosc.explanation.analysis import Analysis, HindranceKind, Trouble
+from robosc.explanation.blame import find_blame
+from robosc.explanation.obstacles import Obstacle, ObstacleKind, obstacles_of, without
+from robosc.explanation.problems import BoundedWatch, Problems
+from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.engines import make_manager
+from robosc.synthesis.fixed_point import initial_states
+from robosc.synthesis.watch import Watch
+from robosc.verification import synthesize_explicit
+from support.empty_systems import empty_system
+
+ENGINES = ("cudd", "autoref")
+EXAMPLES = int(os.environ.get("ROBOSC_RANDOM_SYSTEMS", "30"))
+LIMIT = 50_000
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _needs_cudd() -> None:
+    pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+
+
+class Symbolic:
+    """A system, encoded for questions."""
+
+    def __init__(self, system: System, engine: str) -> None:
+        self.manager = make_manager(engine)
+        self.watch = BoundedWatch(Watch(lambda: False, lambda progress: None))
+        self.encoding = Encoding(system, self.manager)
+        self.obstacles = obstacles_of(system)
+        self.problems = Problems(self.encoding, self.watch)
+
+    def trouble(self) -> Trouble:
+        analysis = Analysis(self.encoding, self.watch, self.problems, self.obstacles, self.manager.false)
+        return analysis.trouble_after(initial_states(self.encoding))
+
+
+def is_empty(system: System) -> bool:
+    supervisor = synthesize_explicit(system, limit=LIMIT)
+    assert supervisor is not None
+    return supervisor.is_empty
+
+
+def test_the_blamed_set_is_minimal_and_the_removal_too() -> None:
+    """By explicit synthesis of what is left: alone it leaves no supervisor, and with any one less there is one."""
+    met: Counter[object] = Counter()
+    for seed in range(EXAMPLES):
+        system = empty_system(seed)
+        symbolic = [Symbolic(system, engine) for engine in ENGINES]
+        blames = [find_blame(item.problems, item.obstacles, item.manager.false, item.watch) for item in symbolic]
+        assert blames[0] == blames[1]
+        blame, obstacles = blames[0], symbolic[0].obstacles
+        everything = frozenset(range(len(obstacles)))
+
+        @cache
+        def empty_with(
+            kept: frozenset[int], system: System = system, obstacles: tuple[Obstacle, ...] = obstacles
+        ) -> bool:
+            return is_empty(without(system, [item for place, item in enumerate(obstacles) if place not in kept]))
+
+        assert blame.is_minimal
+        conflict = frozenset(blame.conflict)
+        assert empty_with(conflict)
+        assert not any(empty_with(conflict - {item}) for item in conflict)
+        assert blame.sufficing == tuple(item for item in blame.conflict if not empty_with(everything - {item}))
+        assert blame.removal is not None
+        left = everything - set(blame.removal)
+        assert not empty_with(left)
+        assert all(empty_with(left | {item}) for item in blame.removal)
+        if len(obstacles) <= 5:
+            # The whole lattice: less never empties, nothing at all is solvable.
+            subsets = chain.from_iterable(combinations(sorted(everything), n) for n in range(len(everything) + 1))
+            for kept in map(frozenset, subsets):
+                assert not empty_with(kept) or all(empty_with(kept | {item}) for item in everything)
+            met["lattice"] += 1
+        met[len(conflict)] += 1
+        met[f"removal of {len(blame.removal)}"] += 1
+        met.update(obstacles[item].kind for item in conflict)
+    assert met[1] and met[2] + met[3] >= EXAMPLES // 20, met
+    assert met["removal of 2"], met
+    assert met["lattice"] >= EXAMPLES // 10
+    assert all(met[kind] for kind in ObstacleKind if kind is not ObstacleKind.REQUIREMENT), met
+
+
+class Search:
+    """What can be reached under the requirements, state by state; bad states are its ends."""
+
+    def __init__(self, system: System) -> None:
+        self.semantics = Semantics(system)
+        self.system = system
+        self.states = self._reached([self.semantics.initial])
+        coreachable = {state for state in self.states if self.semantics.is_marked(state) and not self.bad(state)}
+        grown = True
+        while grown:
+            more = {state for state in self.states if not self.bad(state) and self._reaches(state, coreachable)}
+            grown = not more <= coreachable
+            coreachable |= more
+        self.troubled = self.states - coreachable
+
+    def bad(self, state: State) -> bool:
+        return self.semantics.bad(state)
+
+    def steps(self, state: State) -> Iterable[tuple[str, State]]:
+        for event in self.system.events:
+            if not event.is_controllable or self.semantics.condition(state, event.name):
+                for target in self.semantics.targets(state, event.name):
+                    yield event.name, target
+
+    def _reaches(self, state: State, goal: set[State]) -> bool:
+        for event in self.system.events:
+            if event.is_controllable and not self.semantics.condition(state, event.name):
+                continue
+            targets = self.semantics.targets(state, event.name)
+            # A supervisor allows a controllable event as a whole or not at all, and none into a bad state.
+            if targets & goal and not (event.is_controllable and any(map(self.bad, targets))):
+                return True
+        return False
+
+    def _reached(self, states: list[State]) -> set[State]:
+        found = set(states)
+        while states:
+            state = states.pop()
+            if not self.bad(state):
+                for _, target in self.steps(state):
+                    if target not in found:
+                        found.add(target)
+                        states.append(target)
+        return found
+
+    def distance(self, *, uncontrollable_only: bool) -> int | None:
+        """Length of a shortest run into trouble."""
+        distances = {self.semantics.initial: 0}
+        queue = deque(distances)
+        while queue:
+            state = queue.popleft()
+            if state in self.troubled:
+                return distances[state]
+            for event, target in self.steps(state):
+                if uncontrollable_only and self.system.event(event).is_controllable:
+                    continue
+                if target not in distances:
+                    distances[target] = distances[state] + 1
+                    queue.append(target)
+        return None
+
+
+def test_trouble_is_real_and_the_run_is_shortest() -> None:
+    met: Counter[str] = Counter()
+    for seed in range(2 * EXAMPLES):
+        system = empty_system(seed)
+        trouble, other = (Symbolic(system, engine).trouble() for engine in ENGINES)
+        assert trouble.run == other.run
+        search = Search(system)
+        run = trouble.run
+        assert run.is_shortest
+        assert run.states[0] == search.semantics.initial
+        for event, (before, after) in zip(run.events, pairwise(run.states), strict=True):
+            assert (event, after) in list(search.steps(before))
+        last = run.states[-1]
+        assert last in search.troubled
+        forced = search.distance(uncontrollable_only=True)
+        assert trouble.is_forced == (forced is not None)
+        assert len(run.events) == (search.distance(uncontrollable_only=False) if forced is None else forced)
+        assert trouble.is_blocking == (not search.bad(last))
+        met["forced" if trouble.is_forced else "not forced"] += 1
+        met["blocking" if trouble.is_blocking else "bad"] += 1
+        met["long"] += len(run.events) > 1
+        _check_what_is_broken(system, search, trouble, last, met)
+        if trouble.is_blocking:
+            _check_detour(system, search, trouble, last, met)
+    assert all(met[name] for name in ("forced", "not forced", "blocking", "bad", "long", "invariant", "range")), met
+    assert all(met[name] for name in ("condition", "no way", *map(str, HindranceKind))), met
+
+
+def _check_what_is_broken(system: System, search: Search, trouble: Trouble, last: State, met: Counter[str]) -> None:
+    places = {subject: place for place, subject in enumerate(subjects(system))}
+    broken = [compile_expression(item, places)(last, NO_DATA) is not True for item in system.invariants]
+    assert trouble.invariants == tuple(place for place, is_broken in enumerate(broken) if is_broken)
+    met["invariant"] += any(broken)
+    for place, condition in enumerate(system.conditions):
+        if not system.event(condition.event).is_controllable:
+            is_broken = compile_expression(condition.condition, places)(last, NO_DATA) is not True
+            expected = is_broken and search.semantics.enabled(last, condition.event)
+            assert ((condition.event, place) in trouble.forbidden) == expected
+            met["condition"] += expected
+    for event, obstacle in trouble.leaving:
+        # With all other ranges left out and no condition or invariant, the state is still bad because of this one.
+        others = [item for item in obstacles_of(system) if item != obstacle]
+        assert Semantics(without(system, others)).trouble(last) is not None
+        assert not system.event(event).is_controllable
+        met["range"] += 1
+    free = [item for item in obstacles_of(system) if item.kind is not ObstacleKind.RANGE]
+    assert Semantics(without(system, free)).bad(last) == bool(trouble.leaving)
+
+
+def _check_detour(system: System, search: Search, trouble: Trouble, last: State, met: Counter[str]) -> None:
+    """The plants alone would have this way, and up to the event named all of it is allowed."""
+    free = Semantics(without(system, [item for item in obstacles_of(system) if item.kind is not ObstacleKind.MARKING]))
+    queue, distances = deque([last]), {last: 0}
+    found = None
+    while queue and found is None:
+        state = queue.popleft()
+        if free.is_marked(state):
+            found = distances[state]
+        for each in system.events:
+            for target in free.targets(state, each.name):
+                if target not in distances:
+                    distances[target] = distances[state] + 1
+                    queue.append(target)
+    assert (trouble.detour is None) == (found is None)
+    if trouble.detour is None:
+        met["no way"] += 1
+        return
+    assert len(trouble.detour.events) == found
+    states = {last}
+    for event in trouble.detour.events[: trouble.detour.stopped_at]:
+        states = {target for state in states for name, target in search.steps(state) if name == event}
+        states = {state for state in states if not search.bad(state)}
+    here, event = trouble.detour.state, trouble.detour.events[trouble.detour.stopped_at]
+    assert here in states
+    assert not search.bad(here)
+    semantics = search.semantics
+    kinds = {item.kind for item in trouble.detour.hindrances}
+    met.update(map(str, kinds))
+    if system.event(event).is_controllable:
+        assert (HindranceKind.REQUIREMENT in kinds) == (not semantics.condition(here, event))
+        assert (HindranceKind.RANGE in kinds) == (not semantics.enabled(here, event))
+        assert kinds
+    met[str(HindranceKind.BEHAVIOUR)] += HindranceKind.BEHAVIOUR not in kinds
+
+
+def test_a_search_that_takes_too_long_tells_what_it_has() -> None:
+    """Whatever the limit: what is blamed is to blame, and only a search to its end calls it minimal."""
+    symbolic = Symbolic(empty_system(3), "cudd")
+    full = find_blame(symbolic.problems, symbolic.obstacles, symbolic.manager.false, symbolic.watch)
+    needed = symbolic.watch.steps
+    seen = set()
+    for limit in range(0, needed + 20, max(1, needed // 40)):
+        item = Symbolic(empty_system(3), "cudd")
+        item.watch.limit = limit
+        blame = find_blame(item.problems, item.obstacles, item.manager.false, item.watch)
+        kept = {item.obstacles[place] for place in blame.conflict}
+        assert is_empty(without(empty_system(3), [each for each in item.obstacles if each not in kept]))
+        assert not blame.is_minimal or blame.conflict == full.conflict
+        assert blame.sufficing is None or blame.sufficing == full.sufficing
+        seen.add((blame.is_minimal, blame.removal is None))
+    assert seen == {(False, True), (True, True), (True, False)}
+
+
+def test_the_search_can_be_stopped() -> None:
+    symbolic = Symbolic(empty_system(3), "cudd")
+    stopped = BoundedWatch(Watch(lambda: True, lambda progress: None))
+    problems = Problems(symbolic.encoding, stopped)
+    with pytest.raises(SynthesisCancelled):
+        find_blame(problems, symbolic.obstacles, symbolic.manager.false, stopped)

@@ -7,6 +7,12 @@ from robosc.cli.output import UsageError
 from robosc.model.structure import Deployment
 from robosc.source import Bundle
 
+MAXIMUM_LIMIT = 10**9
+"""States beyond which no machine could search one by one."""
+
+SYNTHESIS_STATES = 200_000
+"""States up to which the result of a synthesis is verified one by one: some seconds."""
+
 
 def add_model_arguments(parser: argparse.ArgumentParser) -> None:
     """The model, its library folders and `--json`."""
@@ -51,6 +57,29 @@ def add_engine_argument(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="engine for decision diagrams: cudd, autoref (plain Python), or auto: the fastest installed (the default)",
     )
+
+
+def add_verify_limit_argument(parser: argparse.ArgumentParser, name: str, default: int) -> None:
+    """How far the independent verifier goes."""
+    parser.add_argument(
+        name,
+        type=_natural,
+        default=default,
+        metavar="N",
+        help="verify up to N states one by one, recompute the supervisor up to N/4 states of the system without it, "
+        "and search symbolically beyond, with 25 N nodes of work; what takes more is 'not checked' (default: "
+        "%(default)s)",
+    )
+
+
+def _natural(text: str) -> int:
+    value = int(text)
+    if not 0 <= value <= MAXIMUM_LIMIT:
+        raise ValueError
+    return value
+
+
+_natural.__name__ = "number"
 
 
 def read_bundle(arguments: argparse.Namespace) -> Bundle:

@@ -22,7 +22,7 @@ from robosc.verification.search import Effort, Reached, blocking_state, search
 from support.families import FAMILIES
 from support.random_supervisors import random_diagram
 from support.random_systems import systems
-from support.systems import automaton, edge, received, system
+from support.systems import automaton, edge, operation, read, received, system
 
 
 def effort(limit: int = 20_000) -> Effort:
@@ -104,6 +104,25 @@ def test_the_recomputed_supervisor_is_the_explicit_one(made: System) -> None:
         for place, event in enumerate(made.events):
             if event.is_controllable:
                 assert found.allows(code, place) == explicit.allows(states[number], event.name)
+
+
+def test_an_event_that_may_end_badly_is_no_way_out() -> None:
+    """A supervisor allows a controllable event as a whole or not at all."""
+    n = IntegerType(0, 1)
+    made = system(
+        automaton(
+            "A",
+            [edge("home -go-> away", n=received()), edge("away -rest-> done", operation(read("A.n"), "=", 0))],
+            marked=["done"],
+            variables=[DiscreteVariable("n", n, 0)],
+        ),
+        inputs=[InputVariable("go", (), n)],
+    )
+    packing, found = _allowed(made)
+    good = {packing.decode(code) for code, number in found.numbers.items() if found.good[number]}
+    explicit = synthesize_explicit(made, limit=100)
+    assert explicit is not None
+    assert good == explicit.good == {("away", 0), ("done", 0)}
 
 
 def test_what_is_forgotten_is_worked_out_again(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@ from robosc.automata import DiscreteVariable, InputVariable, Semantics, System
 from robosc.automata.compile import State
 from robosc.automata.decision import Decision
 from robosc.errors import SynthesisCancelled
-from robosc.expressions import Binary, BooleanType, Conditional, IntegerType, StateTest, Unary, VariableRead
+from robosc.expressions import Binary, BooleanType, Call, Conditional, IntegerType, StateTest, Unary, VariableRead
 from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.structure import AddedCondition, DecisionDiagram
 from robosc.synthesis import SynthesisStatus, synthesize
@@ -215,6 +215,37 @@ def test_long_chains_and_conditionals_are_taken() -> None:
         conditions={"back": chain},
     )
     _agrees(made, {})
+
+
+def test_what_is_unknown_changes_nothing() -> None:
+    """The quotient is unknown, and so is what is compared with it; the event happens all the same."""
+    quotient = operation(2, "/", read("A.n"))
+    made = system(
+        automaton(
+            "A",
+            [edge("l -go-> m", b=operation(quotient, "=", 1), k=Call("integer", (quotient,))), "m -u_x-> l"],
+            variables=[
+                DiscreteVariable("n", IntegerType(0, 1), 0),
+                DiscreteVariable("k", IntegerType(0, 1), 1),
+                DiscreteVariable("b", BooleanType(), True),
+            ],
+        )
+    )
+    assert _agrees(made, {}).states == 2
+
+
+def test_an_array_has_no_gaps() -> None:
+    """Its second element is never known without its first."""
+    one = IntegerType(1, 1)
+    made = system(
+        automaton(
+            "A",
+            [edge("l -u_got-> l", x=received("scan", 0), y=received("scan", 1))],
+            variables=[DiscreteVariable(name, IntegerType(0, 1), 0) for name in ("x", "y")],
+        ),
+        inputs=[InputVariable("u_got", ("scan", index), one, may_be_unknown=True) for index in (0, 1)],
+    )
+    assert _agrees(made, {}).states == 3
 
 
 def test_the_order_keeps_neighbours_together() -> None:

@@ -10,6 +10,11 @@ from robosc.source import Bundle
 
 if TYPE_CHECKING:
     from robosc.synthesis import EngineOptions
+MAXIMUM_LIMIT = 10**9
+"""States beyond which no machine could search one by one."""
+
+SYNTHESIS_STATES = 200_000
+"""States up to which the result of a synthesis is verified one by one: some seconds."""
 
 
 def add_model_arguments(parser: argparse.ArgumentParser) -> None:
@@ -84,6 +89,29 @@ def engine_options(arguments: argparse.Namespace) -> "EngineOptions":
     from robosc.synthesis import EngineOptions
 
     return EngineOptions(arguments.engine or "auto", arguments.reorder, arguments.max_nodes)
+
+
+def add_verify_limit_argument(parser: argparse.ArgumentParser, name: str, default: int) -> None:
+    """How far the independent verifier goes."""
+    parser.add_argument(
+        name,
+        type=_natural,
+        default=default,
+        metavar="N",
+        help="verify up to N states one by one, recompute the supervisor up to N/4 states of the system without it, "
+        "and search symbolically beyond, with 25 N nodes of work; what takes more is 'not checked' (default: "
+        "%(default)s)",
+    )
+
+
+def _natural(text: str) -> int:
+    value = int(text)
+    if not 0 <= value <= MAXIMUM_LIMIT:
+        raise ValueError
+    return value
+
+
+_natural.__name__ = "number"
 
 
 def read_bundle(arguments: argparse.Namespace) -> Bundle:

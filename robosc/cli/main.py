@@ -1,4 +1,4 @@
-"""`robosc`: check, synthesize, explore and generate on this machine.
+"""`robosc`: check, synthesize, verify, explore and generate on this machine.
 
 Every command is a module with `add_parser` and `run`; what a command needs is imported when it runs, so
 that `robosc check` does not pay for decision diagrams.
@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 from robosc._version import __version__
-from robosc.cli import check, doc, explain, explain_synthesis, explore, generate, new, synth
+from robosc.cli import check, doc, explain, explain_synthesis, explore, generate, new, synth, verify
 from robosc.cli import format as format_
 from robosc.cli.output import ExitCode, UsageError, prepare_streams, print_diagnostics
 from robosc.errors import LanguageError, RoboscError
@@ -18,7 +18,7 @@ from robosc.source import visible
 _EPILOG = """\
 exit status:
   0  done; the model has no errors
-  1  the model has errors, or no supervisor exists
+  1  the model has errors, no supervisor exists, or one that was checked is wrong
   2  wrong use
 """
 
@@ -33,7 +33,7 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"robosc {__version__}")
     commands = parser.add_subparsers(title="commands", dest="command", required=True, metavar="COMMAND")
-    for command in (new, check, format_, synth, explore, generate, explain_synthesis, explain, doc):
+    for command in (new, check, format_, synth, verify, explore, generate, explain_synthesis, explain, doc):
         command.add_parser(commands)
     return parser
 

@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from robosc.cli.arguments import (
+    SYNTHESIS_STATES,
     add_deployment_argument,
     add_engine_argument,
     add_model_arguments,
+    add_verify_limit_argument,
     engine_options,
     read_bundle,
 )
@@ -44,6 +46,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     add_output_argument(parser)
     add_deployment_argument(parser)
     add_engine_argument(parser)
+    add_verify_limit_argument(parser, "--verify-limit", SYNTHESIS_STATES)
     parser.set_defaults(run=run)
 
 
@@ -55,10 +58,10 @@ def add_output_argument(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Synthesize; 0 with a supervisor, 1 without."""
     bundle = read_bundle(arguments)
-    return report_synthesis(arguments, make(arguments, bundle), bundle)
+    return report_synthesis(arguments, make(arguments, bundle, verify_limit=arguments.verify_limit), bundle)
 
 
-def make(arguments: argparse.Namespace, bundle: Bundle) -> "Made":
+def make(arguments: argparse.Namespace, bundle: Bundle, *, verify_limit: int = SYNTHESIS_STATES) -> "Made":
     """Synthesize as the arguments say, with a progress line on a terminal."""
     from robosc.supervisor import make_supervisor
 
@@ -68,6 +71,7 @@ def make(arguments: argparse.Namespace, bundle: Bundle) -> "Made":
             bundle,
             deployment=Deployment(arguments.deployment),
             engine=engine_options(arguments),
+            verify_limit=verify_limit,
             on_progress=lambda step: progress.show(f"{step.stage}: {step.message}"),
         )
     finally:

@@ -9,35 +9,26 @@ from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
 
-from robosc._version import __version__
 from robosc.automata import System, to_automata
-from robosc.automata.controlled import TRANSITIONS_PER_STATE
-from robosc.errors import Diagnostic, InternalError, NodeLimitError, sorted_diagnostics
+from robosc.errors import Diagnostic, NodeLimitError, sorted_diagnostics
 from robosc.explanation import EmptyExplanation, explain_empty
 from robosc.model import check
 from robosc.model.layers import layer_findings
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model
 from robosc.source import Bundle
-from robosc.supervisor.conditions import state_predicates
-from robosc.supervisor.structure import Certificate, CheckResult, Supervisor
+from robosc.supervisor.certify import certify
+from robosc.supervisor.structure import Supervisor
 from robosc.synthesis import (
     EngineOptions,
     Statistics,
-    SynthesisResult,
     SynthesisStatus,
     findings,
     questions_about,
     synthesize,
 )
 from robosc.synthesis import Progress as SynthesisProgress
-from robosc.verification import verify
-
-VERIFICATION_LIMIT = 50_000
-"""States up to which the explicit verifier searches; beyond, the certificate says 'not checked'."""
-
-PERMISSIVENESS_LIMIT = 20_000
-"""States of the uncontrolled system up to which permissiveness is checked by recomputing explicitly."""
+from robosc.verification import DEFAULT_STATES, Limits
 
 
 class MadeStatus(StrEnum):
@@ -123,6 +114,7 @@ def make_supervisor(
     *,
     deployment: Deployment = Deployment.CONTROLLER,
     engine: str | EngineOptions = "auto",
+    verify_limit: int = DEFAULT_STATES,
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[Progress], None] = lambda progress: None,
 ) -> Made:
@@ -132,6 +124,7 @@ def make_supervisor(
         bundle: The model and its libraries.
         deployment: Where the supervisor will stand.
         engine: Name of the engine for decision diagrams, or more about it.
+        verify_limit: States up to which the result is verified one by one; see `Limits.of`.
         should_stop: Asked again and again; once true, the work ends.
         on_progress: Told where the work is.
 
@@ -173,75 +166,15 @@ def make_supervisor(
             )
         return Made(MadeStatus.EMPTY, None, prepared.diagnostics, result.statistics, reason, explanation)
     on_progress(Progress("verification", f"{result.statistics.states} states"))
-    certificate = _certify(system, result, bundle, deployment, should_stop)
+    certificate = certify(
+        system,
+        result,
+        bundle,
+        deployment,
+        Limits.of(verify_limit),
+        should_stop=should_stop,
+        on_progress=lambda message: on_progress(Progress("verification", message)),
+    )
     supervisor = Supervisor(model, deployment, result.added, certificate)
     diagnostics = sorted_diagnostics((*prepared.diagnostics, *findings(model, places, result.answers)))
     return Made(MadeStatus.SUPERVISOR, supervisor, diagnostics, result.statistics)
-
-
-def _certify(
-    system: System,
-    result: SynthesisResult,
-    bundle: Bundle,
-    deployment: Deployment,
-    should_stop: Callable[[], bool],
-) -> Certificate:
-    """Let the independent verifier judge the result; a fault it finds is ours."""
-    if result.statistics.states > VERIFICATION_LIMIT:
-        on_limit = f"not searched: more than {VERIFICATION_LIMIT} states"
-        return _certificate(result, bundle, deployment, on_limit, ("not checked",) * 4, None)
-    verification = verify(
-        system,
-        state_predicates(system, result.added),
-        limit=VERIFICATION_LIMIT,
-        permissive_limit=PERMISSIVENESS_LIMIT,
-        should_stop=should_stop,
-    )
-    if verification.states is None:
-        on_limit = (
-            f"not searched: more than {TRANSITIONS_PER_STATE * VERIFICATION_LIMIT} transitions, or too many in one step"
-        )
-        return _certificate(result, bundle, deployment, on_limit, ("not checked",) * 4, None)
-    outcomes = (
-        verification.safe,
-        verification.controllable,
-        verification.nonblocking,
-        verification.maximally_permissive,
-    )
-    if "failed" in outcomes or verification.states != result.statistics.states:
-        raise InternalError(
-            f"the verifier refuses the supervisor: {verification.message or 'another number of states'}"
-            + (f" after {', '.join(verification.trace)}" if verification.trace else "")
-        )
-    recomputed = (
-        f"permissiveness not recomputed: more than {PERMISSIVENESS_LIMIT} states, or "
-        f"{TRANSITIONS_PER_STATE * PERMISSIVENESS_LIMIT} transitions"
-        if verification.maximally_permissive == "not checked"
-        else "permissiveness by explicit recomputation"
-    )
-    method = f"explicit forward search; {recomputed}"
-    results = tuple[CheckResult, ...]("passed" if outcome == "passed" else "not checked" for outcome in outcomes)
-    return _certificate(result, bundle, deployment, method, results, verification.transitions)
-
-
-def _certificate(
-    result: SynthesisResult,
-    bundle: Bundle,
-    deployment: Deployment,
-    method: str,
-    outcomes: tuple[CheckResult, ...],
-    transitions: int | None,
-) -> Certificate:
-    safe, controllable, nonblocking, permissive = outcomes
-    return Certificate(
-        engine_version=__version__,
-        bundle_sha256=bundle.digest,
-        deployment=deployment,
-        method=method,
-        safe=safe,
-        controllable=controllable,
-        nonblocking=nonblocking,
-        maximally_permissive=permissive,
-        states=str(result.statistics.states),
-        transitions=None if transitions is None else str(transitions),
-    )

@@ -1,25 +1,26 @@
-"""Judges a synthesized supervisor by forward search of the controlled system.
+"""Judges a supervisor by explicit forward search of the controlled system.
 
 The controlled system is searched state by state under the plants, the requirements and the conditions
-that the supervisor adds. What is checked is what semantics part 2 promises, one property after the other:
+that the supervisor adds. What is checked is what a supervisor promises, one property after the other:
 safe, controllable, nonblocking; maximally permissive by synthesizing anew, explicitly, and comparing.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
 from robosc.automata.compile import State
-from robosc.automata.controlled import Added, ControlledGraph, controlled_graph
-from robosc.automata.semantics import Semantics
+from robosc.automata.controlled import Added
 from robosc.automata.state import subjects
 from robosc.automata.structure import System
-from robosc.verification.explicit import ExplicitSupervisor, synthesize_explicit
+from robosc.verification.packing import Packing
+from robosc.verification.permissive import Allowed, allowed
+from robosc.verification.search import Effort, Reached, blocking_state, search
 
-DEFAULT_LIMIT = 100_000
+DEFAULT_LIMIT = 200_000
 """States up to which the controlled system is searched."""
 
-DEFAULT_PERMISSIVE_LIMIT = 20_000
+DEFAULT_PERMISSIVE_LIMIT = 100_000
 """States up to which the supervisor is recomputed."""
 
 
@@ -37,15 +38,19 @@ class Failure:
 
     Attributes:
         property: `safe`, `controllable`, `nonblocking` or `maximally permissive`.
-        trace: Events of a shortest run from the initial state into the trouble.
+        trace: Events of a shortest run from an initial state into the trouble.
         state: The state that it leads to, in the order of `subjects`.
-        message: What is wrong there, in words.
+        reason: What is wrong there, in words.
+        message: The same, and the state.
+        is_shortest: Whether there is certainly no shorter run; a symbolic search may have to do with any run.
     """
 
     property: str
     trace: tuple[str, ...]
     state: State
+    reason: str
     message: str
+    is_shortest: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +93,7 @@ def verify(
     limit: int = DEFAULT_LIMIT,
     permissive_limit: int = DEFAULT_PERMISSIVE_LIMIT,
     should_stop: Callable[[], bool] = lambda: False,
+    on_progress: Callable[[str], None] = lambda message: None,
 ) -> Verification:
     """Whether a supervisor is safe, controllable, nonblocking and maximally permissive.
 
@@ -98,98 +104,117 @@ def verify(
         permissive_limit: Number of states that the plants reach under the event conditions beyond which
             permissiveness is not checked. Both count `TRANSITIONS_PER_STATE` transitions as a state, too.
         should_stop: Asked now and then; once true, the work ends.
+        on_progress: Told now and then where the work is, in one short line.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.
         ValueError: A condition is added to something that is no event of the system.
     """
+    require_known(system, added)
+    packing = Packing(system)
+    found = search(packing, added, Effort(limit, should_stop, on_progress, "states"))
+    if found is None:
+        skipped = Outcome.NOT_CHECKED
+        return Verification(None, None, skipped, skipped, skipped, skipped)
+    judge = _Judge(found)
+    failures = {"safe": judge.unsafe(), "controllable": judge.uncontrollable(), "nonblocking": judge.blocking()}
+    # The controlled system's states are among those that a supervisor is recomputed on.
+    if len(found.codes) <= permissive_limit:
+        effort = Effort(permissive_limit, should_stop, on_progress, "states of the uncontrolled system")
+        recomputed = allowed(packing, found.tables, effort)
+        if recomputed is not None:
+            failures["maximally permissive"] = judge.restrictive(recomputed)
+    return verification(len(found.codes), len(found.targets), failures)
+
+
+def require_known(system: System, added: Iterable[str]) -> None:
+    """Do nothing if conditions are added to events of the system only.
+
+    Raises:
+        ValueError: They are not.
+    """
     unknown = sorted(set(added) - {event.name for event in system.events})
     if unknown:
         raise ValueError(f"conditions are added to events that the system does not have: {', '.join(unknown)}")
-    semantics = Semantics(system)
-    graph = controlled_graph(semantics, added, limit=limit, should_stop=should_stop)
-    if graph is None:
-        skipped = Outcome.NOT_CHECKED
-        return Verification(None, None, skipped, skipped, skipped, skipped)
-    judge = _Judge(semantics, added, graph)
-    failures = {"safe": judge.unsafe(), "controllable": judge.uncontrollable(), "nonblocking": judge.blocking()}
-    explicit = synthesize_explicit(system, limit=permissive_limit, should_stop=should_stop)
-    if explicit is not None:
-        failures["maximally permissive"] = judge.restrictive(explicit)
+
+
+def verification(states: int | None, transitions: int | None, found: Mapping[str, Failure | None]) -> Verification:
+    """The judgement, from the first trouble (or None) of each property that was checked."""
 
     def outcome(name: str) -> Outcome:
-        if name not in failures:
+        if name not in found:
             return Outcome.NOT_CHECKED
-        return Outcome.PASSED if failures[name] is None else Outcome.FAILED
+        return Outcome.PASSED if found[name] is None else Outcome.FAILED
 
     return Verification(
-        states=len(graph.states),
-        transitions=graph.transition_count,
+        states=states,
+        transitions=transitions,
         safe=outcome("safe"),
         controllable=outcome("controllable"),
         nonblocking=outcome("nonblocking"),
         maximally_permissive=outcome("maximally permissive"),
-        failures=tuple(failure for failure in failures.values() if failure is not None),
+        failures=tuple(failure for failure in found.values() if failure is not None),
     )
+
+
+def failure(
+    system: System, property_: str, trace: tuple[str, ...], state: State, reason: str, *, is_shortest: bool = True
+) -> Failure:
+    """The failure of a property in a state."""
+    where = ", ".join(f"{subject} = {value}" for subject, value in zip(subjects(system), state, strict=True))
+    return Failure(property_, trace, state, reason, f"{reason} in {where}", is_shortest)
 
 
 @dataclass(frozen=True, slots=True)
 class _Judge:
     """Looks for the first trouble of each kind, nearest to the initial state."""
 
-    semantics: Semantics
-    added: Added
-    graph: ControlledGraph
+    found: Reached
 
     def unsafe(self) -> Failure | None:
         """A reachable bad state."""
-        for number, state in enumerate(self.graph.states):
-            trouble = self.semantics.trouble(state)
-            if trouble is not None:
-                return self._failure("safe", number, trouble)
+        packing = self.found.packing
+        broken = packing.broken_invariants()
+        # Each table has seen every state, so most have no trouble at all.
+        tables = [table for table in self.found.tables if table.trouble]
+        if not broken and not tables:
+            return None
+        for number, code in enumerate(self.found.codes):
+            if any(test(code) for test in broken) or any(table.is_bad(code) for table in tables):
+                trouble = packing.semantics.trouble(packing.decode(code))
+                return self._failure("safe", number, str(trouble))
         return None
 
     def uncontrollable(self) -> Failure | None:
         """A reachable state where the supervisor stands in the way of an uncontrollable event."""
-        events = [item.name for item in self.semantics.system.events if not item.is_controllable]
-        for event in (event for event in events if event in self.added):
-            for number, state in enumerate(self.graph.states):
-                if self.semantics.enabled(state, event) and not self.added[event](state):
-                    return self._failure("controllable", number, f"the uncontrollable {event} is disabled")
+        for table in self.found.tables:
+            if table.event.is_controllable or table.condition is None:
+                continue
+            for number, code in enumerate(self.found.codes):
+                if not table.condition(code) and table.enabled(code):
+                    return self._failure("controllable", number, f"the uncontrollable {table.event.name} is disabled")
         return None
 
     def blocking(self) -> Failure | None:
         """A reachable state from which no marked one is reachable."""
-        predecessors: list[list[int]] = [[] for _ in self.graph.states]
-        for number, steps in enumerate(self.graph.steps):
-            for _, targets in steps:
-                for target in targets:
-                    predecessors[target].append(number)
-        frontier = [number for number, state in enumerate(self.graph.states) if self.semantics.is_marked(state)]
-        found = set(frontier)
-        while frontier:
-            for number in predecessors[frontier.pop()]:
-                if number not in found:
-                    found.add(number)
-                    frontier.append(number)
-        for number in range(len(self.graph.states)):
-            if number not in found:
-                return self._failure("nonblocking", number, "no marked state can be reached")
-        return None
+        number = blocking_state(self.found)
+        return None if number is None else self._failure("nonblocking", number, "no marked state can be reached")
 
-    def restrictive(self, explicit: ExplicitSupervisor) -> Failure | None:
+    def restrictive(self, recomputed: Allowed) -> Failure | None:
         """A reachable state where a controllable event is disabled that a supervisor could allow."""
-        events = [
-            item.name for item in self.semantics.system.events if item.is_controllable and item.name in self.added
+        limited = [
+            (place, table.event.name, table.condition)
+            for place, table in enumerate(self.found.tables)
+            if table.event.is_controllable and table.condition is not None
         ]
-        for number, state in enumerate(self.graph.states):
-            for event in events:
-                if explicit.allows(state, event) and not self.added[event](state):
+        for number, code in enumerate(self.found.codes):
+            for place, event, condition in limited:
+                if not condition(code) and recomputed.allows(code, place):
                     message = f"{event} is disabled although it could be allowed"
                     return self._failure("maximally permissive", number, message)
         return None
 
-    def _failure(self, property_: str, number: int, message: str) -> Failure:
-        places = zip(subjects(self.semantics.system), self.graph.states[number], strict=True)
-        where = ", ".join(f"{subject} = {value}" for subject, value in places)
-        return Failure(property_, self.graph.trace(number), self.graph.states[number], f"{message} in {where}")
+    def _failure(self, property_: str, number: int, reason: str) -> Failure:
+        packing = self.found.packing
+        state = packing.decode(self.found.codes[number])
+        return failure(packing.system, property_, self.found.trace(number), state, reason)

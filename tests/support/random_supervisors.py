@@ -462,10 +462,10 @@ def _provides(dice: Random, requested: Sequence[Communication], world: _World) -
 
 def _added(dice: Random, system: System) -> tuple[AddedCondition, ...]:
     controllable = [event.name for event in system.events if event.is_controllable]
-    return tuple(AddedCondition(event, _diagram(dice, system)) for event in controllable if dice.random() < 0.4)
+    return tuple(AddedCondition(event, random_diagram(dice, system)) for event in controllable if dice.random() < 0.4)
 
 
-def _diagram(dice: Random, system: System) -> DecisionDiagram:
+def random_diagram(dice: Random, system: System) -> DecisionDiagram:
     """A random ordered diagram; nodes that decide nothing and equal nodes may occur."""
     nodes: list[DecisionNode] = []
     for subject in reversed(subjects(system)):

@@ -9,9 +9,9 @@ from robosc.errors import InternalError, SynthesisCancelled
 from robosc.model.structure import Deployment
 from robosc.supervisor import MadeStatus, Progress, encode, make_supervisor, summary_json, summary_text
 from robosc.supervisor.conditions import state_predicates
-from robosc.supervisor.structure import AddedCondition, DecisionDiagram
+from robosc.supervisor.structure import AddedCondition, Certificate, DecisionDiagram
 from robosc.synthesis import SynthesisResult, synthesize
-from robosc.verification import verify
+from robosc.verification import Limits, verify
 from support.models import EXAMPLE_DEPLOYMENTS, bundle_of, example_bundle
 
 COUNTER = """robot Counter {
@@ -61,19 +61,35 @@ def test_a_count_that_nobody_could_stop_is_stopped_in_time() -> None:
     }
 
 
-def test_what_is_too_large_to_search_is_not_called_checked(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robosc.supervisor.make.PERMISSIVENESS_LIMIT", 50)
-    made = make_supervisor(bundle_of(COUNTER))
-    assert made.supervisor is not None
-    certificate = made.supervisor.certificate
-    assert (certificate.safe, certificate.maximally_permissive) == ("passed", "not checked")
-    assert "not recomputed: more than 50" in certificate.method
-    monkeypatch.setattr("robosc.supervisor.make.VERIFICATION_LIMIT", 50)
-    made = make_supervisor(bundle_of(COUNTER))
-    assert made.supervisor is not None
-    assert made.supervisor.certificate.safe == "not checked"
-    assert made.supervisor.certificate.transitions is None
-    assert made.supervisor.certificate.states == certificate.states
+def test_what_is_too_large_to_search_is_not_called_checked() -> None:
+    def certificate(limit: int) -> Certificate:
+        made = make_supervisor(bundle_of(COUNTER), verify_limit=limit)
+        assert made.supervisor is not None
+        return made.supervisor.certificate
+
+    whole, fewer, symbolic, none = certificate(2000), certificate(400), certificate(300), certificate(1)
+    assert (whole.safe, whole.maximally_permissive) == ("passed", "passed")
+    assert (fewer.safe, fewer.maximally_permissive) == ("passed", "not checked")
+    assert "not recomputed: more than 100 states" in fewer.method
+    assert fewer.transitions == whole.transitions
+    assert (symbolic.safe, symbolic.maximally_permissive) == ("not checked", "not checked")
+    assert (none.safe, none.maximally_permissive, none.transitions) == ("not checked", "not checked", None)
+    assert none.method == "not checked: more than 1 states, and the symbolic search takes more than 25 nodes"
+    assert {item.states for item in (fewer, symbolic, none)} == {whole.states}
+
+
+def test_what_is_too_large_to_search_one_by_one_is_searched_symbolically(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Limits, "of", lambda states: Limits(10, 10, 10**6))
+    contents = set()
+    for engine in ("cudd", "autoref"):
+        made = make_supervisor(bundle_of(COUNTER), engine=engine)
+        assert made.supervisor is not None
+        certificate = made.supervisor.certificate
+        assert certificate.method == "symbolic search (more than 10 states); permissiveness not recomputed"
+        assert certificate.safe == certificate.controllable == certificate.nonblocking == "passed"
+        assert (certificate.maximally_permissive, certificate.transitions) == ("not checked", None)
+        contents.add(encode(made.supervisor))
+    assert len(contents) == 1
 
 
 def test_a_model_with_errors_and_a_library_have_none() -> None:
@@ -107,18 +123,25 @@ def test_progress_and_cancellation() -> None:
 
 
 @pytest.mark.timeout(60)
-@pytest.mark.parametrize("inputs", ["x := value.a", "x := value.a, y := value.b", "b := value.a < value.b"])
-def test_wide_integers_are_synthesized_and_honestly_not_searched(inputs: str) -> None:
+@pytest.mark.parametrize(
+    ("inputs", "outcome"),
+    [
+        ("x := value.a, b := x > 7", "passed"),
+        ("x := value.a, y := value.b", "passed"),
+        ("b := value.a < value.b", "not checked"),
+    ],
+)
+def test_wide_integers_are_synthesized_and_searched_honestly(inputs: str, outcome: str) -> None:
     text = (
         "robot R { interface i use T from p datatype object P { a: integer(0..10000) b: integer(0..10000) }"
         " component S { outgoing message m with type: P links i behaviour { variable x: integer(0..10000)"
         " variable y: integer(0..10000) variable b: boolean"
         f" initial marked state s {{ on response from m do {inputs} }} }} }}"
         " component G { incoming message go with type: none }"
-        " requirement go needs S.x < 5000 and S.y < S.x or S.b }"
+        " requirement go needs S.x < 5000 and S.y < 5 or S.b }"
     )
     made = make_supervisor(bundle_of(text))
     assert made.supervisor is not None
     certificate = made.supervisor.certificate
-    assert certificate.method.startswith("not searched: more than ")
-    assert certificate.safe == certificate.maximally_permissive == "not checked"
+    assert (certificate.safe, certificate.maximally_permissive) == (outcome, "not checked")
+    assert certificate.method.startswith("symbolic search" if outcome == "passed" else "not checked: more than ")

@@ -1,0 +1,195 @@
+"""`robosc verify`: whether a supervisor that someone hands over is right for a model."""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from robosc.cli.arguments import add_engine_argument, add_model_arguments, add_verify_limit_argument, read_bundle
+from robosc.cli.output import (
+    ExitCode,
+    ProgressLine,
+    UsageError,
+    diagnostics_json,
+    print_diagnostics,
+    print_json,
+)
+from robosc.errors import InvalidSupervisorError
+from robosc.model.structure import Deployment
+from robosc.source import visible
+
+if TYPE_CHECKING:
+    from robosc.supervisor.recheck import Fault, Recheck
+    from robosc.supervisor.structure import Supervisor
+
+FOREIGN_STATES = 1_000_000
+"""States up to which a foreign supervisor is searched one by one: a minute or so at most."""
+
+_DESCRIPTION = """\
+Check a supervisor file against the texts of its model, believing nothing that the file says of itself: it must hold
+the model of the texts, its figures must be right, and the robot under it must be safe, controllable and nonblocking.
+That it forbids no more than it must is checked for systems of moderate size.
+"""
+
+
+def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "verify",
+        help="check a supervisor file against its model",
+        description=_DESCRIPTION,
+        usage="robosc verify [options] FILE.rsup MODEL",
+    )
+    # Optional to the parser alone, so that another question about a MODEL can do without it.
+    parser.add_argument("supervisor", nargs="?", type=Path, metavar="FILE.rsup", help="the supervisor to check")
+    add_model_arguments(parser)
+    parser.add_argument(
+        "--deployment",
+        choices=[str(deployment) for deployment in Deployment],
+        help="refuse a supervisor made for another deployment (default: as the file says)",
+    )
+    add_verify_limit_argument(parser, "--limit", FOREIGN_STATES)
+    parser.add_argument("--strict", action="store_true", help="what could not be checked counts as failed")
+    parser.add_argument("-q", "--quiet", action="store_true", help="print what is wrong and nothing else")
+    add_engine_argument(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Check; 0 if the supervisor passed, 1 if not.
+
+    Raises:
+        UsageError: A file is not there or cannot be read, or there is no supervisor to check.
+    """
+    if arguments.supervisor is None:
+        raise UsageError("verify needs a supervisor file and its model: robosc verify FILE.rsup MODEL")
+    return _verify_supervisor(arguments)
+
+
+def _verify_supervisor(arguments: argparse.Namespace) -> ExitCode:
+    from robosc.supervisor.codec import decode
+    from robosc.supervisor.recheck import recheck
+    from robosc.synthesis.engines import resolve_engine
+    from robosc.verification import Limits
+
+    engine = resolve_engine(arguments.engine)
+    content = _read(arguments.supervisor)
+    bundle = read_bundle(arguments)
+    try:
+        supervisor = decode(content)
+    except InvalidSupervisorError as error:
+        return _report_malformed(arguments, error)
+    progress = ProgressLine()
+    try:
+        found = recheck(
+            supervisor,
+            bundle,
+            Limits.of(arguments.limit),
+            deployment=None if arguments.deployment is None else Deployment(arguments.deployment),
+            engine=engine,
+            on_progress=lambda message: progress.show(f"verification: {message}"),
+        )
+    finally:
+        progress.clear()
+    has_passed = found.judgement is not None and not found.faults and not (arguments.strict and found.unchecked())
+    if arguments.json:
+        print_json(_document(found, supervisor, has_passed=has_passed))
+    else:
+        print_diagnostics(found.diagnostics, bundle)
+        if found.diagnostics or found.judgement or found.faults:
+            _print_report(arguments, found, supervisor, has_passed=has_passed)
+        else:
+            sys.stderr.write(f"{arguments.model}: a library has no robot that a supervisor could be for\n")
+    return ExitCode.OK if has_passed else ExitCode.FAILED
+
+
+def _read(path: Path) -> bytes:
+    from robosc.supervisor.codec import MAXIMUM_BYTES
+
+    try:
+        with path.open("rb") as file:
+            # One byte more than is allowed tells that there are too many; a device could go on for ever.
+            return file.read(MAXIMUM_BYTES + 1)
+    except OSError as error:
+        raise UsageError(f"cannot read {path}: {error.strerror or error}") from error
+
+
+def _report_malformed(arguments: argparse.Namespace, error: InvalidSupervisorError) -> ExitCode:
+    if arguments.json:
+        print_json({"status": "failed", "reason": str(error)})
+    else:
+        sys.stderr.write(f"{arguments.supervisor}: {visible(str(error))}\n")
+    return ExitCode.FAILED
+
+
+def _document(found: "Recheck", supervisor: "Supervisor", *, has_passed: bool) -> dict[str, object]:
+    judgement = found.judgement
+    return {
+        "status": "passed" if has_passed else "failed",
+        "model": supervisor.model.name,
+        "deployment": str(supervisor.deployment),
+        "checks": {name: str(outcome) for name, outcome in found.outcomes().items()},
+        "faults": [_fault_json(fault) for fault in found.faults],
+        "remarks": list(found.notes),
+        "states": judgement.verification.states if judgement else None,
+        "transitions": judgement.verification.transitions if judgement else None,
+        "method": judgement.method if judgement else None,
+        **diagnostics_json(found.diagnostics),
+    }
+
+
+def _fault_json(fault: "Fault") -> dict[str, object]:
+    document: dict[str, object] = {"check": fault.check, "message": fault.message}
+    if fault.trace is not None and fault.state is not None:
+        document |= {
+            "trace": list(fault.trace),
+            "shortest": fault.is_shortest,
+            "state": {
+                "components": fault.state.components,
+                "variables": fault.state.variables,
+                "communications": fault.state.communications,
+            },
+        }
+    return document
+
+
+def _print_report(
+    arguments: argparse.Namespace, found: "Recheck", supervisor: "Supervisor", *, has_passed: bool
+) -> None:
+    lines: list[str] = []
+    unchecked = [name.replace("_", " ") for name in found.unchecked()]
+    if found.diagnostics:
+        lines.append(f"{arguments.supervisor}: failed: the texts hold no model that it could be for")
+    elif found.faults:
+        lines.append(f"{arguments.supervisor}: failed: no right supervisor of {arguments.model}")
+    elif not has_passed:
+        lines.append(f"{arguments.supervisor}: failed: not checked: {', '.join(unchecked)}")
+    else:
+        lines.append(f"{arguments.supervisor}: passed: a right supervisor of {arguments.model}")
+    if not found.diagnostics and not arguments.quiet:
+        lines += [f"  {name.replace('_', ' '):<21} {outcome}" for name, outcome in found.outcomes().items()]
+        judgement = found.judgement
+        if judgement is not None:
+            counted = judgement.verification
+            figures = [] if counted.states is None else [f"{counted.states} states"]
+            figures += [] if counted.transitions is None else [f"{counted.transitions} transitions"]
+            lines += [f"  {'controlled':<21} {', '.join(figures) or 'not counted'} ({supervisor.deployment})"]
+            lines.append(f"  {'method':<21} {judgement.method}")
+    for fault in found.faults:
+        lines += _fault_lines(fault)
+    if not arguments.quiet:
+        lines += [f"note: {note}" for note in found.notes]
+    if not (has_passed and arguments.quiet):
+        sys.stdout.write("".join(f"{visible(line)}\n" for line in lines))
+
+
+def _fault_lines(fault: "Fault") -> list[str]:
+    name = fault.check.replace("_", " ")
+    if fault.trace is None or fault.state is None:
+        return [f"{name}: {fault.message}"]
+    run = "after" if fault.is_shortest else "after (there may be shorter runs)"
+    return [
+        f"not {name}: {fault.message}",
+        f"  {run}: {', '.join(fault.trace) or 'nothing: it is so at the start'}",
+        f"  in: {fault.state.text()}",
+    ]

@@ -1,0 +1,71 @@
+"""The certificate: what the independent verifier says about a supervisor that has just been synthesized."""
+
+from collections.abc import Callable
+
+from robosc._version import __version__
+from robosc.automata import System
+from robosc.errors import InternalError
+from robosc.model.structure import Deployment
+from robosc.source import Bundle
+from robosc.supervisor.conditions import state_predicates
+from robosc.supervisor.structure import Certificate, CheckResult
+from robosc.synthesis import SynthesisResult
+from robosc.verification import Limits, Outcome, judge
+
+
+def certify(
+    system: System,
+    result: SynthesisResult,
+    bundle: Bundle,
+    deployment: Deployment,
+    limits: Limits,
+    *,
+    should_stop: Callable[[], bool] = lambda: False,
+    on_progress: Callable[[str], None] = lambda message: None,
+) -> Certificate:
+    """Let the independent verifier judge the result; a fault it finds is ours.
+
+    Args:
+        system: Plants and event conditions.
+        result: A supervisor of them.
+        bundle: The texts that they were made from.
+        deployment: Where the supervisor will stand.
+        limits: How far the check goes.
+        should_stop: Asked now and then; once true, the work ends.
+        on_progress: Told now and then where the work is, in one short line.
+
+    Raises:
+        SynthesisCancelled: `should_stop` became true.
+        InternalError: The verifier found fault with the result.
+    """
+    judgement = judge(
+        system,
+        state_predicates(system, result.added),
+        limits,
+        expected_states=result.statistics.states,
+        engine=result.statistics.engine,
+        should_stop=should_stop,
+        on_progress=on_progress,
+    )
+    found = judgement.verification
+    if found.failures or found.states not in (None, result.statistics.states):
+        raise InternalError(
+            f"the verifier refuses the supervisor: {found.message or 'another number of states'}"
+            + (f" after {', '.join(found.trace)}" if found.trace else "")
+        )
+    return Certificate(
+        engine_version=__version__,
+        bundle_sha256=bundle.digest,
+        deployment=deployment,
+        method=judgement.method,
+        safe=_result(found.safe),
+        controllable=_result(found.controllable),
+        nonblocking=_result(found.nonblocking),
+        maximally_permissive=_result(found.maximally_permissive),
+        states=str(result.statistics.states),
+        transitions=None if found.transitions is None else str(found.transitions),
+    )
+
+
+def _result(outcome: Outcome) -> CheckResult:
+    return "passed" if outcome is Outcome.PASSED else "not checked"

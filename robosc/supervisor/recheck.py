@@ -1,0 +1,216 @@
+"""Whether a supervisor that someone hands over is right for a model, whoever made it and whatever it says of itself.
+
+Nothing in the file is believed: its model is compared with the one that is read anew from the texts, its added
+conditions are judged on that one, and its certificate is compared with what is found. A digest in a file proves
+nothing, since who changes the file can change the digest: it is told where it differs, but decides nothing.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from robosc._version import __version__
+from robosc.automata import System, to_automata
+from robosc.automata.compile import State
+from robosc.automata.plants import communication_plant_name
+from robosc.automata.state import subjects
+from robosc.errors import Diagnostic, sorted_diagnostics
+from robosc.expressions import Value
+from robosc.model import check
+from robosc.model.layers import layer_findings
+from robosc.model.structure import CommunicationKind, Deployment, Model
+from robosc.source import Bundle
+from robosc.supervisor.conditions import state_predicates
+from robosc.supervisor.differences import model_differences
+from robosc.supervisor.structure import Certificate, Supervisor
+from robosc.verification import Judgement, Limits, Outcome, Verification, judge
+
+PROPERTIES = ("safe", "controllable", "nonblocking", "maximally_permissive")
+"""The four properties, as certificates call them."""
+
+
+@dataclass(frozen=True, slots=True)
+class StateInWords:
+    """A state in the words of the model, in source order.
+
+    Attributes:
+        components: The state of each component with a behaviour.
+        variables: The value of each synthesis variable, by `Component.variable`.
+        communications: Where each service and action is.
+    """
+
+    components: dict[str, str]
+    variables: dict[str, Value]
+    communications: dict[str, str]
+
+    def text(self) -> str:
+        """In one line."""
+        values = {
+            name: str(value).lower() if isinstance(value, bool) else value for name, value in self.variables.items()
+        }
+        return ", ".join(
+            f"{name} = {value}" for name, value in {**self.components, **values, **self.communications}.items()
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """What is wrong with a supervisor.
+
+    Attributes:
+        check: `deployment`, `model`, `certificate`, or the property that does not hold.
+        message: What is wrong, in words.
+        trace: Events of a run into the trouble, or None where none belongs to it.
+        is_shortest: Whether there is certainly no shorter run.
+        state: The state that it leads to, or None where none belongs to it.
+    """
+
+    check: str
+    message: str
+    trace: tuple[str, ...] | None = None
+    is_shortest: bool = True
+    state: StateInWords | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Recheck:
+    """The outcome of checking a supervisor anew.
+
+    Attributes:
+        diagnostics: Why the texts hold no model that the supervisor could be for; empty where they do.
+        faults: What is wrong with it; a right one has none.
+        notes: What is worth knowing, but decides nothing.
+        judgement: The verifier's, or None where the supervisor is for another model or deployment.
+    """
+
+    diagnostics: tuple[Diagnostic, ...]
+    faults: tuple[Fault, ...]
+    notes: tuple[str, ...]
+    judgement: Judgement | None
+
+    def outcomes(self) -> dict[str, Outcome]:
+        """What became of each check, in order."""
+        faulty = {fault.check for fault in self.faults}
+        found = {name: Outcome.FAILED if name in faulty else Outcome.PASSED for name in ("deployment", "model")}
+        if self.judgement is None:
+            return found | dict.fromkeys(("certificate", *PROPERTIES), Outcome.NOT_CHECKED)
+        found["certificate"] = Outcome.FAILED if "certificate" in faulty else Outcome.PASSED
+        return found | {name: getattr(self.judgement.verification, name) for name in PROPERTIES}
+
+    def unchecked(self) -> tuple[str, ...]:
+        """What was not checked."""
+        return tuple(name for name, outcome in self.outcomes().items() if outcome is Outcome.NOT_CHECKED)
+
+
+def recheck(
+    supervisor: Supervisor,
+    bundle: Bundle,
+    limits: Limits,
+    *,
+    deployment: Deployment | None = None,
+    engine: str = "auto",
+    should_stop: Callable[[], bool] = lambda: False,
+    on_progress: Callable[[str], None] = lambda message: None,
+) -> Recheck:
+    """Check a supervisor against the texts of its model.
+
+    Args:
+        supervisor: As `decode` read it.
+        bundle: The texts.
+        limits: How far to go.
+        deployment: Where it is to stand, or None to take its word for that.
+        engine: Engine of a symbolic search.
+        should_stop: Asked now and then; once true, the work ends.
+        on_progress: Told now and then where the work is, in one short line.
+
+    Raises:
+        SynthesisCancelled: `should_stop` became true.
+        UnsupportedModelError: The texts' model is nested too deeply, or outside what synthesis handles.
+    """
+    checked = check(bundle)
+    if checked.model is None or checked.places is None:
+        return Recheck(checked.diagnostics, (), (), None)
+    if supervisor.deployment is Deployment.LAYER:
+        ambiguous = layer_findings(checked.model, checked.places)
+        if ambiguous:
+            return Recheck(sorted_diagnostics((*checked.diagnostics, *ambiguous)), (), (), None)
+    faults = [Fault("model", text) for text in model_differences(supervisor.model, checked.model)]
+    has_actions = any(item.kind is CommunicationKind.ACTION for item in checked.model.communications)
+    if deployment not in (None, supervisor.deployment) and has_actions:
+        faults.append(Fault("deployment", f"it was made for the deployment {supervisor.deployment}, not {deployment}"))
+    notes = tuple(_notes(supervisor.certificate, bundle))
+    if faults:
+        return Recheck((), tuple(faults), notes, None)
+    system = to_automata(checked.model, supervisor.deployment)
+    judgement = judge(
+        system,
+        state_predicates(system, supervisor.added),
+        limits,
+        expected_states=int(supervisor.certificate.states),
+        engine=engine,
+        should_stop=should_stop,
+        on_progress=on_progress,
+    )
+    found = judgement.verification
+    faults += [Fault("certificate", text) for text in _false_claims(supervisor.certificate, found)]
+    faults += [
+        Fault(
+            item.property.replace(" ", "_"),
+            item.reason,
+            item.trace,
+            item.is_shortest,
+            state_in_words(system, checked.model, item.state),
+        )
+        for item in found.failures
+    ]
+    return Recheck((), tuple(faults), (*notes, *_beliefs(supervisor.certificate, found)), judgement)
+
+
+def _notes(certificate: Certificate, bundle: Bundle) -> list[str]:
+    """What differs and decides nothing."""
+    notes = []
+    if certificate.bundle_sha256 != bundle.digest:
+        notes.append(
+            "the certificate's digest is of other texts than these; only the models that the texts mean are compared"
+        )
+    if certificate.engine_version != __version__:
+        notes.append(f"it was made by RoboSC {certificate.engine_version}; this is {__version__}")
+    return notes
+
+
+def _false_claims(certificate: Certificate, found: Verification) -> list[str]:
+    """What a certificate says and is not so."""
+    claims = []
+    for what, told, counted in (
+        ("states", certificate.states, found.states),
+        ("transitions", certificate.transitions, found.transitions),
+    ):
+        if told is not None and counted is not None and int(told) != counted:
+            claims.append(f"it tells of {told} {what}, there are {counted}")
+    for name in PROPERTIES:
+        if getattr(certificate, name) == "passed" and getattr(found, name) is Outcome.FAILED:
+            claims.append(f"it says '{name.replace('_', ' ')}: passed', which is false")
+    return claims
+
+
+def _beliefs(certificate: Certificate, found: Verification) -> list[str]:
+    """What a certificate says and nobody has checked here."""
+    claimed = [
+        name.replace("_", " ")
+        for name in PROPERTIES
+        if getattr(certificate, name) == "passed" and getattr(found, name) is Outcome.NOT_CHECKED
+    ]
+    return [f"the certificate says 'passed' for what was not checked here: {', '.join(claimed)}"] if claimed else []
+
+
+def state_in_words(system: System, model: Model, state: State) -> StateInWords:
+    """A state of a model's automata in the words of the model."""
+    values = {(item.automaton, item.variable): value for item, value in zip(subjects(system), state, strict=True)}
+    return StateInWords(
+        components={item.name: str(values[item.name, None]) for item in model.components if item.behaviour},
+        variables={f"{owner}.{name}": value for (owner, name), value in values.items() if name is not None},
+        communications={
+            item.name: str(values[communication_plant_name(item), None])
+            for item in model.communications
+            if item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
+        },
+    )

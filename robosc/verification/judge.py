@@ -1,0 +1,107 @@
+"""A supervisor judged at any size: state by state as far as that goes, on sets of states beyond."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from robosc.automata.controlled import TRANSITIONS_PER_STATE
+from robosc.automata.decision import Decision
+from robosc.automata.structure import System
+from robosc.verification.symbolic import verify_symbolically
+from robosc.verification.verify import Outcome, Verification, verify
+
+DEFAULT_STATES = 200_000
+"""States up to which the controlled system is searched one by one: some seconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """How far a check goes; all is counted, so that it ends alike on every machine.
+
+    Attributes:
+        states: States up to which the controlled system is searched one by one.
+        recomputed: States of the uncontrolled system up to which the supervisor is recomputed.
+        work: Nodes of decision diagrams up to which larger systems are searched symbolically.
+    """
+
+    states: int
+    recomputed: int
+    work: int
+
+    @classmethod
+    def of(cls, states: int) -> "Limits":
+        """Limits under which each part takes about as long as searching so many states."""
+        return cls(states, states // 4, 25 * states)
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """What was found, and how.
+
+    Attributes:
+        verification: The outcomes.
+        method: What was done, in one line.
+    """
+
+    verification: Verification
+    method: str
+
+
+def judge(
+    system: System,
+    added: Mapping[str, Decision],
+    limits: Limits,
+    *,
+    expected_states: int = 0,
+    engine: str = "auto",
+    should_stop: Callable[[], bool] = lambda: False,
+    on_progress: Callable[[str], None] = lambda message: None,
+) -> Judgement:
+    """Whether a supervisor is safe, controllable, nonblocking and, where that can be told, maximally permissive.
+
+    Args:
+        system: Plants and event conditions.
+        added: For each event to which the supervisor adds a condition, that condition.
+        limits: How far to go.
+        expected_states: States that the controlled system is said to have: where these are too many, the search one
+            by one is not even begun. Nothing else depends on it.
+        engine: Engine of the symbolic search: see `verify_symbolically`.
+        should_stop: Asked now and then; once true, the work ends.
+        on_progress: Told now and then where the work is, in one short line.
+
+    Raises:
+        SynthesisCancelled: `should_stop` became true.
+        ValueError: A condition is added to something that is no event of the system.
+    """
+    if expected_states <= limits.states:
+        found = verify(
+            system,
+            added,
+            limit=limits.states,
+            permissive_limit=limits.recomputed,
+            should_stop=should_stop,
+            on_progress=on_progress,
+        )
+        if found.states is not None:
+            return Judgement(found, f"explicit forward search; {_permissiveness(found, limits)}")
+        reason = f"more than {limits.states} states, or {TRANSITIONS_PER_STATE * limits.states} transitions"
+    else:
+        reason = f"more than {limits.states} states"
+    found = verify_symbolically(
+        system, added, limit=limits.work, engine=engine, should_stop=should_stop, on_progress=on_progress
+    )
+    if found.states is None:
+        method = f"not checked: {reason}, and the symbolic search takes more than {limits.work} nodes"
+    elif Outcome.NOT_CHECKED in (found.safe, found.controllable, found.nonblocking):
+        method = f"symbolic search ({reason}), given up after {limits.work} nodes; permissiveness not recomputed"
+    else:
+        method = f"symbolic search ({reason}); permissiveness not recomputed"
+    return Judgement(found, method)
+
+
+def _permissiveness(found: Verification, limits: Limits) -> str:
+    if found.maximally_permissive is Outcome.NOT_CHECKED:
+        return (
+            f"permissiveness not recomputed: more than {limits.recomputed} states, or "
+            f"{TRANSITIONS_PER_STATE * limits.recomputed} transitions"
+        )
+    return "permissiveness by explicit recomputation"

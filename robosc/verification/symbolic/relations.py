@@ -1,0 +1,203 @@
+"""What events do, as relations between the state before and the state after."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from robosc.automata.decision import Decision
+from robosc.automata.state import Subject, subject_type
+from robosc.automata.structure import Assignment, Automaton, Edge, Event
+from robosc.expressions import BooleanType, Expression, IntegerType, Value
+from robosc.verification.symbolic.expressions import Expressions
+from robosc.verification.symbolic.variables import Variables, after, cofactors
+
+
+@dataclass(frozen=True, slots=True)
+class Relation:
+    """One event of the controlled system.
+
+    Attributes:
+        event: The event.
+        enabled: Where the plants enable it and, for a controllable one, every range is kept.
+        allowed: Where the supervisor lets it happen; everywhere where nothing is added.
+        guard: Where it can happen in the controlled system: enabled, allowed and, for a controllable event, its
+            conditions true.
+        bad: Where it makes a state bad: an uncontrollable event that can happen against its conditions, or leave a
+            range.
+        steps: State before and state after, for the places that it may change; the others stay as they are.
+        names: The variables of these places.
+        touched: The variables that `guard` and `steps` depend on.
+    """
+
+    event: Event
+    enabled: Any
+    allowed: Any
+    guard: Any
+    bad: Any
+    steps: Any
+    names: tuple[str, ...]
+    touched: frozenset[str]
+
+    def image(self, variables: Variables, states: Any) -> Any:
+        """Where the event leads to from some states."""
+        manager = variables.manager
+        found = states & self.guard & self.steps
+        if self.names:
+            found = manager.let({after(name): name for name in self.names}, manager.exist(self.names, found))
+        return variables.work.count(found)
+
+    def preimage(self, variables: Variables, states: Any) -> Any:
+        """From where the event can lead to some states."""
+        manager = variables.manager
+        found = self.steps
+        if self.names:
+            found = found & manager.let({name: after(name) for name in self.names}, states)
+            found = manager.exist([after(name) for name in self.names], found)
+        else:
+            found = found & states
+        return variables.work.count(found & self.guard)
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """What one automaton does at an event; predicates over the state before, the data and the state after."""
+
+    possible: Any
+    leaves_range: Any
+    steps: Any
+
+
+class Relations:
+    """The relations of a system's events.
+
+    Args:
+        variables: The variables.
+        added: The conditions that a supervisor adds.
+    """
+
+    def __init__(self, variables: Variables, added: dict[str, Decision]) -> None:
+        self._variables = variables
+        self._added = added
+        self._plain = Expressions(variables)
+
+    def holds(self, conditions: Iterable[Expression]) -> Any:
+        """Where conditions are all true."""
+        return self._variables.all_of(self._plain.truth(condition).true for condition in conditions)
+
+    def relation(self, event: Event) -> Relation:
+        """The relation of an event."""
+        variables, manager = self._variables, self._variables.manager
+        automata = [item for item in variables.system.automata if event.name in item.alphabet]
+        places = sorted(place for item in automata for place in self._changed(item, event.name))
+        parts = [self._part(item, event.name, set(places)) for item in automata]
+        possible = variables.all_of(part.possible for part in parts) if parts else manager.false
+        data = variables.possible_data(event.name)
+        names_of_data = [
+            name
+            for (owner, _), digits in variables.data.items()
+            if owner == event.name
+            for name in (*digits.names, *([] if digits.known is None else [digits.known]))
+        ]
+        leaving = variables.any_of(part.leaves_range for part in parts) & data
+        steps = data if parts else manager.false
+        for part in parts:
+            steps = variables.work.count(steps & part.steps)
+        if names_of_data:
+            leaving, steps = manager.exist(names_of_data, leaving), manager.exist(names_of_data, steps)
+        leaving = possible & leaving
+        conditions = self.holds(item.condition for item in variables.system.conditions if item.event == event.name)
+        added = self._added.get(event.name)
+        allowed = manager.true if added is None else variables.work.count(variables.decision(added))
+        enabled = possible & ~leaving if event.is_controllable else possible
+        guard = enabled & conditions & allowed if event.is_controllable else enabled & allowed
+        return Relation(
+            event=event,
+            enabled=enabled,
+            allowed=allowed,
+            guard=variables.work.count(guard),
+            bad=manager.false if event.is_controllable else (possible & ~conditions) | leaving,
+            steps=variables.work.count(steps),
+            names=tuple(name for place in places for name in variables.places[place].names),
+            touched=_support(manager, guard, steps),
+        )
+
+    def _changed(self, automaton: Automaton, event: str) -> set[int]:
+        """The places that an automaton may change at an event."""
+        found = set[int]()
+        for edge in automaton.edges:
+            if edge.event == event:
+                if edge.source != edge.target:
+                    found.add(self._variables.place_of[Subject(automaton.name)])
+                found |= {self._variables.place_of[Subject(automaton.name, item.variable)] for item in edge.updates}
+        return found
+
+    def _part(self, automaton: Automaton, event: str, changed: set[int]) -> _Part:
+        variables = self._variables
+        possible = leaves_range = steps = variables.manager.false
+        own = self._changed(automaton, event) & changed
+        for edge in automaton.edges:
+            if edge.event == event:
+                taken = variables.in_location(automaton.name, edge.source) & self.holds([edge.guard])
+                possible = possible | taken
+                leaving, updated = self._edge(automaton, edge, own)
+                leaves_range = leaves_range | (taken & leaving)
+                steps = variables.work.count(steps | (taken & updated))
+        return _Part(possible, leaves_range, steps)
+
+    def _edge(self, automaton: Automaton, edge: Edge, changed: set[int]) -> tuple[Any, Any]:
+        """Where the updates of an edge leave a range, and what the edge makes of the places that may change."""
+        variables = self._variables
+        leaving, updated = variables.manager.false, variables.manager.true
+        location = variables.place_of[Subject(automaton.name)]
+        expressions = Expressions(variables, edge.event)
+        left = set(changed)
+        if location in left:
+            left.remove(location)
+            updated = variables.has_value(variables.places[location].after(), edge.target)
+        for update in edge.updates:
+            left.discard(variables.place_of[Subject(automaton.name, update.variable)])
+            beyond, result = self._update(automaton, update, expressions)
+            leaving, updated = leaving | beyond, updated & result
+        for place in sorted(left):
+            updated = updated & variables.unchanged(place)
+        return leaving, updated
+
+    def _update(self, automaton: Automaton, update: Assignment, expressions: Expressions) -> tuple[Any, Any]:
+        """Where an update leaves its range, and what it makes of its variable elsewhere."""
+        variables, manager = self._variables, self._variables.manager
+        subject = Subject(automaton.name, update.variable)
+        place = variables.place_of[subject]
+        digits, kept = variables.places[place].after(), variables.unchanged(place)
+        type_ = subject_type(variables.system, subject)
+        if isinstance(type_, BooleanType):
+            truth = expressions.truth(update.expression)
+            known = truth.true | truth.false
+            made = (truth.true & variables.has_value(digits, True)) | (truth.false & variables.has_value(digits, False))
+            return manager.false, made | (~known & kept)
+
+        def in_range(value: Value) -> bool:
+            # As the meaning of systems has it, only integers can leave their range.
+            return not isinstance(type_, IntegerType) or value in digits.values
+
+        def result(value: Value | None) -> Any:
+            if value is None:
+                return kept
+            return variables.has_value(digits, value) if in_range(value) else manager.false
+
+        table = expressions.table(update.expression)
+        beyond = table.where(lambda value: manager.true if value is not None and not in_range(value) else manager.false)
+        return beyond, table.where(result)
+
+
+def _support(manager: Any, *predicates: Any) -> frozenset[str]:
+    """The variables that some predicates depend on."""
+    found: set[str] = set()
+    seen: set[int] = set()
+    stack = list(predicates)
+    while stack:
+        node = stack.pop()
+        if node not in (manager.true, manager.false) and int(node) not in seen:
+            seen.add(int(node))
+            found.add(node.var)
+            stack.extend(cofactors(node))
+    return frozenset(found)

@@ -1,0 +1,317 @@
+"""Places of a state and received data as Boolean variables of a decision diagram."""
+
+import importlib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from robosc.automata.compile import State
+from robosc.automata.decision import Decision
+from robosc.automata.inputs import connected_inputs, valuations
+from robosc.automata.semantics import Semantics
+from robosc.automata.state import Subject, subject_domain, subjects
+from robosc.automata.structure import InputVariable, System
+from robosc.expressions import IntegerType, Received, Value, domain, leaves
+from robosc.recursion import allow_depth
+from robosc.verification.symbolic.order import place_order
+from robosc.verification.symbolic.work import Work
+
+_FRAMES_PER_LEVEL = 6
+"""Python frames that the plain engine has open for each variable."""
+
+
+@dataclass(frozen=True, slots=True)
+class Digits:
+    """The variables that hold the index of a value, most significant first.
+
+    Attributes:
+        names: In the state before an event (or in the data of its occurrence).
+        values: The values, in the order of their indices.
+        known: The variable that tells whether a received datum is known at all, or None if it always is.
+    """
+
+    names: tuple[str, ...]
+    values: Sequence[Value]
+    known: str | None = None
+
+    def after(self) -> "Digits":
+        """The same of the state after an event."""
+        return replace(self, names=tuple(map(after, self.names)))
+
+    def size(self) -> int:
+        """How many choices there are."""
+        return len(self.values) + (self.known is not None)
+
+    def choices(self) -> tuple[Value | None, ...]:
+        """Every value, and then None where it may be unknown."""
+        return tuple(self.values) if self.known is None else (*self.values, None)
+
+
+def after(name: str) -> str:
+    """The variable of the state after an event that belongs to one of the state before it."""
+    return name + "'"
+
+
+def make_manager(engine: str) -> Any:
+    """A fresh manager of decision diagrams: in C where it is installed, else in plain Python.
+
+    Args:
+        engine: `autoref` for the plain one; with any other name the choice is free.
+    """
+    if engine != "autoref":
+        try:
+            manager = importlib.import_module("dd.cudd").BDD()
+        except ImportError:
+            manager = importlib.import_module("dd.autoref").BDD()
+    else:
+        manager = importlib.import_module("dd.autoref").BDD()
+    # The order is chosen below, so that the work is the same wherever it is done.
+    manager.configure(reordering=False)
+    return manager
+
+
+class Variables:
+    """All variables of a system.
+
+    Attributes:
+        manager: The decision diagrams.
+        system: The system.
+        places: The digits of each place of a state.
+        names: Every variable of the state before an event, topmost first.
+    """
+
+    def __init__(self, system: System, engine: str, work: Work) -> None:
+        self.system = system
+        self.manager = make_manager(engine)
+        self.work = work
+        order = subjects(system)
+        self.place_of = {subject: place for place, subject in enumerate(order)}
+        self.places = tuple(_digits(f"s{place}", subject_domain(system, item)) for place, item in enumerate(order))
+        self.data = {
+            (item.event, item.path): _digits(
+                f"d{number}", domain(item.type), f"d{number}.known" if item.may_be_unknown else None
+            )
+            for number, item in enumerate(system.inputs)
+        }
+        self.names = self._declare(place_order(system))
+        allow_depth(2 * len(self.names) + sum(len(item.names) + 1 for item in self.data.values()), _FRAMES_PER_LEVEL)
+
+    def _declare(self, order: Sequence[int]) -> tuple[str, ...]:
+        """Declare the variables; returns those of a state."""
+        beside = self._data_beside(order)
+        names: list[str] = []
+        for place in order:
+            own = self.places[place]
+            others = beside.get(place, [])
+            self.manager.declare(*(item.known for item in others if item.known is not None))
+            # Digits of one weight stand together, so that copies stay small.
+            for rank in range(max([len(own.names), *(len(item.names) for item in others)]), 0, -1):
+                if rank <= len(own.names):
+                    name = own.names[-rank]
+                    names.append(name)
+                    self.manager.declare(name, after(name))
+                self.manager.declare(*(item.names[-rank] for item in others if rank <= len(item.names)))
+        return tuple(names)
+
+    def _data_beside(self, order: Sequence[int]) -> dict[int, list[Digits]]:
+        """For some places the data that stand with them: where they are written to, or anywhere."""
+        level = {place: number for number, place in enumerate(order)}
+        written: dict[Any, int] = {}
+        for automaton in self.system.automata:
+            for edge in automaton.edges:
+                for update in edge.updates:
+                    place = self.place_of[Subject(automaton.name, update.variable)]
+                    for leaf in leaves(update.expression):
+                        if isinstance(leaf, Received):
+                            key = (edge.event, leaf.path)
+                            written[key] = min(written.get(key, place), place, key=lambda item: level[item])
+        found: dict[int, list[Digits]] = {}
+        for key, digits in self.data.items():
+            found.setdefault(written.get(key, order[-1]), []).append(digits)
+        return found
+
+    # Predicates
+
+    def any_of(self, predicates: Iterable[Any]) -> Any:
+        """Where one of the predicates is true."""
+        result = self.manager.false
+        for predicate in predicates:
+            result = result | predicate
+        return result
+
+    def all_of(self, predicates: Iterable[Any]) -> Any:
+        """Where all of the predicates are true."""
+        result = self.manager.true
+        for predicate in predicates:
+            result = result & predicate
+        return result
+
+    def chosen(self, digits: Digits, branches: Sequence[Any]) -> Any:
+        """The branch of the value that some digits have; false where they have none.
+
+        Args:
+            digits: The digits.
+            branches: A predicate for each of `digits.choices()`.
+        """
+        level = [*branches[: len(digits.values)]]
+        level += [self.manager.false] * ((1 << len(digits.names)) - len(level))
+        for name in reversed(digits.names):
+            variable = self.manager.var(name)
+            level = [
+                low if low == high else self.manager.ite(variable, high, low)
+                for low, high in zip(level[::2], level[1::2], strict=True)
+            ]
+        if digits.known is None:
+            return level[0]
+        return self.manager.ite(self.manager.var(digits.known), level[0], branches[-1])
+
+    def has_index(self, digits: Digits, index: int) -> Any:
+        """Where some digits hold an index."""
+        result = self.manager.true
+        for place, name in enumerate(reversed(digits.names)):
+            variable = self.manager.var(name)
+            result = (variable if (index >> place) & 1 else ~variable) & result
+        return result
+
+    def has_value(self, digits: Digits, value: Value) -> Any:
+        """Where some digits hold a value."""
+        return self.has_index(digits, digits.values.index(value))
+
+    def in_location(self, automaton: str, location: str) -> Any:
+        """Where an automaton is in a location."""
+        return self.has_value(self.places[self.place_of[Subject(automaton)]], location)
+
+    def unchanged(self, place: int) -> Any:
+        """Where a place has one value before and after an event."""
+        return self.all_of(
+            self.manager.ite(self.manager.var(name), self.manager.var(after(name)), ~self.manager.var(after(name)))
+            for name in reversed(self.places[place].names)
+        )
+
+    def states(self, states: Iterable[State]) -> Any:
+        """Where the state is one of some states."""
+        return self.any_of(
+            self.all_of(self.has_value(digits, value) for digits, value in zip(self.places, state, strict=True))
+            for state in states
+        )
+
+    def initial(self) -> Any:
+        """The initial states."""
+        return self.states((Semantics(replace(self.system, events=(), invariants=())).initial,))
+
+    def marked(self) -> Any:
+        """Where every automaton is in a marked location."""
+        return self.all_of(
+            self.chosen(
+                self.places[self.place_of[Subject(item.name)]],
+                [self.manager.true if location in item.marked else self.manager.false for location in item.locations],
+            )
+            for item in self.system.automata
+        )
+
+    def possible_data(self, event: str) -> Any:
+        """The data that an occurrence of an event can carry."""
+        inputs = [item for item in self.system.inputs if item.event == event]
+        result = self.manager.true
+        for item in inputs:
+            digits = self.data[event, item.path]
+            is_value = self._has_any_value(digits)
+            if digits.known is not None:
+                is_value = is_value | ~self.manager.var(digits.known)
+            result = result & is_value
+        for group in connected_inputs(inputs):
+            if any(item.may_be_unknown for item in group):
+                result = result & self._possible_knowledge(group)
+        return result
+
+    def _has_any_value(self, digits: Digits) -> Any:
+        """Where some digits hold the index of a value at all."""
+        if len(digits.values) == 1 << len(digits.names):
+            return self.manager.true
+        return self._by_ranges(digits.names, (0, len(digits.values)), (self.manager.true, self.manager.false))
+
+    def _possible_knowledge(self, group: Sequence[InputVariable]) -> Any:
+        """Which data of an array can be known together."""
+        # With one value each, what remains of the choices is which are known.
+        single = [replace(item, type=IntegerType(0, 0)) for item in group]
+        found = self.manager.false
+        for data in valuations(single):
+            self.work.spend(1)
+            combination = self.manager.true
+            for item in group:
+                known = self.data[item.event, item.path].known
+                if known is not None:
+                    variable = self.manager.var(known)
+                    combination = combination & (~variable if data[item.path] is None else variable)
+            found = found | combination
+        return found
+
+    def decision(self, decision: Decision) -> Any:
+        """Where a supervisor's condition is true."""
+        made = [self.manager.false, self.manager.true]
+        for node in decision.nodes:
+            digits = self.places[node.place]
+            branches = [made[child] for child in node.children]
+            self.work.spend(len(branches))
+            made.append(self._by_ranges(digits.names, node.starts, branches))
+        return made[decision.root]
+
+    def _by_ranges(self, names: Sequence[str], starts: Sequence[int], branches: Sequence[Any]) -> Any:
+        """The branch whose range an index lies in; the ranges begin at `starts`, the first at 0."""
+        if len(starts) == 1:
+            return branches[0]
+        half = 1 << (len(names) - 1)
+        split = next((number for number, start in enumerate(starts) if start >= half), len(starts))
+        low = self._by_ranges(names[1:], starts[:split], branches[:split])
+        if split == len(starts) or starts[split] > half:
+            # The range before it goes on in the upper half.
+            upper, above = [0, *(start - half for start in starts[split:])], branches[split - 1 :]
+        else:
+            upper, above = [start - half for start in starts[split:]], branches[split:]
+        return self.manager.ite(self.manager.var(names[0]), self._by_ranges(names[1:], upper, above), low)
+
+    # States
+
+    def a_state(self, predicate: Any) -> State:
+        """A state in which a predicate over the state's variables is true (it is true somewhere): the first one."""
+        values = dict.fromkeys(self.names, False)
+        node = predicate
+        while node != self.manager.true:
+            low, high = cofactors(node)
+            if low == self.manager.false:
+                values[node.var] = True
+            node = high if low == self.manager.false else low
+        return tuple(
+            digits.values[sum(values[name] << rank for rank, name in enumerate(reversed(digits.names)))]
+            for digits in self.places
+        )
+
+    def count(self, predicate: Any) -> int:
+        """How many states a predicate over the state's variables is true in, exactly."""
+        level = {name: number for number, name in enumerate(self.names)}
+        nodes: dict[int, Any] = {}
+        stack = [predicate]
+        while stack:
+            node = stack.pop()
+            if node not in (self.manager.true, self.manager.false) and int(node) not in nodes:
+                nodes[int(node)] = node
+                stack.extend(cofactors(node))
+        counts = {int(self.manager.false): 0, int(self.manager.true): 1}
+        levels = {int(self.manager.false): len(level), int(self.manager.true): len(level)}
+        levels |= {number: level[node.var] for number, node in nodes.items()}
+        # Lowest first: what a node leads to is counted before it.
+        for number in sorted(nodes, key=lambda number: -levels[number]):
+            counts[number] = sum(
+                counts[int(child)] << (levels[int(child)] - levels[number] - 1) for child in cofactors(nodes[number])
+            )
+        return counts[int(predicate)] << levels[int(predicate)]
+
+
+def cofactors(node: Any) -> tuple[Any, Any]:
+    """What a diagram is where its topmost variable is false, and where it is true."""
+    return (~node.low, ~node.high) if node.negated else (node.low, node.high)
+
+
+def _digits(prefix: str, values: Sequence[Value], known: str | None = None) -> Digits:
+    width = (len(values) - 1).bit_length()
+    return Digits(tuple(f"{prefix}.{place}" for place in range(width)), values, known)

@@ -1,0 +1,56 @@
+"""How much work a symbolic check may take: counted in nodes, so that it ends alike on every machine."""
+
+from collections.abc import Callable
+from typing import Any
+
+from robosc.errors import RoboscError, SynthesisCancelled
+
+PROGRESS_INTERVAL = 64
+"""Steps between two reports of progress."""
+
+
+class TooMuchWorkError(RoboscError):
+    """The check would take more work than it may."""
+
+
+class Work:
+    """Counts work, and ends it where it is too much.
+
+    Args:
+        limit: Nodes of all diagrams that are made, each counted each time, and values that expressions are worked
+            out for.
+        should_stop: Asked at each step; once true, the work ends.
+        on_progress: Told now and then where the work is, in one short line.
+    """
+
+    def __init__(self, limit: int, should_stop: Callable[[], bool], on_progress: Callable[[str], None]) -> None:
+        self.limit = limit
+        self.done = 0
+        self._steps = 0
+        self._should_stop = should_stop
+        self._on_progress = on_progress
+
+    def again(self) -> "Work":
+        """As much work anew."""
+        return Work(self.limit, self._should_stop, self._on_progress)
+
+    def spend(self, amount: int) -> None:
+        """Count some work.
+
+        Raises:
+            TooMuchWorkError: It is more than is left.
+            SynthesisCancelled: The work is to end.
+        """
+        if self._should_stop():
+            raise SynthesisCancelled("the symbolic check was stopped")
+        self.done += amount
+        if self.done > self.limit:
+            raise TooMuchWorkError(f"more than {self.limit} nodes")
+        self._steps += 1
+        if self._steps % PROGRESS_INTERVAL == 0:
+            self._on_progress(f"symbolic search, {self.done} nodes")
+
+    def count(self, node: Any) -> Any:
+        """Count a diagram that was made; returns it."""
+        self.spend(int(node.dag_size))
+        return node

@@ -1,0 +1,258 @@
+"""The symbolic check agrees with the explicit one, on right supervisors and on wrong ones."""
+
+from collections.abc import Mapping, Sequence
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robosc.automata import DiscreteVariable, InputVariable, Semantics, System
+from robosc.automata.compile import State
+from robosc.automata.decision import Decision
+from robosc.errors import SynthesisCancelled
+from robosc.expressions import Binary, BooleanType, Call, Conditional, IntegerType, StateTest, Unary, VariableRead
+from robosc.supervisor.conditions import state_predicates
+from robosc.supervisor.structure import AddedCondition, DecisionDiagram
+from robosc.synthesis import SynthesisStatus, synthesize
+from robosc.verification import Outcome, Verification, verify, verify_symbolically
+from robosc.verification.symbolic.order import cuthill_mckee, place_order
+from robosc.verification.symbolic.reach import Reachability
+from robosc.verification.symbolic.work import TooMuchWorkError, Work
+from support.families import FAMILIES
+from support.random_supervisors import random_diagram
+from support.random_systems import systems
+from support.systems import automaton, edge, operation, read, received, system
+
+PASSED, FAILED, NOT_CHECKED = Outcome.PASSED, Outcome.FAILED, Outcome.NOT_CHECKED
+
+
+def _three(found: Verification) -> tuple[Outcome, Outcome, Outcome]:
+    return found.safe, found.controllable, found.nonblocking
+
+
+def replay(made: System, added: Mapping[str, Decision], trace: Sequence[str]) -> set[State]:
+    """The states that a trace can lead to in the controlled system."""
+    semantics = Semantics(made)
+    states = {semantics.initial}
+    for name in trace:
+        states = {
+            target
+            for at in states
+            if name not in added or added[name](at)
+            if not made.event(name).is_controllable or semantics.condition(at, name)
+            for target in semantics.targets(at, name)
+        }
+    return states
+
+
+def _agrees(made: System, added: Mapping[str, Decision], engine: str = "cudd") -> Verification:
+    explicit = verify(made, added, permissive_limit=0)
+    symbolic = verify_symbolically(made, added, engine=engine)
+    assert (symbolic.states, _three(symbolic)) == (explicit.states, _three(explicit))
+    assert symbolic.maximally_permissive is NOT_CHECKED
+    assert symbolic.transitions is None
+    traces = {item.property: item.trace for item in explicit.failures}
+    for failure in symbolic.failures:
+        assert failure.state in replay(made, added, failure.trace)
+        assert failure.is_shortest
+        if failure.property != "controllable":
+            # Of several events that are disabled, either names the first it meets.
+            assert len(failure.trace) == len(traces[failure.property])
+    return symbolic
+
+
+def _conditions(made: System, seed: int) -> dict[str, Decision]:
+    dice = Random(seed)
+    return state_predicates(
+        made, [AddedCondition(event.name, random_diagram(dice, made)) for event in made.events if dice.random() < 0.4]
+    )
+
+
+@settings(deadline=None, max_examples=40)
+@given(systems(), st.integers(0, 10**6))
+def test_on_any_supervisor_it_agrees_with_the_explicit_search(made: System, seed: int) -> None:
+    _agrees(made, {})
+    _agrees(made, _conditions(made, seed))
+
+
+@settings(deadline=None, max_examples=8)
+@given(systems(), st.integers(0, 10**6))
+def test_both_engines_find_the_same_with_the_same_work(made: System, seed: int) -> None:
+    added = _conditions(made, seed)
+    found = [verify_symbolically(made, added, engine=engine) for engine in ("cudd", "autoref")]
+    assert found[0] == found[1]
+    for limit in (100, 500, 2000):
+        ends = [verify_symbolically(made, added, engine=engine, limit=limit) for engine in ("cudd", "autoref")]
+        assert ends[0] == ends[1]
+
+
+@settings(deadline=None, max_examples=15)
+@given(systems())
+def test_right_supervisors_pass_and_freed_ones_fail(made: System) -> None:
+    result = synthesize(made)
+    if result.status is SynthesisStatus.EMPTY:
+        return
+    right = _agrees(made, state_predicates(made, result.added))
+    assert _three(right) == (PASSED, PASSED, PASSED)
+    assert right.states == result.statistics.states
+    for item in result.added:
+        freed = [one if one != item else AddedCondition(item.event, DecisionDiagram((), 1)) for one in result.added]
+        assert FAILED in _three(_agrees(made, state_predicates(made, freed)))
+
+
+@pytest.mark.parametrize(
+    ("family", "size"),
+    [
+        ("dining philosophers", 5),
+        ("transfer line", 2),
+        ("token ring", 20),
+        ("cat and mouse, 2 pairs", 1),
+        ("counter", 100),
+        ("random robot", 6),
+        ("random robot", 40),
+    ],
+)
+def test_families(family: str, size: int) -> None:
+    made = FAMILIES[family](size)
+    result = synthesize(made)
+    found = verify_symbolically(made, state_predicates(made, result.added))
+    assert (found.states, _three(found)) == (result.statistics.states, (PASSED, PASSED, PASSED))
+
+
+def test_a_large_robot_without_its_supervisor_is_told_from_one_with_it() -> None:
+    """Far too large for any explicit search: forks are taken until nobody can eat."""
+    made = FAMILIES["dining philosophers"](12)
+    found = verify_symbolically(made, {})
+    assert _three(found) == (PASSED, PASSED, FAILED)
+    (failure,) = found.failures
+    assert failure.state in replay(made, {}, failure.trace)
+
+
+@settings(deadline=None, max_examples=12)
+@given(systems(), st.integers(0, 10**6))
+def test_a_run_is_found_even_where_a_shortest_one_is_too_much_work(made: System, seed: int) -> None:
+    added = _conditions(made, seed)
+    with pytest.MonkeyPatch.context() as patch:
+
+        def too_much(self: Reachability, initial: object, wanted: object) -> None:
+            raise TooMuchWorkError
+
+        patch.setattr(Reachability, "_shortest_run", too_much)
+        found = verify_symbolically(made, added)
+    for failure in found.failures:
+        assert not failure.is_shortest
+        assert failure.state in replay(made, added, failure.trace)
+
+
+def test_beyond_its_work_nothing_is_claimed() -> None:
+    made = FAMILIES["random robot"](5)
+    skipped = Verification(None, None, *[NOT_CHECKED] * 4)  # type: ignore[arg-type]
+    assert verify_symbolically(made, {}, limit=100) == skipped
+    whole = Work(10**9, lambda: False, lambda message: None)
+    with pytest.raises(TooMuchWorkError):
+        whole.spend(10**9 + 1)
+    # Between nothing and all there is a limit that only the last property goes beyond.
+    outcomes = {_three(verify_symbolically(made, {}, limit=limit)) for limit in range(3000, 15_000, 600)}
+    assert {(NOT_CHECKED,) * 3, (PASSED, PASSED, NOT_CHECKED), (PASSED, PASSED, PASSED)} == outcomes
+
+
+def test_it_stops_when_told_and_tells_of_progress() -> None:
+    told: list[str] = []
+    verify_symbolically(FAMILIES["random robot"](5), {}, on_progress=told.append)
+    assert told[0].startswith("symbolic search, ")
+    with pytest.raises(SynthesisCancelled):
+        verify_symbolically(FAMILIES["random robot"](5), {}, should_stop=lambda: True)
+
+
+def test_an_unknown_event_is_refused() -> None:
+    with pytest.raises(ValueError, match="does not have: fly"):
+        verify_symbolically(FAMILIES["token ring"](2), {"fly": Decision((), 1, ())})
+
+
+def test_wide_integers_are_copied_but_not_computed_with() -> None:
+    wide = IntegerType(0, 10_000)
+    copied = system(
+        automaton("A", [edge("l -u_got-> l", n=received())], variables=[DiscreteVariable("n", wide, (0,))]),
+        inputs=[InputVariable("u_got", (), wide)],
+    )
+    assert verify_symbolically(copied, {}).states == 10_001
+    sums = system(
+        automaton(
+            "A",
+            [edge("l -u_got-> l", n=operation(read("A.n"), "+", received()))],
+            variables=[DiscreteVariable("n", wide, (0,))],
+        ),
+        inputs=[InputVariable("u_got", (), wide)],
+    )
+    assert verify_symbolically(sums, {}).safe is NOT_CHECKED
+
+
+def test_a_range_without_number_is_not_gone_through() -> None:
+    made = system(
+        automaton(
+            "A",
+            [edge("l -go-> l", n=operation(1, "+", 2))],
+            variables=[DiscreteVariable("n", IntegerType(-(2**31), 2**31 - 1), (7,))],
+        ),
+        inputs=[InputVariable("go", (), IntegerType(-(2**31), 2**31 - 1))],
+    )
+    assert verify_symbolically(made, {}).states == 2
+
+
+def test_long_chains_and_conditionals_are_taken() -> None:
+    test = StateTest("A", "l")
+    chain: Binary = Binary("and", test, test)
+    for _ in range(3000):
+        chain = Binary("and", chain, test)
+    choice = Conditional(Unary("not", test), chain, Binary("=", chain, VariableRead("A", "b")))
+    made = system(
+        automaton(
+            "A",
+            [edge("l -go-> l", chain, b=choice), edge("l -u_x-> m"), edge("m -back-> l")],
+            variables=[DiscreteVariable("b", BooleanType(), (True,))],
+        ),
+        conditions={"back": chain},
+    )
+    _agrees(made, {})
+
+
+def test_what_is_unknown_changes_nothing() -> None:
+    """The quotient is unknown, and so is what is compared with it; the event happens all the same."""
+    quotient = operation(2, "/", read("A.n"))
+    made = system(
+        automaton(
+            "A",
+            [edge("l -go-> m", b=operation(quotient, "=", 1), k=Call("integer", (quotient,))), "m -u_x-> l"],
+            variables=[
+                DiscreteVariable("n", IntegerType(0, 1), (0,)),
+                DiscreteVariable("k", IntegerType(0, 1), (1,)),
+                DiscreteVariable("b", BooleanType(), (True,)),
+            ],
+        )
+    )
+    assert _agrees(made, {}).states == 2
+
+
+def test_an_array_has_no_gaps() -> None:
+    """Its second element is never known without its first."""
+    one = IntegerType(1, 1)
+    made = system(
+        automaton(
+            "A",
+            [edge("l -u_got-> l", x=received("scan", 0), y=received("scan", 1))],
+            variables=[DiscreteVariable(name, IntegerType(0, 1), (0,)) for name in ("x", "y")],
+        ),
+        inputs=[InputVariable("u_got", ("scan", index), one, may_be_unknown=True) for index in (0, 1)],
+    )
+    assert _agrees(made, {}).states == 3
+
+
+def test_the_order_keeps_neighbours_together() -> None:
+    ring = [{(number - 1) % 12: 1.0, (number + 1) % 12: 1.0} for number in range(12)]
+    order = cuthill_mckee(ring)
+    assert sorted(order) == list(range(12))
+    place = {node: number for number, node in enumerate(order)}
+    assert max(abs(place[node] - place[other]) for node, ties in enumerate(ring) for other in ties) == 2
+    made = FAMILIES["dining philosophers"](6)
+    assert sorted(place_order(made)) == list(range(12))

@@ -5,7 +5,13 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robosc.cli.arguments import add_deployment_argument, add_engine_argument, add_model_arguments, read_bundle
+from robosc.cli.arguments import (
+    add_deployment_argument,
+    add_engine_argument,
+    add_livelock_argument,
+    add_model_arguments,
+    read_bundle,
+)
 from robosc.cli.output import ExitCode, ProgressLine, diagnostics_json, print_diagnostics, print_json, write_bytes
 from robosc.model.structure import Deployment
 from robosc.source import Bundle
@@ -25,6 +31,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     add_output_argument(parser)
     add_deployment_argument(parser)
     add_engine_argument(parser)
+    add_livelock_argument(parser)
     parser.set_defaults(run=run)
 
 
@@ -36,10 +43,10 @@ def add_output_argument(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Synthesize; 0 with a supervisor, 1 without."""
     bundle = read_bundle(arguments)
-    return report_synthesis(arguments, make(arguments, bundle), bundle)
+    return report_synthesis(arguments, make(arguments, bundle, allow_livelock=arguments.allow_livelock), bundle)
 
 
-def make(arguments: argparse.Namespace, bundle: Bundle) -> "Made":
+def make(arguments: argparse.Namespace, bundle: Bundle, *, allow_livelock: bool) -> "Made":
     """Synthesize as the arguments say, with a progress line on a terminal."""
     from robosc.supervisor import make_supervisor
 
@@ -49,6 +56,7 @@ def make(arguments: argparse.Namespace, bundle: Bundle) -> "Made":
             bundle,
             deployment=Deployment(arguments.deployment),
             engine=arguments.engine,
+            allow_livelock=allow_livelock,
             on_progress=lambda step: progress.show(f"{step.stage}: {step.message}"),
         )
     finally:

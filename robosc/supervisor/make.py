@@ -8,6 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 
+import msgspec
+
 from robosc._version import __version__
 from robosc.automata import System, to_automata
 from robosc.automata.controlled import TRANSITIONS_PER_STATE
@@ -15,6 +17,7 @@ from robosc.errors import Diagnostic, InternalError, sorted_diagnostics
 from robosc.model import check
 from robosc.model.layers import layer_findings
 from robosc.model.structure import Deployment
+from robosc.properties import check_controller, controller_findings
 from robosc.source import Bundle
 from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.structure import Certificate, CheckResult, Supervisor
@@ -29,6 +32,9 @@ PERMISSIVENESS_LIMIT = 20_000
 """States of the uncontrolled system up to which permissiveness is checked by recomputing explicitly."""
 
 
+LIVELOCK_REASON = "no supervisor is made, because silent steps never end (--allow-livelock overrides this)"
+
+
 class MadeStatus(StrEnum):
     """How an attempt to make a supervisor ended."""
 
@@ -36,6 +42,7 @@ class MadeStatus(StrEnum):
     EMPTY = "empty"
     """No supervisor exists: a result about the model, not a fault."""
     MODEL_ERRORS = "model errors"
+    """The model has errors, one that only synthesis can tell included: silent steps that never end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +50,7 @@ class Progress:
     """Where long work is.
 
     Attributes:
-        stage: `check`, `synthesis` or `verification`.
+        stage: `check`, `synthesis`, `verification` or `controller`.
         message: One short line.
     """
 
@@ -76,6 +83,7 @@ def make_supervisor(
     *,
     deployment: Deployment = Deployment.CONTROLLER,
     engine: str = "auto",
+    allow_livelock: bool = False,
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[Progress], None] = lambda progress: None,
 ) -> Made:
@@ -85,6 +93,7 @@ def make_supervisor(
         bundle: The model and its libraries.
         deployment: Where the supervisor will stand.
         engine: Name of the engine for decision diagrams.
+        allow_livelock: Whether a supervisor is made even if silent steps of its executor never end.
         should_stop: Asked again and again; once true, the work ends.
         on_progress: Told where the work is.
 
@@ -119,8 +128,26 @@ def make_supervisor(
         return Made(MadeStatus.EMPTY, None, checked.diagnostics, result.statistics, reason)
     on_progress(Progress("verification", f"{result.statistics.states} states"))
     certificate = _certify(system, result, bundle, deployment, should_stop)
+    on_progress(Progress("controller", "finite response, confluence, nonblocking under control"))
+    properties = check_controller(
+        checked.model,
+        deployment,
+        result.added,
+        is_nonblocking=certificate.nonblocking == "passed",
+        states=result.statistics.states,
+        should_stop=should_stop,
+    )
+    diagnostics = sorted_diagnostics(
+        (
+            *checked.diagnostics,
+            *findings(checked.model, checked.places, result.answers),
+            *controller_findings(checked.model, system, checked.places, properties, allow_livelock=allow_livelock),
+        )
+    )
+    if properties.livelock is not None and not allow_livelock:
+        return Made(MadeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, LIVELOCK_REASON)
+    certificate = msgspec.structs.replace(certificate, controller=properties.certified())
     supervisor = Supervisor(checked.model, deployment, result.added, certificate)
-    diagnostics = sorted_diagnostics((*checked.diagnostics, *findings(checked.model, checked.places, result.answers)))
     return Made(MadeStatus.SUPERVISOR, supervisor, diagnostics, result.statistics)
 
 

@@ -1,5 +1,7 @@
 """A supervisor in figures and words: what `synth` prints, on this machine or from a service."""
 
+import msgspec
+
 from robosc.automata import System, to_automata
 from robosc.expressions.text import expression_text
 from robosc.model.structure import Model
@@ -35,6 +37,7 @@ def summary_json(supervisor: Supervisor) -> dict[str, object]:
             "method": certificate.method,
             **_checks(certificate),
         },
+        "controller": None if certificate.controller is None else msgspec.to_builtins(certificate.controller),
     }
 
 
@@ -57,6 +60,13 @@ def summary_text(supervisor: Supervisor) -> str:
     added = added_texts(supervisor, system)
     width = max((len(event) for event in added), default=0)
     lines += [f"    {event:<{width}}  {text if text != 'true' else 'nothing'}" for event, text in added.items()]
+    if certificate.controller is not None:
+        found = certificate.controller
+        lines.append("  controller")
+        lines.append(f"    {'finite response':<21} {found.finite_response}")
+        lines.append(f"    {'confluence':<21} {found.confluence}")
+        lines.append(f"    {'nonblocking':<21} {found.nonblocking}")
+        lines.append(f"    {'method':<21} {found.method}")
     lines.append("  certificate")
     checks = _checks(certificate)
     lines += [f"    {name.replace('_', ' '):<21} {outcome}" for name, outcome in checks.items()]

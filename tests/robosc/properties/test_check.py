@@ -10,6 +10,7 @@ from robosc.properties.controller import Controller
 from robosc.properties.orders import Orders
 from robosc.properties.search import search
 from robosc.supervisor import MadeStatus, decode, encode, make_supervisor, summary_json, summary_text
+from robosc.supervisor.structure import AddedCondition, DecisionDiagram, DecisionNode
 from robosc.synthesis import synthesize
 from support.models import EXAMPLE_DEPLOYMENTS, bundle_of, example_bundle, marked_place, model_of
 
@@ -259,6 +260,26 @@ def test_what_the_request_itself_makes_false_never_cancels() -> None:
     assert found.blocking.trace == ("reach.request",)
     turned = robot(INTERFACE, EYE, AGAIN, "requirement reach needs !Eye.dark")
     assert outcomes(properties(turned)) == ("passed", "passed", "passed")
+
+
+def test_a_cancel_that_was_forbidden_when_it_was_due_comes_later() -> None:
+    """What held in some stable state since the request is remembered, not only what held in the last one."""
+    gate = component(
+        "Gate",
+        "initial marked state shut { on response from open goto opened } marked state opened { }",
+        "outgoing message open with type: none",
+    )
+    model = model_of(robot(INTERFACE, EYE, gate, AGAIN, "requirement reach needs !Eye.dark"))
+    if_opened = DecisionDiagram((DecisionNode("Gate", None, (0, 1), (0, 1)),), 2)
+    controller = Controller(model, Deployment.CONTROLLER, (AddedCondition("reach.cancel", if_opened),))
+    node = controller.run(controller.start).end
+    taken: list[str] = []
+    for wanted in ("reach.request", "dusk.response", "open.response"):
+        assert node is not None
+        run = controller.run(next(after for events, _, after in controller.moves(node) if events == (wanted,)))
+        taken += [wanted, *run.events]
+        node = run.end
+    assert taken == ["reach.request", "dusk.response", "open.response", "reach.cancel"]
 
 
 def test_as_a_layer_the_caller_may_cancel() -> None:

@@ -72,6 +72,7 @@ class Client:
         *,
         deployment: Deployment = Deployment.CONTROLLER,
         engine: str = "auto",
+        allow_livelock: bool = False,
         deadline_s: float | None = None,
         on_progress: Callable[[Progress], None] = lambda progress: None,
     ) -> Synthesis:
@@ -81,10 +82,11 @@ class Client:
             bundle: The model and its libraries.
             deployment: Where the supervisor will stand.
             engine: Name of the server's engine for decision diagrams, or `auto`.
+            allow_livelock: Whether a supervisor is made even if silent steps of its controller never end.
             deadline_s: See the class.
             on_progress: Told where the work is; what it raises ends the work.
         """
-        request = convert.synthesize_request(bundle, deployment, engine)
+        request = convert.synthesize_request(bundle, deployment, engine, allow_livelock=allow_livelock)
         with self._translated(deadline_s):
             call = self._stub.Synthesize(request, timeout=deadline_s)
             try:
@@ -104,10 +106,11 @@ class Client:
         target: str,
         deployment: Deployment = Deployment.CONTROLLER,
         engine: str = "auto",
+        allow_livelock: bool = False,
         deadline_s: float | None = None,
     ) -> Generation:
         """Synthesize a supervisor and generate the files of a target around it; arguments as in `synthesize`."""
-        request = convert.generate_request(bundle, deployment, engine, target)
+        request = convert.generate_request(bundle, deployment, engine, target, allow_livelock=allow_livelock)
         with self._translated(deadline_s):
             return convert.generation(self._stub.Generate(request, timeout=deadline_s))
 

@@ -43,14 +43,19 @@ def check_request(bundle: Bundle) -> pb.CheckRequest:
     return pb.CheckRequest(bundle=_bundle(bundle))
 
 
-def synthesize_request(bundle: Bundle, deployment: Deployment, engine: str) -> pb.SynthesizeRequest:
+def synthesize_request(
+    bundle: Bundle, deployment: Deployment, engine: str, *, allow_livelock: bool = False
+) -> pb.SynthesizeRequest:
     """Ask for a supervisor; raises as `check_request`."""
-    return pb.SynthesizeRequest(bundle=_bundle(bundle), options=_options(deployment, engine))
+    return pb.SynthesizeRequest(bundle=_bundle(bundle), options=_options(deployment, engine, allow_livelock))
 
 
-def generate_request(bundle: Bundle, deployment: Deployment, engine: str, target: str) -> pb.GenerateRequest:
+def generate_request(
+    bundle: Bundle, deployment: Deployment, engine: str, target: str, *, allow_livelock: bool = False
+) -> pb.GenerateRequest:
     """Ask for generated files; raises as `check_request`."""
-    return pb.GenerateRequest(bundle=_bundle(bundle), options=_options(deployment, engine), target=target)
+    options = _options(deployment, engine, allow_livelock)
+    return pb.GenerateRequest(bundle=_bundle(bundle), options=options, target=target)
 
 
 def diagnostics(messages: Iterable[pb.Diagnostic]) -> tuple[Diagnostic, ...]:
@@ -133,8 +138,8 @@ def _file(file: SourceFile) -> pb.SourceFile:
     return pb.SourceFile(name=file.name, text=file.text)
 
 
-def _options(deployment: Deployment, engine: str) -> pb.SynthesisOptions:
-    return pb.SynthesisOptions(deployment=_DEPLOYMENTS[deployment], engine=engine)
+def _options(deployment: Deployment, engine: str, allow_livelock: bool) -> pb.SynthesisOptions:
+    return pb.SynthesisOptions(deployment=_DEPLOYMENTS[deployment], engine=engine, allow_livelock=allow_livelock)
 
 
 def _status(number: pb.SynthesisStatus) -> SynthesisStatus:

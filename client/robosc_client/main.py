@@ -10,7 +10,13 @@ from collections.abc import Sequence
 os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 
 from robosc import __version__
-from robosc.cli.arguments import add_deployment_argument, add_engine_argument, add_model_arguments, read_bundle
+from robosc.cli.arguments import (
+    add_deployment_argument,
+    add_engine_argument,
+    add_livelock_argument,
+    add_model_arguments,
+    read_bundle,
+)
 from robosc.cli.check import report_check
 from robosc.cli.generate import add_generate_arguments, report_generated
 from robosc.cli.main import guarded
@@ -93,6 +99,7 @@ def _add_common_arguments(parser: argparse.ArgumentParser) -> None:
 def _add_synthesis_arguments(parser: argparse.ArgumentParser) -> None:
     add_deployment_argument(parser)
     add_engine_argument(parser)
+    add_livelock_argument(parser)
 
 
 def _address(text: str) -> str:
@@ -131,6 +138,7 @@ def _synth(arguments: argparse.Namespace, client: Client) -> int:
             bundle,
             deployment=Deployment(arguments.deployment),
             engine=arguments.engine,
+            allow_livelock=arguments.allow_livelock,
             deadline_s=arguments.deadline,
             on_progress=lambda progress: line.show(f"{progress.stage}: {progress.message}"),
         )
@@ -147,6 +155,7 @@ def _generate(arguments: argparse.Namespace, client: Client) -> int:
         target=arguments.target,
         deployment=Deployment(arguments.deployment),
         engine=arguments.engine,
+        allow_livelock=arguments.allow_livelock,
         deadline_s=arguments.deadline,
     )
     made = _made(generation, b"")

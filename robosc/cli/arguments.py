@@ -114,6 +114,16 @@ def _natural(text: str) -> int:
 _natural.__name__ = "number"
 
 
+def add_livelock_argument(parser: argparse.ArgumentParser) -> None:
+    """What is thought of silent steps that never end."""
+    parser.add_argument(
+        "--allow-livelock",
+        action="store_true",
+        help="make the supervisor even if resets, cancels and tau transitions can go on for ever without anything "
+        "else happening: only warn (default: that is an error)",
+    )
+
+
 def read_bundle(arguments: argparse.Namespace) -> Bundle:
     """The model that the arguments name, with its libraries.
 

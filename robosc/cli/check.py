@@ -93,7 +93,7 @@ def _synthesized(arguments: argparse.Namespace, bundle: Bundle) -> _Synthesized:
 
     arguments.deployment = arguments.deployment or str(Deployment.CONTROLLER)
     try:
-        made = synth.make(arguments, bundle)
+        made = synth.make(arguments, bundle, allow_livelock=False)
     except UnsupportedModelError as error:
         return _Synthesized(_checked(bundle), "unsupported model", str(error), has_failed=True)
     has_failed = made.status is MadeStatus.EMPTY

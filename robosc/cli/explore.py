@@ -48,7 +48,8 @@ def run(arguments: argparse.Namespace) -> int:
     from robosc.supervisor.conditions import state_predicates
 
     bundle = read_bundle(arguments)
-    made = synth.make(arguments, bundle)
+    # The graph is of everything allowed, whatever an executor would choose.
+    made = synth.make(arguments, bundle, allow_livelock=True)
     if made.supervisor is None:
         if arguments.json:
             print_json({"status": str(made.status), **synth.reasons_json(made), **diagnostics_json(made.diagnostics)})

@@ -6,7 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robosc.cli import synth
-from robosc.cli.arguments import add_deployment_argument, add_engine_argument, add_model_arguments, read_bundle
+from robosc.cli.arguments import (
+    add_deployment_argument,
+    add_engine_argument,
+    add_livelock_argument,
+    add_model_arguments,
+    read_bundle,
+)
 from robosc.cli.output import ExitCode, diagnostics_json, print_json
 from robosc.source import Bundle
 
@@ -37,6 +43,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     add_generate_arguments(parser)
     add_deployment_argument(parser)
     add_engine_argument(parser)
+    add_livelock_argument(parser)
     parser.set_defaults(run=run)
 
 
@@ -54,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     require_target(arguments.target)
     bundle = read_bundle(arguments)
-    made = judged_for(synth.make(arguments, bundle), arguments.target)
+    made = judged_for(synth.make(arguments, bundle, allow_livelock=arguments.allow_livelock), arguments.target)
     files = generate(made.supervisor, arguments.target) if made.supervisor else None
     return report_generated(arguments, made, files, bundle)
 

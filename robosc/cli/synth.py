@@ -9,6 +9,7 @@ from robosc.cli.arguments import (
     SYNTHESIS_STATES,
     add_deployment_argument,
     add_engine_argument,
+    add_livelock_argument,
     add_model_arguments,
     add_verify_limit_argument,
     engine_options,
@@ -47,6 +48,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     add_deployment_argument(parser)
     add_engine_argument(parser)
     add_verify_limit_argument(parser, "--verify-limit", SYNTHESIS_STATES)
+    add_livelock_argument(parser)
     parser.set_defaults(run=run)
 
 
@@ -58,10 +60,14 @@ def add_output_argument(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Synthesize; 0 with a supervisor, 1 without."""
     bundle = read_bundle(arguments)
-    return report_synthesis(arguments, make(arguments, bundle, verify_limit=arguments.verify_limit), bundle)
+    allow_livelock, verify_limit = arguments.allow_livelock, arguments.verify_limit
+    made = make(arguments, bundle, allow_livelock=allow_livelock, verify_limit=verify_limit)
+    return report_synthesis(arguments, made, bundle)
 
 
-def make(arguments: argparse.Namespace, bundle: Bundle, *, verify_limit: int = SYNTHESIS_STATES) -> "Made":
+def make(
+    arguments: argparse.Namespace, bundle: Bundle, *, allow_livelock: bool, verify_limit: int = SYNTHESIS_STATES
+) -> "Made":
     """Synthesize as the arguments say, with a progress line on a terminal."""
     from robosc.supervisor import make_supervisor
 
@@ -72,6 +78,7 @@ def make(arguments: argparse.Namespace, bundle: Bundle, *, verify_limit: int = S
             deployment=Deployment(arguments.deployment),
             engine=engine_options(arguments),
             verify_limit=verify_limit,
+            allow_livelock=allow_livelock,
             on_progress=lambda step: progress.show(f"{step.stage}: {step.message}"),
         )
     finally:

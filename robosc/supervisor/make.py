@@ -9,6 +9,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
 
+import msgspec
+
 from robosc.automata import System, to_automata
 from robosc.errors import Diagnostic, NodeLimitError, sorted_diagnostics
 from robosc.explanation import EmptyExplanation, explain_empty
@@ -16,6 +18,7 @@ from robosc.model import check
 from robosc.model.layers import layer_findings
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model
+from robosc.properties import check_controller, controller_findings
 from robosc.source import Bundle
 from robosc.supervisor.certify import certify
 from robosc.supervisor.structure import Supervisor
@@ -29,6 +32,8 @@ from robosc.synthesis import (
 )
 from robosc.synthesis import Progress as SynthesisProgress
 from robosc.verification import DEFAULT_STATES, Limits
+
+LIVELOCK_REASON = "no supervisor is made, because silent steps never end (--allow-livelock overrides this)"
 
 
 class MadeStatus(StrEnum):
@@ -45,7 +50,7 @@ class Progress:
     """Where long work is.
 
     Attributes:
-        stage: `check`, `synthesis` or `verification`.
+        stage: `check`, `synthesis`, `verification` or `controller`.
         message: One short line.
     """
 
@@ -115,6 +120,7 @@ def make_supervisor(
     deployment: Deployment = Deployment.CONTROLLER,
     engine: str | EngineOptions = "auto",
     verify_limit: int = DEFAULT_STATES,
+    allow_livelock: bool = False,
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[Progress], None] = lambda progress: None,
 ) -> Made:
@@ -125,6 +131,7 @@ def make_supervisor(
         deployment: Where the supervisor will stand.
         engine: Name of the engine for decision diagrams, or more about it.
         verify_limit: States up to which the result is verified one by one; see `Limits.of`.
+        allow_livelock: Whether a supervisor is made even if silent steps of its executor never end.
         should_stop: Asked again and again; once true, the work ends.
         on_progress: Told where the work is.
 
@@ -175,6 +182,24 @@ def make_supervisor(
         should_stop=should_stop,
         on_progress=lambda message: on_progress(Progress("verification", message)),
     )
+    on_progress(Progress("controller", "finite response, confluence, nonblocking under control"))
+    properties = check_controller(
+        model,
+        deployment,
+        result.added,
+        is_nonblocking=certificate.nonblocking == "passed",
+        states=result.statistics.states,
+        should_stop=should_stop,
+    )
+    diagnostics = sorted_diagnostics(
+        (
+            *prepared.diagnostics,
+            *findings(model, places, result.answers),
+            *controller_findings(model, system, places, properties, allow_livelock=allow_livelock),
+        )
+    )
+    if properties.livelock is not None and not allow_livelock:
+        return Made(MadeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, LIVELOCK_REASON)
+    certificate = msgspec.structs.replace(certificate, controller=properties.certified())
     supervisor = Supervisor(model, deployment, result.added, certificate)
-    diagnostics = sorted_diagnostics((*prepared.diagnostics, *findings(model, places, result.answers)))
     return Made(MadeStatus.SUPERVISOR, supervisor, diagnostics, result.statistics)

@@ -63,7 +63,26 @@ class AddedCondition(msgspec.Struct, frozen=True):
 CheckResult = Literal["passed", "not checked"]
 
 
-class Certificate(msgspec.Struct, frozen=True):
+PropertyResult = Literal["passed", "failed", "not checked"]
+
+
+class ControllerProperties(msgspec.Struct, frozen=True):
+    """What was found out about supervisor and executor together, which synthesis does not guarantee.
+
+    Attributes:
+        finite_response: Whether silent steps end.
+        confluence: Whether their order does not matter.
+        nonblocking: Whether a marked state stays reachable under control.
+        method: How this was found out, in words.
+    """
+
+    finite_response: PropertyResult
+    confluence: PropertyResult
+    nonblocking: PropertyResult
+    method: str
+
+
+class Certificate(msgspec.Struct, frozen=True, omit_defaults=True):
     """What was checked about the supervisor, how, and for which model.
 
     Attributes:
@@ -77,6 +96,7 @@ class Certificate(msgspec.Struct, frozen=True):
         maximally_permissive: Nothing more is disabled than needed.
         states: Reachable states of the controlled system, exact.
         transitions: Transitions between them, or None where they were not counted.
+        controller: Properties of the controller, or None where nobody asked.
     """
 
     engine_version: str
@@ -89,6 +109,7 @@ class Certificate(msgspec.Struct, frozen=True):
     maximally_permissive: CheckResult
     states: str
     transitions: str | None
+    controller: ControllerProperties | None = None
 
 
 class Supervisor(msgspec.Struct, frozen=True):

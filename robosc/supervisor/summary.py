@@ -2,6 +2,8 @@
 
 import textwrap
 
+import msgspec
+
 from robosc.automata import System, to_automata
 from robosc.expressions import TRUE, Expression
 from robosc.model.structure import Model
@@ -50,6 +52,7 @@ def summary_json(supervisor: Supervisor) -> dict[str, object]:
             "method": certificate.method,
             **_checks(certificate),
         },
+        "controller": None if certificate.controller is None else msgspec.to_builtins(certificate.controller),
     }
 
 
@@ -70,6 +73,13 @@ def summary_text(supervisor: Supervisor) -> str:
     lines += [f"  {name:<13} {text}" for name, text in rows]
     lines.append("  the supervisor adds to each controllable event")
     lines += [f"    {line}" for line in added_lines(supervisor, system)]
+    if certificate.controller is not None:
+        found = certificate.controller
+        lines.append("  controller")
+        lines.append(f"    {'finite response':<21} {found.finite_response}")
+        lines.append(f"    {'confluence':<21} {found.confluence}")
+        lines.append(f"    {'nonblocking':<21} {found.nonblocking}")
+        lines.append(f"    {'method':<21} {found.method}")
     lines.append("  certificate")
     checks = _checks(certificate)
     lines += [f"    {name.replace('_', ' '):<21} {outcome}" for name, outcome in checks.items()]

@@ -458,7 +458,10 @@ def _synthesis_expressions(
 
 
 def _validate_certificate(certificate: Certificate) -> None:
-    for name, text in (("method", certificate.method), ("engine version", certificate.engine_version)):
+    texts = [("method", certificate.method), ("engine version", certificate.engine_version)]
+    if certificate.controller is not None:
+        texts.append(("method of the controller's properties", certificate.controller.method))
+    for name, text in texts:
         if len(text) > _MAXIMUM_TEXT or not text.isprintable():
             raise InvalidSupervisorError(f"certificate: the {name} is no line of at most {_MAXIMUM_TEXT} characters")
     if not _COUNT.match(certificate.states) or certificate.states == "0":

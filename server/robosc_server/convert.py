@@ -72,7 +72,8 @@ def synthesize_job(request: pb.SynthesizeRequest | pb.GenerateRequest, max_bundl
     if deployment is None:
         raise RequestError(f"there is no deployment of number {request.options.deployment}")
     bundle = _bundle(request.bundle, max_bundle_bytes)
-    return SynthesizeJob(bundle, deployment, request.options.engine or "auto")
+    options = request.options
+    return SynthesizeJob(bundle, deployment, options.engine or "auto", options.allow_livelock)
 
 
 def generate_job(request: pb.GenerateRequest, max_bundle_bytes: int) -> GenerateJob:

@@ -34,6 +34,7 @@ class SynthesizeJob:
     bundle: Bundle
     deployment: Deployment
     engine: str
+    allow_livelock: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,6 +168,7 @@ def _made(job: SynthesizeJob, on_report: Callable[[Report], None]) -> "Made | Sy
             job.bundle,
             deployment=job.deployment,
             engine=job.engine,
+            allow_livelock=job.allow_livelock,
             on_progress=lambda progress: on_report(Report(progress.stage, progress.message)),
         )
     except LanguageError as error:

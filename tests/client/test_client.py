@@ -224,8 +224,13 @@ class TestConversion:
         request = client_convert.synthesize_request(bundle, Deployment.LAYER, "autoref")
         job = server_convert.synthesize_job(request, 1000)
         assert (job.bundle, job.deployment, job.engine) == (bundle, Deployment.LAYER, "autoref")
+        assert not job.allow_livelock
+        allowing = client_convert.synthesize_request(bundle, Deployment.LAYER, "autoref", allow_livelock=True)
+        assert server_convert.synthesize_job(allowing, 1000).allow_livelock
         generate = client_convert.generate_request(bundle, Deployment.CONTROLLER, "auto", "ros2")
         assert server_convert.generate_job(generate, 1000).target == "ros2"
+        generate = client_convert.generate_request(bundle, Deployment.CONTROLLER, "auto", "ros2", allow_livelock=True)
+        assert server_convert.generate_job(generate, 1000).synthesis.allow_livelock
         assert server_convert.check_job(client_convert.check_request(bundle), 1000).bundle == bundle
 
     def test_libraries_are_sorted_for_the_core(self) -> None:

@@ -9,6 +9,8 @@ SOURCE = Path(__file__).parents[2] / "robosc"
 
 _LOOKS_LIKE_A_CODE = re.compile(r"[a-z0-9]+(-[a-z0-9]+)+")
 
+_IS_ONE_WORD = re.compile(r"[a-z0-9]+")
+
 NO_CODES = frozenset({"utf-8", "utf-8-sig", "robosc-supervisor"})
 """Texts of the source that look like codes and are none."""
 
@@ -31,9 +33,21 @@ def reportable_codes() -> frozenset[str]:
     """Every code that stands in the source.
 
     A code may reach its finding by ways that no syntax tree shows (a variable, a table, a parameter), so every text
-    that looks like one counts: words of lower case with hyphens between them are nothing else in this source.
+    that looks like one counts: words of lower case with hyphens between them are nothing else in this source. A code of
+    one word counts where it is given to a `Diagnostic` as it stands.
     """
-    found = {
+    given = {
+        argument.value
+        for _, tree in trees()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id == "Diagnostic"
+        and isinstance(argument := _code_argument(node), ast.Constant)
+        and isinstance(argument.value, str)
+        and _IS_ONE_WORD.fullmatch(argument.value)
+    }
+    found = given | {
         node.value
         for _, tree in trees()
         for node in ast.walk(tree)

@@ -24,19 +24,19 @@ _sym_db = _symbol_database.Default()
 
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1drobosc_api/v1/synthesis.proto\x12\rrobosc_api.v1\"(\n\nSourceFile\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x0c\n\x04text\x18\x02 \x01(\t\"\xa0\x01\n\x06\x42undle\x12\'\n\x04main\x18\x01 \x01(\x0b\x32\x19.robosc_api.v1.SourceFile\x12,\n\tlibraries\x18\x02 \x03(\x0b\x32\x19.robosc_api.v1.SourceFile\x12\x10\n\x08searched\x18\x03 \x03(\t\x12-\n\ninterfaces\x18\x04 \x03(\x0b\x32\x19.robosc_api.v1.SourceFile\"F\n\x08Location\x12\x0c\n\x04\x66ile\x18\x01 \x01(\t\x12\x0c\n\x04line\x18\x02 \x01(\r\x12\x0e\n\x06\x63olumn\x18\x03 \x01(\r\x12\x0e\n\x06length\x18\x04 \x01(\r\"J\n\x0cRelatedPlace\x12\x0f\n\x07message\x18\x01 \x01(\t\x12)\n\x08location\x18\x02 \x01(\x0b\x32\x17.robosc_api.v1.Location\"\xbd\x01\n\nDiagnostic\x12)\n\x08severity\x18\x01 \x01(\x0e\x32\x17.robosc_api.v1.Severity\x12\x0c\n\x04\x63ode\x18\x02 \x01(\t\x12\x0f\n\x07message\x18\x03 \x01(\t\x12)\n\x08location\x18\x04 \x01(\x0b\x32\x17.robosc_api.v1.Location\x12\x0c\n\x04mend\x18\x05 \x01(\t\x12,\n\x07related\x18\x06 \x03(\x0b\x32\x1b.robosc_api.v1.RelatedPlace\"Q\n\x10SynthesisOptions\x12-\n\ndeployment\x18\x01 \x01(\x0e\x32\x19.robosc_api.v1.Deployment\x12\x0e\n\x06\x65ngine\x18\x02 \x01(\t\"5\n\x0c\x43heckRequest\x12%\n\x06\x62undle\x18\x01 \x01(\x0b\x32\x15.robosc_api.v1.Bundle\"?\n\rCheckResponse\x12.\n\x0b\x64iagnostics\x18\x01 \x03(\x0b\x32\x19.robosc_api.v1.Diagnostic\"l\n\x11SynthesizeRequest\x12%\n\x06\x62undle\x18\x01 \x01(\x0b\x32\x15.robosc_api.v1.Bundle\x12\x30\n\x07options\x18\x02 \x01(\x0b\x32\x1f.robosc_api.v1.SynthesisOptions\"|\n\x12SynthesizeResponse\x12+\n\x08progress\x18\x01 \x01(\x0b\x32\x17.robosc_api.v1.ProgressH\x00\x12\x30\n\x06result\x18\x02 \x01(\x0b\x32\x1e.robosc_api.v1.SynthesisResultH\x00\x42\x07\n\x05\x65vent\"*\n\x08Progress\x12\r\n\x05stage\x18\x01 \x01(\t\x12\x0f\n\x07message\x18\x02 \x01(\t\"\x82\x02\n\x0fSynthesisResult\x12.\n\x06status\x18\x01 \x01(\x0e\x32\x1e.robosc_api.v1.SynthesisStatus\x12.\n\x0b\x64iagnostics\x18\x02 \x03(\x0b\x32\x19.robosc_api.v1.Diagnostic\x12\x12\n\nsupervisor\x18\x03 \x01(\x0c\x12\x0e\n\x06reason\x18\x04 \x01(\t\x12\'\n\x07summary\x18\x05 \x01(\x0b\x32\x16.robosc_api.v1.Summary\x12-\n\nstatistics\x18\x06 \x01(\x0b\x32\x19.robosc_api.v1.Statistics\x12\x13\n\x0b\x65xplanation\x18\x07 \x01(\t\"X\n\nStatistics\x12\x0e\n\x06\x65ngine\x18\x01 \x01(\t\x12\x12\n\nstate_bits\x18\x02 \x01(\r\x12\x12\n\niterations\x18\x03 \x01(\x04\x12\x12\n\npeak_nodes\x18\x04 \x01(\x04\"\xa6\x01\n\x07Summary\x12\x1b\n\x13\x63ontrollable_events\x18\x01 \x01(\r\x12\x1d\n\x15uncontrollable_events\x18\x02 \x01(\r\x12\x0e\n\x06states\x18\x03 \x01(\t\x12\x13\n\x0btransitions\x18\x04 \x01(\t\x12,\n\x05\x61\x64\x64\x65\x64\x18\x05 \x03(\x0b\x32\x1d.robosc_api.v1.AddedCondition\x12\x0c\n\x04text\x18\x06 \x01(\t\"2\n\x0e\x41\x64\x64\x65\x64\x43ondition\x12\r\n\x05\x65vent\x18\x01 \x01(\t\x12\x11\n\tcondition\x18\x02 \x01(\t\"z\n\x0fGenerateRequest\x12%\n\x06\x62undle\x18\x01 \x01(\x0b\x32\x15.robosc_api.v1.Bundle\x12\x30\n\x07options\x18\x02 \x01(\x0b\x32\x1f.robosc_api.v1.SynthesisOptions\x12\x0e\n\x06target\x18\x03 \x01(\t\"\xc4\x01\n\x10GenerateResponse\x12.\n\x06status\x18\x01 \x01(\x0e\x32\x1e.robosc_api.v1.SynthesisStatus\x12.\n\x0b\x64iagnostics\x18\x02 \x03(\x0b\x32\x19.robosc_api.v1.Diagnostic\x12\x0e\n\x06reason\x18\x03 \x01(\t\x12+\n\x05\x66iles\x18\x04 \x03(\x0b\x32\x1c.robosc_api.v1.GeneratedFile\x12\x13\n\x0b\x65xplanation\x18\x05 \x01(\t\"B\n\rGeneratedFile\x12\x0c\n\x04path\x18\x01 \x01(\t\x12\x0f\n\x07\x63ontent\x18\x02 \x01(\t\x12\x12\n\nexecutable\x18\x03 \x01(\x08*a\n\x08Severity\x12\x18\n\x14SEVERITY_UNSPECIFIED\x10\x00\x12\x12\n\x0eSEVERITY_ERROR\x10\x01\x12\x14\n\x10SEVERITY_WARNING\x10\x02\x12\x11\n\rSEVERITY_NOTE\x10\x03*Y\n\nDeployment\x12\x1a\n\x16\x44\x45PLOYMENT_UNSPECIFIED\x10\x00\x12\x19\n\x15\x44\x45PLOYMENT_CONTROLLER\x10\x01\x12\x14\n\x10\x44\x45PLOYMENT_LAYER\x10\x02*\xbb\x01\n\x0fSynthesisStatus\x12 \n\x1cSYNTHESIS_STATUS_UNSPECIFIED\x10\x00\x12\x1f\n\x1bSYNTHESIS_STATUS_SUPERVISOR\x10\x01\x12\x1a\n\x16SYNTHESIS_STATUS_EMPTY\x10\x02\x12!\n\x1dSYNTHESIS_STATUS_MODEL_ERRORS\x10\x03\x12&\n\"SYNTHESIS_STATUS_UNSUPPORTED_MODEL\x10\x04\x32\xf8\x01\n\x10SynthesisService\x12\x42\n\x05\x43heck\x12\x1b.robosc_api.v1.CheckRequest\x1a\x1c.robosc_api.v1.CheckResponse\x12S\n\nSynthesize\x12 .robosc_api.v1.SynthesizeRequest\x1a!.robosc_api.v1.SynthesizeResponse0\x01\x12K\n\x08Generate\x12\x1e.robosc_api.v1.GenerateRequest\x1a\x1f.robosc_api.v1.GenerateResponseb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1drobosc_api/v1/synthesis.proto\x12\rrobosc_api.v1\"(\n\nSourceFile\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x0c\n\x04text\x18\x02 \x01(\t\"\xa0\x01\n\x06\x42undle\x12\'\n\x04main\x18\x01 \x01(\x0b\x32\x19.robosc_api.v1.SourceFile\x12,\n\tlibraries\x18\x02 \x03(\x0b\x32\x19.robosc_api.v1.SourceFile\x12\x10\n\x08searched\x18\x03 \x03(\t\x12-\n\ninterfaces\x18\x04 \x03(\x0b\x32\x19.robosc_api.v1.SourceFile\"F\n\x08Location\x12\x0c\n\x04\x66ile\x18\x01 \x01(\t\x12\x0c\n\x04line\x18\x02 \x01(\r\x12\x0e\n\x06\x63olumn\x18\x03 \x01(\r\x12\x0e\n\x06length\x18\x04 \x01(\r\"J\n\x0cRelatedPlace\x12\x0f\n\x07message\x18\x01 \x01(\t\x12)\n\x08location\x18\x02 \x01(\x0b\x32\x17.robosc_api.v1.Location\"\xbd\x01\n\nDiagnostic\x12)\n\x08severity\x18\x01 \x01(\x0e\x32\x17.robosc_api.v1.Severity\x12\x0c\n\x04\x63ode\x18\x02 \x01(\t\x12\x0f\n\x07message\x18\x03 \x01(\t\x12)\n\x08location\x18\x04 \x01(\x0b\x32\x17.robosc_api.v1.Location\x12\x0c\n\x04mend\x18\x05 \x01(\t\x12,\n\x07related\x18\x06 \x03(\x0b\x32\x1b.robosc_api.v1.RelatedPlace\"i\n\x10SynthesisOptions\x12-\n\ndeployment\x18\x01 \x01(\x0e\x32\x19.robosc_api.v1.Deployment\x12\x0e\n\x06\x65ngine\x18\x02 \x01(\t\x12\x16\n\x0e\x61llow_livelock\x18\x03 \x01(\x08\"5\n\x0c\x43heckRequest\x12%\n\x06\x62undle\x18\x01 \x01(\x0b\x32\x15.robosc_api.v1.Bundle\"?\n\rCheckResponse\x12.\n\x0b\x64iagnostics\x18\x01 \x03(\x0b\x32\x19.robosc_api.v1.Diagnostic\"l\n\x11SynthesizeRequest\x12%\n\x06\x62undle\x18\x01 \x01(\x0b\x32\x15.robosc_api.v1.Bundle\x12\x30\n\x07options\x18\x02 \x01(\x0b\x32\x1f.robosc_api.v1.SynthesisOptions\"|\n\x12SynthesizeResponse\x12+\n\x08progress\x18\x01 \x01(\x0b\x32\x17.robosc_api.v1.ProgressH\x00\x12\x30\n\x06result\x18\x02 \x01(\x0b\x32\x1e.robosc_api.v1.SynthesisResultH\x00\x42\x07\n\x05\x65vent\"*\n\x08Progress\x12\r\n\x05stage\x18\x01 \x01(\t\x12\x0f\n\x07message\x18\x02 \x01(\t\"\x82\x02\n\x0fSynthesisResult\x12.\n\x06status\x18\x01 \x01(\x0e\x32\x1e.robosc_api.v1.SynthesisStatus\x12.\n\x0b\x64iagnostics\x18\x02 \x03(\x0b\x32\x19.robosc_api.v1.Diagnostic\x12\x12\n\nsupervisor\x18\x03 \x01(\x0c\x12\x0e\n\x06reason\x18\x04 \x01(\t\x12\'\n\x07summary\x18\x05 \x01(\x0b\x32\x16.robosc_api.v1.Summary\x12-\n\nstatistics\x18\x06 \x01(\x0b\x32\x19.robosc_api.v1.Statistics\x12\x13\n\x0b\x65xplanation\x18\x07 \x01(\t\"X\n\nStatistics\x12\x0e\n\x06\x65ngine\x18\x01 \x01(\t\x12\x12\n\nstate_bits\x18\x02 \x01(\r\x12\x12\n\niterations\x18\x03 \x01(\x04\x12\x12\n\npeak_nodes\x18\x04 \x01(\x04\"\xa6\x01\n\x07Summary\x12\x1b\n\x13\x63ontrollable_events\x18\x01 \x01(\r\x12\x1d\n\x15uncontrollable_events\x18\x02 \x01(\r\x12\x0e\n\x06states\x18\x03 \x01(\t\x12\x13\n\x0btransitions\x18\x04 \x01(\t\x12,\n\x05\x61\x64\x64\x65\x64\x18\x05 \x03(\x0b\x32\x1d.robosc_api.v1.AddedCondition\x12\x0c\n\x04text\x18\x06 \x01(\t\"2\n\x0e\x41\x64\x64\x65\x64\x43ondition\x12\r\n\x05\x65vent\x18\x01 \x01(\t\x12\x11\n\tcondition\x18\x02 \x01(\t\"z\n\x0fGenerateRequest\x12%\n\x06\x62undle\x18\x01 \x01(\x0b\x32\x15.robosc_api.v1.Bundle\x12\x30\n\x07options\x18\x02 \x01(\x0b\x32\x1f.robosc_api.v1.SynthesisOptions\x12\x0e\n\x06target\x18\x03 \x01(\t\"\xc4\x01\n\x10GenerateResponse\x12.\n\x06status\x18\x01 \x01(\x0e\x32\x1e.robosc_api.v1.SynthesisStatus\x12.\n\x0b\x64iagnostics\x18\x02 \x03(\x0b\x32\x19.robosc_api.v1.Diagnostic\x12\x0e\n\x06reason\x18\x03 \x01(\t\x12+\n\x05\x66iles\x18\x04 \x03(\x0b\x32\x1c.robosc_api.v1.GeneratedFile\x12\x13\n\x0b\x65xplanation\x18\x05 \x01(\t\"B\n\rGeneratedFile\x12\x0c\n\x04path\x18\x01 \x01(\t\x12\x0f\n\x07\x63ontent\x18\x02 \x01(\t\x12\x12\n\nexecutable\x18\x03 \x01(\x08*a\n\x08Severity\x12\x18\n\x14SEVERITY_UNSPECIFIED\x10\x00\x12\x12\n\x0eSEVERITY_ERROR\x10\x01\x12\x14\n\x10SEVERITY_WARNING\x10\x02\x12\x11\n\rSEVERITY_NOTE\x10\x03*Y\n\nDeployment\x12\x1a\n\x16\x44\x45PLOYMENT_UNSPECIFIED\x10\x00\x12\x19\n\x15\x44\x45PLOYMENT_CONTROLLER\x10\x01\x12\x14\n\x10\x44\x45PLOYMENT_LAYER\x10\x02*\xbb\x01\n\x0fSynthesisStatus\x12 \n\x1cSYNTHESIS_STATUS_UNSPECIFIED\x10\x00\x12\x1f\n\x1bSYNTHESIS_STATUS_SUPERVISOR\x10\x01\x12\x1a\n\x16SYNTHESIS_STATUS_EMPTY\x10\x02\x12!\n\x1dSYNTHESIS_STATUS_MODEL_ERRORS\x10\x03\x12&\n\"SYNTHESIS_STATUS_UNSUPPORTED_MODEL\x10\x04\x32\xf8\x01\n\x10SynthesisService\x12\x42\n\x05\x43heck\x12\x1b.robosc_api.v1.CheckRequest\x1a\x1c.robosc_api.v1.CheckResponse\x12S\n\nSynthesize\x12 .robosc_api.v1.SynthesizeRequest\x1a!.robosc_api.v1.SynthesizeResponse0\x01\x12K\n\x08Generate\x12\x1e.robosc_api.v1.GenerateRequest\x1a\x1f.robosc_api.v1.GenerateResponseb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'robosc_api.v1.synthesis_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
-  _globals['_SEVERITY']._serialized_start=2039
-  _globals['_SEVERITY']._serialized_end=2136
-  _globals['_DEPLOYMENT']._serialized_start=2138
-  _globals['_DEPLOYMENT']._serialized_end=2227
-  _globals['_SYNTHESISSTATUS']._serialized_start=2230
-  _globals['_SYNTHESISSTATUS']._serialized_end=2417
+  _globals['_SEVERITY']._serialized_start=2063
+  _globals['_SEVERITY']._serialized_end=2160
+  _globals['_DEPLOYMENT']._serialized_start=2162
+  _globals['_DEPLOYMENT']._serialized_end=2251
+  _globals['_SYNTHESISSTATUS']._serialized_start=2254
+  _globals['_SYNTHESISSTATUS']._serialized_end=2441
   _globals['_SOURCEFILE']._serialized_start=48
   _globals['_SOURCEFILE']._serialized_end=88
   _globals['_BUNDLE']._serialized_start=91
@@ -48,31 +48,31 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_DIAGNOSTIC']._serialized_start=402
   _globals['_DIAGNOSTIC']._serialized_end=591
   _globals['_SYNTHESISOPTIONS']._serialized_start=593
-  _globals['_SYNTHESISOPTIONS']._serialized_end=674
-  _globals['_CHECKREQUEST']._serialized_start=676
-  _globals['_CHECKREQUEST']._serialized_end=729
-  _globals['_CHECKRESPONSE']._serialized_start=731
-  _globals['_CHECKRESPONSE']._serialized_end=794
-  _globals['_SYNTHESIZEREQUEST']._serialized_start=796
-  _globals['_SYNTHESIZEREQUEST']._serialized_end=904
-  _globals['_SYNTHESIZERESPONSE']._serialized_start=906
-  _globals['_SYNTHESIZERESPONSE']._serialized_end=1030
-  _globals['_PROGRESS']._serialized_start=1032
-  _globals['_PROGRESS']._serialized_end=1074
-  _globals['_SYNTHESISRESULT']._serialized_start=1077
-  _globals['_SYNTHESISRESULT']._serialized_end=1335
-  _globals['_STATISTICS']._serialized_start=1337
-  _globals['_STATISTICS']._serialized_end=1425
-  _globals['_SUMMARY']._serialized_start=1428
-  _globals['_SUMMARY']._serialized_end=1594
-  _globals['_ADDEDCONDITION']._serialized_start=1596
-  _globals['_ADDEDCONDITION']._serialized_end=1646
-  _globals['_GENERATEREQUEST']._serialized_start=1648
-  _globals['_GENERATEREQUEST']._serialized_end=1770
-  _globals['_GENERATERESPONSE']._serialized_start=1773
-  _globals['_GENERATERESPONSE']._serialized_end=1969
-  _globals['_GENERATEDFILE']._serialized_start=1971
-  _globals['_GENERATEDFILE']._serialized_end=2037
-  _globals['_SYNTHESISSERVICE']._serialized_start=2420
-  _globals['_SYNTHESISSERVICE']._serialized_end=2668
+  _globals['_SYNTHESISOPTIONS']._serialized_end=698
+  _globals['_CHECKREQUEST']._serialized_start=700
+  _globals['_CHECKREQUEST']._serialized_end=753
+  _globals['_CHECKRESPONSE']._serialized_start=755
+  _globals['_CHECKRESPONSE']._serialized_end=818
+  _globals['_SYNTHESIZEREQUEST']._serialized_start=820
+  _globals['_SYNTHESIZEREQUEST']._serialized_end=928
+  _globals['_SYNTHESIZERESPONSE']._serialized_start=930
+  _globals['_SYNTHESIZERESPONSE']._serialized_end=1054
+  _globals['_PROGRESS']._serialized_start=1056
+  _globals['_PROGRESS']._serialized_end=1098
+  _globals['_SYNTHESISRESULT']._serialized_start=1101
+  _globals['_SYNTHESISRESULT']._serialized_end=1359
+  _globals['_STATISTICS']._serialized_start=1361
+  _globals['_STATISTICS']._serialized_end=1449
+  _globals['_SUMMARY']._serialized_start=1452
+  _globals['_SUMMARY']._serialized_end=1618
+  _globals['_ADDEDCONDITION']._serialized_start=1620
+  _globals['_ADDEDCONDITION']._serialized_end=1670
+  _globals['_GENERATEREQUEST']._serialized_start=1672
+  _globals['_GENERATEREQUEST']._serialized_end=1794
+  _globals['_GENERATERESPONSE']._serialized_start=1797
+  _globals['_GENERATERESPONSE']._serialized_end=1993
+  _globals['_GENERATEDFILE']._serialized_start=1995
+  _globals['_GENERATEDFILE']._serialized_end=2061
+  _globals['_SYNTHESISSERVICE']._serialized_start=2444
+  _globals['_SYNTHESISSERVICE']._serialized_end=2692
 # @@protoc_insertion_point(module_scope)

@@ -97,12 +97,14 @@ class Diagnostic(_message.Message):
     def __init__(self, severity: _Optional[_Union[Severity, str]] = ..., code: _Optional[str] = ..., message: _Optional[str] = ..., location: _Optional[_Union[Location, _Mapping]] = ..., mend: _Optional[str] = ..., related: _Optional[_Iterable[_Union[RelatedPlace, _Mapping]]] = ...) -> None: ...
 
 class SynthesisOptions(_message.Message):
-    __slots__ = ("deployment", "engine")
+    __slots__ = ("deployment", "engine", "allow_livelock")
     DEPLOYMENT_FIELD_NUMBER: _ClassVar[int]
     ENGINE_FIELD_NUMBER: _ClassVar[int]
+    ALLOW_LIVELOCK_FIELD_NUMBER: _ClassVar[int]
     deployment: Deployment
     engine: str
-    def __init__(self, deployment: _Optional[_Union[Deployment, str]] = ..., engine: _Optional[str] = ...) -> None: ...
+    allow_livelock: bool
+    def __init__(self, deployment: _Optional[_Union[Deployment, str]] = ..., engine: _Optional[str] = ..., allow_livelock: _Optional[bool] = ...) -> None: ...
 
 class CheckRequest(_message.Message):
     __slots__ = ("bundle",)

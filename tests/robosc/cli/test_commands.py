@@ -368,3 +368,40 @@ def test_what_check_does_not_need_is_not_imported() -> None:
         [sys.executable, "-c", code, LINE_FOLLOWER], capture_output=True, text=True, timeout=60, check=True
     )
     assert result.stdout.splitlines()[-1] == "[]"
+
+
+LIVELOCK = """robot R {
+    component B {
+        behaviour {
+            initial marked state a { transition goto b }
+            state b { transition goto a }
+        }
+    }
+}"""
+
+
+def test_silent_steps_that_never_end_are_an_error_unless_allowed(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    model = tmp_path / "model.rscd"
+    model.write_text(LIVELOCK, encoding="utf-8")
+    target, folder = tmp_path / "out.rsup", tmp_path / "out"
+    assert main(["synth", str(model), "-o", str(target)]) == 1
+    assert main(["generate", str(model), "--target", "python", "-o", str(folder)]) == 1
+    told = capsys.readouterr().err
+    assert told.count("error: silent steps never end: from the initial state, B.tau_1, B.tau_2 repeat themselves") == 2
+    assert told.count("--allow-livelock overrides this") == 2
+    assert not target.exists() and not folder.exists()
+    status, document = run_json(capsys, "synth", str(model))
+    assert (status, document["status"], document["summary"]) == (1, "model errors", None)
+    assert main(["synth", str(model), "-o", str(target), "--allow-livelock"]) == 0
+    captured = capsys.readouterr()
+    assert "warning: silent steps never end" in captured.err
+    assert "finite response       failed" in captured.out
+    controller = decode(target.read_bytes()).certificate.controller
+    assert controller is not None and controller.finite_response == "failed"
+    assert main(["generate", str(model), "--target", "python", "-o", str(folder), "--allow-livelock"]) == 0
+    assert folder.exists()
+    # The graph is of everything allowed, whatever an executor does.
+    assert main(["explore", str(model)]) == 0
+    assert main(["check", str(model), "--synthesize"]) == 1

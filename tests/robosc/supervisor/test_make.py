@@ -117,7 +117,12 @@ def test_a_wrong_synthesis_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_progress_and_cancellation() -> None:
     told: list[Progress] = []
     make_supervisor(bundle_of(COUNTER), on_progress=told.append)
-    assert list(dict.fromkeys(item.stage for item in told)) == ["check", "synthesis", "verification"]
+    assert list(dict.fromkeys(item.stage for item in told)) == [
+        "check",
+        "synthesis",
+        "verification",
+        "controller",
+    ]
     with pytest.raises(SynthesisCancelled):
         make_supervisor(bundle_of(COUNTER), should_stop=lambda: True)
 

@@ -1,0 +1,94 @@
+"""Checks the properties of a controller: by structure where that is enough, else by visiting its states."""
+
+from collections.abc import Callable, Iterable
+
+from robosc.automata.semantics import TooManyChoicesError
+from robosc.model.structure import Deployment, Model
+from robosc.properties.controller import Controller
+from robosc.properties.orders import Orders
+from robosc.properties.outcome import Properties
+from robosc.properties.search import search
+from robosc.properties.structure import always_end, never_conflict, stays_nonblocking
+from robosc.supervisor.structure import AddedCondition, PropertyResult
+
+DEFAULT_LIMIT = 10_000
+"""Stable states beyond which a search is given up."""
+
+HOPELESS = 1_000
+"""Times by which the controlled system is larger than a search may be, where none is begun."""
+
+
+def check_controller(
+    model: Model,
+    deployment: Deployment,
+    added: Iterable[AddedCondition],
+    *,
+    is_nonblocking: bool,
+    states: int = 0,
+    limit: int = DEFAULT_LIMIT,
+    should_stop: Callable[[], bool] = lambda: False,
+) -> Properties:
+    """Finite response, confluence and nonblocking under control of a supervisor; the same for the same input.
+
+    Only what is proved is 'passed', and only what a trace shows is 'failed'.
+
+    Args:
+        model: The checked robot.
+        deployment: Where the supervisor stands.
+        added: The conditions that synthesis adds.
+        is_nonblocking: Whether it is certain that the controlled system is nonblocking.
+        states: States of the controlled system, as far as is known: where there are `HOPELESS` times as many as
+            `limit` allows, nothing is searched for nonblocking alone, which only a whole search can tell.
+        limit: Stable states beyond which a search is given up.
+        should_stop: Asked now and then; once true, the work ends.
+
+    Raises:
+        SynthesisCancelled: `should_stop` became true.
+    """
+    conditions = tuple(added)
+    controller = Controller(model, deployment, conditions)
+    ends = always_end(controller.system, should_stop)
+    is_confluent = ends and never_conflict(controller, conditions, should_stop)
+    # Not without an end of silent steps: what comes after them would not.
+    is_live = ends and is_nonblocking and stays_nonblocking(model, controller, conditions)
+    proved = (ends, is_confluent, is_live)
+    if all(proved):
+        return Properties("passed", "passed", "passed", "by the structure of silent steps")
+    if ends and is_confluent and states > HOPELESS * limit:
+        how = f"not searched: more than {HOPELESS * limit} states in the controlled system"
+        return Properties("passed", "passed", "not checked", _method(proved, how))
+    try:
+        orders = None if is_confluent else Orders(controller, limit)
+        found = search(controller, limit=limit, orders=orders, should_stop=should_stop)
+    except TooManyChoicesError as error:
+        outcomes = (_outcome(item, False, False) for item in proved)
+        finite_response, confluence, nonblocking = outcomes
+        return Properties(finite_response, confluence, nonblocking, _method(proved, f"not searched: {error}"))
+    how = f"search of every stable state ({found.states})"
+    if not found.is_complete:
+        how = f"search given up after {found.states} stable states"
+    are_judged = found.is_complete
+    if orders is not None and orders.is_exhausted:
+        are_judged = False
+        how = f"{how}; too many orders of silent steps to follow them all: more than {limit} states on their way"
+    return Properties(
+        finite_response=_outcome(ends, found.livelock is not None, found.is_complete),
+        confluence=_outcome(is_confluent, found.conflict is not None, are_judged),
+        nonblocking=_outcome(is_live, found.blocking is not None, found.is_complete),
+        method=_method(proved, how),
+        livelock=found.livelock,
+        conflict=found.conflict,
+        blocking=found.blocking,
+    )
+
+
+def _outcome(is_proved: bool, has_failed: bool, is_complete: bool) -> PropertyResult:
+    if has_failed:
+        return "failed"
+    return "passed" if is_proved or is_complete else "not checked"
+
+
+def _method(proved: tuple[bool, bool, bool], how: str) -> str:
+    names = ("finite response", "confluence", "nonblocking under control")
+    found = [name for name, is_proved in zip(names, proved, strict=True) if is_proved]
+    return f"{' and '.join(found)} by the structure of silent steps; {how}" if found else how

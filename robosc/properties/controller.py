@@ -1,0 +1,341 @@
+"""The controller automaton: what a supervisor and its executor do together, state by state (semantics 2 and 3).
+
+A state is one of the system, with what the executor remembers of running goals: which requirements of an action
+held in some stable state since its request (3.4). It is *stable* where no silent step is enabled. Silent steps
+pre-empt everything else, in the executor's order: own cancels, resets, taus (3.3). In a stable state the environment
+may send a message or answer, and any enabled request may be issued.
+
+- One step of the environment is one middleware message, a *batch* (3.1): the events that stand for it, in source
+  order, with no silent step between them. Under the setting `on_unknown: keep` an event whose enum is unknown does
+  not happen, so any part of a batch may happen as well; a *whole* batch can happen under every setting.
+- Received data takes every value that matters. Code-only variables do not matter: nothing that decides about events
+  reads one (language A.6). They only decide what is sent; a request whose data is unknown counts as possible.
+- That an action cannot be requested again until its cancelled goal is known to have ended (3.2) is left out: the end
+  can become known in any state and changes nothing else, so every state is reached, and left, as if it were known.
+- Where two transitions on one event apply, the executor takes the state's own before the behaviour's, then source
+  order (language A.7).
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import msgspec
+
+from robosc.automata import System, to_automata
+from robosc.automata.compile import NO_DATA, Function, State, compile_expression, subjects_read
+from robosc.automata.plants import communication_plant, is_blocking
+from robosc.automata.semantics import Semantics
+from robosc.automata.state import Subject, subjects
+from robosc.model.structure import (
+    Behaviour,
+    CommunicationKind,
+    Component,
+    Deployment,
+    EventKind,
+    Model,
+    Transition,
+)
+from robosc.supervisor.conditions import state_predicates
+from robosc.supervisor.structure import AddedCondition
+
+Held = tuple[int, ...]
+"""For each action with requirements: a bit for each of them that held in a stable state since its request."""
+
+Node = tuple[State, Held]
+"""A state of the controller automaton."""
+
+
+def executed(model: Model) -> Model:
+    """The model with those transitions only that an executor takes: at most one on an event in a state."""
+    components = tuple(
+        item
+        if item.behaviour is None
+        else Component(item.name, msgspec.structs.replace(item.behaviour, transitions=_taken(item.behaviour)))
+        for item in model.components
+    )
+    return msgspec.structs.replace(model, components=components)
+
+
+def _taken(behaviour: Behaviour) -> tuple[Transition, ...]:
+    """A behaviour's transitions: of several on one event in a state, the state's own first, then source order."""
+    states = [state.name for state in behaviour.states]
+    owner: dict[tuple[str, str], int] = {}
+    for is_own in (True, False):
+        for number, item in enumerate(behaviour.transitions):
+            if (item.source is not None) is is_own and not is_blocking(item.event):
+                for state in states if item.source is None else [item.source]:
+                    owner.setdefault((state, item.event), number)
+    result: list[Transition] = []
+    for number, item in enumerate(behaviour.transitions):
+        if is_blocking(item.event):
+            result.append(item)
+            continue
+        wanted = states if item.source is None else [item.source]
+        kept = [state for state in wanted if owner[state, item.event] == number]
+        if len(kept) == len(wanted):
+            result.append(item)
+        else:
+            result.extend(msgspec.structs.replace(item, source=state) for state in kept)
+    return tuple(result)
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """An action with requirements, as the executor watches its goal.
+
+    Attributes:
+        index: Its place in `Held`.
+        cancel: Its cancel event.
+        place: Where in a state its plant's location stands.
+        running: The location in which a goal runs.
+        requirements: Its requirements.
+        reads: What they read.
+    """
+
+    index: int
+    cancel: str
+    place: int
+    running: str
+    requirements: tuple[Function, ...]
+    reads: frozenset[Subject]
+
+    def holding(self, state: State) -> int:
+        """A bit for each requirement that holds."""
+        return sum(1 << bit for bit, holds in enumerate(self.requirements) if holds(state, NO_DATA) is True)
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """Silent steps in the executor's order, to the end.
+
+    Attributes:
+        events: The steps; of a run that does not end, those before its cycle.
+        cycle: The steps that come again and again; empty where the run ends.
+        end: The stable state, once the executor has looked at it; None where the run does not end.
+        is_marked: Whether a state of the run is marked, the first included; of one that does not end, whether one of
+            its cycle is.
+        cycle_states: The states of its cycle; empty where the run ends.
+    """
+
+    events: tuple[str, ...]
+    cycle: tuple[str, ...]
+    end: Node | None
+    is_marked: bool
+    cycle_states: tuple[State, ...] = ()
+
+
+class Controller:
+    """The controller automaton of a supervisor.
+
+    Args:
+        model: The checked robot.
+        deployment: Where the supervisor stands.
+        added: The conditions that synthesis adds.
+
+    Attributes:
+        is_deterministic: Whether no two transitions apply to one event in one state, whatever a model may say.
+        system: The automata that are executed; their states are those of the model's automata.
+        width: Number of places of a state.
+        goals: The actions that the executor may cancel, in source order.
+        silent: Resets, then taus that can change something, in the executor's order.
+        batches: The events of each kind of step of the environment, in source order.
+        requests: Events of requests, in source order.
+    """
+
+    def __init__(self, model: Model, deployment: Deployment, added: Iterable[AddedCondition]) -> None:
+        written, model = model, executed(model)
+        self.is_deterministic = model == written
+        self.system: System = to_automata(model, deployment)
+        self._semantics = Semantics(self.system)
+        self._added = state_predicates(self.system, added)
+        places = {subject: place for place, subject in enumerate(subjects(self.system))}
+        self.goals = tuple(_goals(model, places))
+        self.width = len(places)
+        self._start: Node = (self._semantics.initial, (0,) * len(self.goals))
+        with_reset = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
+        resets = [item.event(EventKind.RESET) for item in model.communications if item.kind in with_reset]
+        moving = {edge.event for item in self.system.automata for edge in item.edges if edge.source != edge.target}
+        self.silent: tuple[str, ...] = (*resets, *(event for event in model.taus if event in moving))
+        self.batches = tuple(_batches(model, deployment))
+        self.requests = tuple(
+            item.event(EventKind.REQUEST)
+            for item in model.communications
+            if item.kind is not CommunicationKind.OUTGOING_MESSAGE
+        )
+        self._runs: dict[Node, Run] = {}
+        # Only where it is not marked everywhere, as a message's plant is.
+        self._marked = tuple(
+            (places[Subject(item.name)], item.marked)
+            for item in self.system.automata
+            if not item.marked.issuperset(item.locations)
+        )
+        self._sources = {event.name: tuple(_sources(self.system, event.name, places)) for event in self.system.events}
+
+    @property
+    def start(self) -> Node:
+        """The state in which the executor starts; it may not be stable."""
+        return self._start
+
+    def is_marked(self, node: Node) -> bool:
+        """Whether every automaton is in a marked location."""
+        state = node[0]
+        return all(state[place] in marked for place, marked in self._marked)
+
+    def after(self, state: State, event: str) -> State | None:
+        """Where a controllable event leads, or None where it is not enabled."""
+        if not self._stands(state, event):
+            return None
+        semantics = self._semantics
+        if not semantics.condition(state, event):
+            return None
+        targets = semantics.targets(state, event)
+        if not targets:
+            return None
+        condition = self._added.get(event)
+        if condition is not None and not condition(state):
+            return None
+        return min(targets) if len(targets) > 1 else next(iter(targets))
+
+    def _stands(self, state: State, event: str) -> bool:
+        """Whether every automaton of an event has an edge here: few have, and this is quickly asked."""
+        return all(state[place] in sources for place, sources in self._sources[event])
+
+    def silent_steps(self, node: Node) -> Iterator[tuple[str, Node]]:
+        """Every silent step that is enabled, with where it leads, the executor's choice first."""
+        state, held = node
+        for goal in self.goals:
+            mask = held[goal.index]
+            if mask and mask & ~goal.holding(state):
+                target = self.after(state, goal.cancel)
+                if target is not None:
+                    yield goal.cancel, (target, self._forget(target, held))
+        for event in self.silent:
+            target = self.after(state, event)
+            # A tau that would change nothing is not taken.
+            if target is not None and target != state:
+                yield event, (target, held)
+
+    def run(self, node: Node) -> Run:
+        """The silent steps that the executor takes from a state."""
+        found = self._runs.get(node)
+        if found is None:
+            found = self._runs[node] = self._work_out(node)
+        return found
+
+    def _work_out(self, node: Node) -> Run:
+        places = {node: 0}
+        visited = [node]
+        events: list[str] = []
+        while True:
+            step = next(self.silent_steps(visited[-1]), None)
+            if step is None:
+                end = self.observed(visited[-1])
+                return Run(tuple(events), (), end, any(map(self.is_marked, visited)))
+            event, target = step
+            events.append(event)
+            if target in places:
+                first = places[target]
+                again = visited[first:]
+                is_marked = any(map(self.is_marked, again))
+                states = tuple(state for state, _ in again)
+                return Run(tuple(events[:first]), tuple(events[first:]), None, is_marked, states)
+            places[target] = len(visited)
+            visited.append(target)
+
+    def observed(self, node: Node) -> Node:
+        """A stable state in which the executor has looked at the requirements of what runs."""
+        state, held = node
+        if not held:
+            return node
+        looked = tuple(
+            mask | goal.holding(state) if state[goal.place] == goal.running else 0
+            for goal, mask in zip(self.goals, held, strict=True)
+        )
+        return state, looked
+
+    def moves(self, node: Node) -> Iterator[tuple[tuple[str, ...], bool, Node]]:
+        """What may happen in a stable state and changes it: first requests, then the environment's, in source order.
+
+        Returns:
+            Events, whether this can happen under every setting, and the state before any silent step. A state comes
+            once for each request, and once for each batch: as a whole one, if it can.
+        """
+        state, held = node
+        for event in self.requests:
+            target = self.after(state, event)
+            if target is not None and target != state:
+                yield (event,), True, (target, self._forget(target, held))
+        for batch in self.batches:
+            for target, (events, is_whole) in sorted(self._together(state, batch).items(), key=lambda item: item[0]):
+                yield events, is_whole, (target, self._forget(target, held))
+
+    def _together(self, state: State, batch: tuple[str, ...]) -> dict[State, tuple[tuple[str, ...], bool]]:
+        """What the events of a batch make of a state: with the events, and whether those are all of them."""
+        found: dict[State, tuple[tuple[str, ...], bool]] = {state: ((), True)}
+        for event in batch:
+            if not self._stands(state, event):
+                # The locations that an answer needs are those of its own plant: nothing else moves them.
+                continue
+            further: dict[State, tuple[tuple[str, ...], bool]] = {}
+            for before, (events, is_whole) in found.items():
+                for target in self._semantics.targets(before, event):
+                    if target not in further or (is_whole and not further[target][1]):
+                        further[target] = (*events, event), is_whole
+            # Without this event it is no whole batch.
+            for before, (events, _) in found.items():
+                further.setdefault(before, (events, False))
+            found = further
+        found.pop(state, None)
+        return found
+
+    def _forget(self, state: State, held: Held) -> Held:
+        """What is remembered, without the goals that do not run."""
+        if not any(held):
+            return held
+        return tuple(
+            mask if state[goal.place] == goal.running else 0 for goal, mask in zip(self.goals, held, strict=True)
+        )
+
+
+def _sources(system: System, event: str, places: dict[Subject, int]) -> Iterator[tuple[int, frozenset[str]]]:
+    """Where the automata of an event have edges, but for those that have one in every location."""
+    for automaton in system.automata:
+        if event in automaton.alphabet:
+            sources = frozenset(edge.source for edge in automaton.edges if edge.event == event)
+            if len(sources) < len(automaton.locations):
+                yield places[Subject(automaton.name)], sources
+
+
+def _goals(model: Model, places: dict[Subject, int]) -> Iterator[Goal]:
+    index = 0
+    for item in model.communications:
+        requirements = model.requirements_on(item.name)
+        if item.kind is CommunicationKind.ACTION and requirements:
+            plant = communication_plant(item)
+            request = item.event(EventKind.REQUEST)
+            yield Goal(
+                index=index,
+                cancel=item.event(EventKind.CANCEL),
+                place=places[Subject(plant.name)],
+                running=next(edge.target for edge in plant.edges if edge.event == request),
+                requirements=tuple(compile_expression(rule.condition, places) for rule in requirements),
+                reads=frozenset().union(*(subjects_read(rule.condition) for rule in requirements)),
+            )
+            index += 1
+
+
+def _batches(model: Model, deployment: Deployment) -> Iterable[tuple[str, ...]]:
+    """Messages on one identifier together; every other event of the environment alone."""
+    topics: dict[str, tuple[str, ...]] = {}
+    others: list[tuple[str, ...]] = []
+    kinds = [EventKind.RESPONSE, EventKind.FEEDBACK, EventKind.ERROR]
+    if deployment is Deployment.LAYER:
+        # There a caller may cancel its own goal.
+        kinds.append(EventKind.CANCEL)
+    for item in model.communications:
+        if item.kind is CommunicationKind.OUTGOING_MESSAGE:
+            event = item.event(EventKind.RESPONSE)
+            topics[item.identifier] = (*topics.get(item.identifier, ()), event)
+        else:
+            others.extend((event,) for event in map(item.event, kinds) if event in item.events)
+    return (*topics.values(), *others)

@@ -1,0 +1,94 @@
+"""What was found out about a controller: plain values."""
+
+from dataclasses import dataclass
+
+from robosc.automata.compile import State
+from robosc.supervisor.structure import ControllerProperties, PropertyResult
+
+
+@dataclass(frozen=True, slots=True)
+class Livelock:
+    """Silent steps that do not end.
+
+    Attributes:
+        trace: The events that lead into the cycle.
+        cycle: The silent steps that come again and again.
+    """
+
+    trace: tuple[str, ...]
+    cycle: tuple[str, ...]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """How much there is to read."""
+        return len(self.trace), len(self.cycle)
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """Silent steps in one order.
+
+    Attributes:
+        events: The steps; of an order that does not end, those before its cycle.
+        cycle: The steps that come again and again; empty where it ends.
+        end: The state where no silent step is enabled, or None where there is no end.
+    """
+
+    events: tuple[str, ...]
+    cycle: tuple[str, ...]
+    end: State | None
+
+
+@dataclass(frozen=True, slots=True)
+class Conflict:
+    """Silent steps whose order matters.
+
+    Attributes:
+        trace: The events that lead to where they are enabled.
+        chosen: The order that the executor takes.
+        other: Another order, with another outcome.
+    """
+
+    trace: tuple[str, ...]
+    chosen: Order
+    other: Order
+
+
+@dataclass(frozen=True, slots=True)
+class Blocking:
+    """A state from which no marked state can be reached under control.
+
+    Attributes:
+        trace: The events that lead there.
+        states: It, and the stable states that can be reached from it.
+    """
+
+    trace: tuple[str, ...]
+    states: tuple[State, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Properties:
+    """The properties of a controller (semantics 2).
+
+    Attributes:
+        finite_response: Whether silent steps end.
+        confluence: Whether their order does not matter.
+        nonblocking: Whether a marked state stays reachable under control.
+        method: How this was found out, in words.
+        livelock: Why there is no finite response, or None.
+        conflict: Why there is no confluence, or None.
+        blocking: Why it is not nonblocking under control, or None.
+    """
+
+    finite_response: PropertyResult
+    confluence: PropertyResult
+    nonblocking: PropertyResult
+    method: str
+    livelock: Livelock | None = None
+    conflict: Conflict | None = None
+    blocking: Blocking | None = None
+
+    def certified(self) -> ControllerProperties:
+        """What stands in a certificate."""
+        return ControllerProperties(self.finite_response, self.confluence, self.nonblocking, self.method)

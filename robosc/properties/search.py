@@ -1,0 +1,190 @@
+"""Forward search of the controller automaton, and what it tells about finite response and nonblocking.
+
+Stable states are visited by the number of events that lead to them (E. W. Dijkstra, "A note on two problems in
+connexion with graphs", Numerische Mathematik 1, 1959, pp. 269-271), so a trace has as few events as there can be.
+"""
+
+from collections import defaultdict
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from heapq import heappop, heappush
+
+from robosc.errors import SynthesisCancelled
+from robosc.properties.controller import Controller, Node
+from robosc.properties.orders import Orders
+from robosc.properties.outcome import Blocking, Conflict, Livelock
+
+STOP_INTERVAL = 64
+"""States handled between two questions whether to stop."""
+
+MAXIMUM_EFFORT = 5_000_000
+"""Moves, each counted with the places of a state, beyond which a search is given up too: some seconds."""
+
+
+@dataclass(slots=True)
+class Searched:
+    """What a search found.
+
+    Attributes:
+        states: Stable states that were visited.
+        is_complete: Whether there are no others.
+        livelock: Silent steps that do not end, the first by the number of events, or None.
+        conflict: Silent steps whose order matters, or None.
+        blocking: A state from which no marked one is reachable, or None; also where the search is not complete.
+    """
+
+    states: int = 0
+    is_complete: bool = False
+    livelock: Livelock | None = None
+    conflict: Conflict | None = None
+    blocking: Blocking | None = None
+
+
+@dataclass(slots=True)
+class _Graph:
+    """Stable states by number, and how they are connected.
+
+    Attributes:
+        nodes: The states.
+        numbers: Their numbers.
+        distances: Fewest events that lead there, as far as is known.
+        parents: Where those events begin, and which they are.
+        before: For each state those from which it can be reached under every setting.
+        good: States that are marked, or pass one on a way that there is under every setting.
+    """
+
+    nodes: list[Node] = field(default_factory=list)
+    numbers: dict[Node, int] = field(default_factory=dict)
+    distances: list[int] = field(default_factory=list)
+    parents: list[tuple[int | None, tuple[str, ...]]] = field(default_factory=list)
+    before: defaultdict[int, list[int]] = field(default_factory=lambda: defaultdict(list))
+    good: set[int] = field(default_factory=set)
+
+    def meet(self, node: Node, parent: int | None, events: tuple[str, ...]) -> tuple[int, bool]:
+        """The number of a state reached by events, and whether that is the shortest way so far."""
+        distance = len(events) + (0 if parent is None else self.distances[parent])
+        number = self.numbers.setdefault(node, len(self.nodes))
+        if number == len(self.nodes):
+            self.nodes.append(node)
+            self.distances.append(distance)
+            self.parents.append((parent, events))
+            return number, True
+        if distance < self.distances[number]:
+            self.distances[number] = distance
+            self.parents[number] = (parent, events)
+            return number, True
+        return number, False
+
+    def trace(self, number: int | None) -> tuple[str, ...]:
+        """The events that lead to a state."""
+        parts: list[tuple[str, ...]] = []
+        while number is not None:
+            number, events = self.parents[number]
+            parts.append(events)
+        return tuple(event for part in reversed(parts) for event in part)
+
+
+def search(
+    controller: Controller,
+    *,
+    limit: int,
+    orders: Orders | None,
+    should_stop: Callable[[], bool] = lambda: False,
+) -> Searched:
+    """Visit every stable state of a controller, the same for the same input.
+
+    Args:
+        controller: The automaton.
+        limit: Stable states beyond which to give up; also beyond `MAXIMUM_EFFORT`.
+        orders: Judges the silent steps of every state that is met, or None if nobody asks.
+        should_stop: Asked now and then; once true, the work ends.
+
+    Raises:
+        SynthesisCancelled: `should_stop` became true.
+        TooManyChoicesError: Received data of one step has too many values that matter.
+    """
+    graph = _Graph()
+    found = Searched()
+    queue: list[tuple[int, int]] = []
+
+    def enter(parent: int | None, events: tuple[str, ...], is_sure: bool, node: Node) -> None:
+        """Something happened in a stable state, or the executor started."""
+        run = controller.run(node)
+        if run.end is None or run.events:
+            if run.end is None:
+                livelock = Livelock((*graph.trace(parent), *events, *run.events), run.cycle)
+                if found.livelock is None or livelock.size < found.livelock.size:
+                    found.livelock = livelock
+                if not run.is_marked and found.blocking is None:
+                    found.blocking = Blocking(livelock.trace, run.cycle_states)
+                if run.is_marked and is_sure and parent is not None:
+                    graph.good.add(parent)
+            if orders is not None and found.conflict is None:
+                found.conflict = orders.judge(node, lambda: (*graph.trace(parent), *events))
+        if run.end is None:
+            return
+        number, is_nearer = graph.meet(run.end, parent, (*events, *run.events))
+        if is_nearer:
+            heappush(queue, (graph.distances[number], number))
+        if controller.is_marked(run.end):
+            graph.good.add(number)
+        if parent is not None and is_sure:
+            if run.is_marked:
+                graph.good.add(parent)
+            graph.before[number].append(parent)
+
+    enter(None, (), True, controller.start)
+    visited: set[int] = set()
+    moves = 0
+    while queue:
+        _, number = heappop(queue)
+        if number in visited:
+            continue
+        if len(visited) >= limit or moves * controller.width > MAXIMUM_EFFORT:
+            found.states = len(visited)
+            # What was not visited may lead to a marked state.
+            found.blocking = None
+            return found
+        if len(visited) % STOP_INTERVAL == 0 and should_stop():
+            raise SynthesisCancelled("the search of the controller was stopped")
+        visited.add(number)
+        for events, is_sure, node in controller.moves(graph.nodes[number]):
+            moves += 1
+            enter(number, events, is_sure, node)
+    found.states = len(visited)
+    found.is_complete = True
+    found.blocking = found.blocking or _blocking(graph)
+    return found
+
+
+def _blocking(graph: _Graph) -> Blocking | None:
+    """The nearest state from which no marked one is reachable."""
+    good = set(graph.good)
+    stack = list(good)
+    while stack:
+        for number in graph.before[stack.pop()]:
+            if number not in good:
+                good.add(number)
+                stack.append(number)
+    bad = [number for number in range(len(graph.nodes)) if number not in good]
+    if not bad:
+        return None
+    nearest = min(bad, key=lambda number: (graph.distances[number], number))
+    states = (graph.nodes[number][0] for number in sorted(_reachable(graph, nearest)))
+    return Blocking(graph.trace(nearest), tuple(dict.fromkeys(states)))
+
+
+def _reachable(graph: _Graph, start: int) -> set[int]:
+    """Stable states that can be reached from one under every setting."""
+    after = defaultdict[int, list[int]](list)
+    for number, sources in graph.before.items():
+        for source in sources:
+            after[source].append(number)
+    found = {start}
+    stack = [start]
+    while stack:
+        for number in after[stack.pop()]:
+            if number not in found:
+                found.add(number)
+                stack.append(number)
+    return found

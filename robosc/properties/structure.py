@@ -1,0 +1,305 @@
+"""Properties of the controller that follow from the structure of its silent steps, without visiting states.
+
+Each function proves its property or says nothing. Facts about silent steps of a checked model:
+
+- A tau changes the location of its own component and nothing else.
+- Resets and the executor's own cancels bring a service or action back to where only a request leads on, so each of
+  them happens at most once in a run of silent steps.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import product
+from math import prod
+
+from robosc.automata.compile import NO_DATA, Function, State, compile_expression, subjects_read
+from robosc.automata.state import Subject, subject_domain, subjects
+from robosc.automata.structure import Automaton, Edge, System
+from robosc.errors import SynthesisCancelled
+from robosc.expressions import Value
+from robosc.model.structure import CommunicationKind, EventKind, Model, is_tau
+from robosc.properties.controller import Controller
+from robosc.supervisor.structure import AddedCondition
+
+MAXIMUM_VALUATIONS = 20_000
+"""Values, of all that some silent steps read, beyond which they are not gone through."""
+
+_Arcs = dict[str, list[Edge]]
+"""Taus of one automaton that change its location, by the location they leave."""
+
+
+_Steps = dict[tuple[int, Value], list[tuple[Function, str]]]
+"""Guards and targets of taus, by the place of their automaton's location and the location they leave."""
+
+
+def always_end(system: System, should_stop: Callable[[], bool] = lambda: False) -> bool:
+    """Whether silent steps end in whatever order they are taken, by the taus of every component.
+
+    From some step on, a run without end takes only taus that it takes again and again: each lies on a cycle of its
+    component's taus, and all that other steps change stands still. So it is enough that no values of what stands
+    still let such taus go round, looking at those components together whose guards read each other.
+    """
+    cyclic: dict[str, _Arcs] = {}
+    for automaton in system.automata:
+        taus = [edge for edge in automaton.edges if is_tau(edge.event) and edge.source != edge.target]
+        if any(edge.updates for edge in taus):
+            return False
+        arcs = _on_cycles(taus)
+        if arcs:
+            cyclic[automaton.name] = arcs
+    return all(_stands_still(system, cyclic, cluster, should_stop) for cluster in _clusters(cyclic))
+
+
+def _on_cycles(taus: Iterable[Edge]) -> _Arcs:
+    """The edges that lie on a cycle, whatever their guards: those of which the source is reachable from the target."""
+    leaving: _Arcs = {}
+    for edge in taus:
+        leaving.setdefault(edge.source, []).append(edge)
+    components = _components({source: [edge.target for edge in edges] for source, edges in leaving.items()})
+    kept = {
+        source: [edge for edge in edges if components.get(edge.target) == components[source]]
+        for source, edges in leaving.items()
+    }
+    return {source: edges for source, edges in kept.items() if edges}
+
+
+def _components(graph: Mapping[str, list[str]]) -> dict[str, int]:
+    """The strongly connected component of every node with arcs.
+
+    R. E. Tarjan, "Depth-first search and linear graph algorithms", SIAM Journal on Computing 1(2), 1972, pp. 146-160,
+    with a stack of its own instead of recursion.
+    """
+    order: dict[str, int] = {}
+    lowest: dict[str, int] = {}
+    found: dict[str, int] = {}
+    waiting: list[str] = []
+    for root in graph:
+        calls = [(root, 0)] if root not in order else []
+        while calls:
+            node, place = calls.pop()
+            if place == 0:
+                order[node] = lowest[node] = len(order)
+                waiting.append(node)
+            targets = graph.get(node, [])
+            if place > 0:
+                lowest[node] = min(lowest[node], lowest[targets[place - 1]])
+            while place < len(targets):
+                target = targets[place]
+                place += 1
+                if target not in order:
+                    calls += [(node, place), (target, 0)]
+                    break
+                if target not in found:
+                    lowest[node] = min(lowest[node], order[target])
+            else:
+                if lowest[node] == order[node]:
+                    while node not in found:
+                        found[waiting.pop()] = order[node]
+    return found
+
+
+def _clusters(cyclic: Mapping[str, _Arcs]) -> Iterator[tuple[str, ...]]:
+    """Automata with cycles, together where a guard of one reads the location of another."""
+    neighbours: dict[str, set[str]] = {name: set() for name in cyclic}
+    for name, arcs in cyclic.items():
+        for subject in _read(arcs):
+            if subject.variable is None and subject.automaton in cyclic:
+                neighbours[name].add(subject.automaton)
+                neighbours[subject.automaton].add(name)
+    seen: set[str] = set()
+    for name in cyclic:
+        if name not in seen:
+            seen.add(name)
+            cluster = [name]
+            for member in cluster:
+                further = sorted(neighbours[member] - seen)
+                seen.update(further)
+                cluster.extend(further)
+            yield tuple(cluster)
+
+
+def _read(arcs: _Arcs) -> dict[Subject, None]:
+    """What guards read."""
+    found = (
+        subject for edges in arcs.values() for edge in edges for subject in sorted(subjects_read(edge.guard), key=str)
+    )
+    return dict.fromkeys(found)
+
+
+def _stands_still(
+    system: System, cyclic: Mapping[str, _Arcs], cluster: tuple[str, ...], should_stop: Callable[[], bool]
+) -> bool:
+    """Whether the taus of some automata cannot go round, whatever everything else is."""
+    own = [Subject(name) for name in cluster]
+    frozen = [
+        item for item in dict.fromkeys(item for name in cluster for item in _read(cyclic[name])) if item not in own
+    ]
+    domains = [subject_domain(system, subject) for subject in (*own, *frozen)]
+    if prod(map(len, domains)) > MAXIMUM_VALUATIONS:
+        return False
+    places = {subject: place for place, subject in enumerate((*own, *frozen))}
+    steps: _Steps = {
+        (places[Subject(name)], source): [(compile_expression(edge.guard, places), edge.target) for edge in edges]
+        for name in cluster
+        for source, edges in cyclic[name].items()
+    }
+    for values in product(*domains[len(own) :]):
+        if should_stop():
+            raise SynthesisCancelled("the check of the controller was stopped")
+        if _goes_round(steps, len(own), [(*locations, *values) for locations in product(*domains[: len(own)])]):
+            return False
+    return True
+
+
+def _goes_round(steps: _Steps, width: int, states: Iterable[State]) -> bool:
+    """Whether taus lead from one of the states back to it: removing what nothing leads to leaves something over."""
+    after: dict[State, list[State]] = {}
+    arriving: dict[State, int] = {}
+    for state in states:
+        after[state] = [
+            (*state[:place], target, *state[place + 1 :])
+            for place in range(width)
+            for guard, target in steps.get((place, state[place]), ())
+            if guard(state, NO_DATA) is True
+        ]
+        for target in after[state]:
+            arriving[target] = arriving.get(target, 0) + 1
+    done = [state for state in after if state not in arriving]
+    for state in done:
+        for target in after[state]:
+            arriving[target] -= 1
+            if not arriving[target]:
+                done.append(target)
+    return len(done) < len(after)
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """A silent step.
+
+    Attributes:
+        event: Its event.
+        reads: A bit for each place of a state on which it depends whether it is enabled and where it leads.
+        writes: A bit for each place that it may change.
+        home: The automaton of a tau; None for resets and cancels.
+        sources: The locations in which a tau stands.
+    """
+
+    event: str
+    reads: int
+    writes: int
+    home: str | None
+    sources: frozenset[str]
+
+
+def never_conflict(
+    controller: Controller, added: Iterable[AddedCondition], should_stop: Callable[[], bool] = lambda: False
+) -> bool:
+    """Whether any two silent steps that are enabled together lead to one state in either order.
+
+    Where silent steps always end, that is confluence, by Newman's lemma (see `robosc.properties.orders`).
+
+    Args:
+        controller: The automaton.
+        added: The conditions that its supervisor adds.
+        should_stop: Asked now and then; once true, the work ends.
+
+    Raises:
+        SynthesisCancelled: `should_stop` became true.
+    """
+    system = controller.system
+    diagrams = {item.event: item.condition for item in added}
+    places = {subject: place for place, subject in enumerate(subjects(system))}
+    watched = {goal.cancel: goal for goal in controller.goals}
+    alphabets: dict[str, list[Automaton]] = {}
+    for automaton in system.automata:
+        for event in automaton.alphabet:
+            alphabets.setdefault(event, []).append(automaton)
+    conditions: dict[str, set[Subject]] = {}
+    for condition in system.conditions:
+        conditions.setdefault(condition.event, set()).update(subjects_read(condition.condition))
+
+    def bits(found: Iterable[Subject]) -> int:
+        return sum(1 << place for place in {places[subject] for subject in found})
+
+    def step(event: str) -> _Step:
+        automata = alphabets.get(event, [])
+        edges = [(item.name, edge) for item in automata for edge in item.edges if edge.event == event]
+        reads = {Subject(item.name) for item in automata} | conditions.get(event, set())
+        for _, edge in edges:
+            reads.update(subjects_read(edge.guard), *(subjects_read(update.expression) for update in edge.updates))
+        if event in diagrams:
+            reads.update(Subject(node.automaton, node.variable) for node in diagrams[event].nodes)
+        writes = {Subject(name) for name, edge in edges if edge.source != edge.target}
+        writes.update(Subject(name, update.variable) for name, edge in edges for update in edge.updates)
+        mask = bits(reads)
+        if event in watched:
+            mask |= bits(watched[event].reads)
+        home = automata[0].name if is_tau(event) and automata else None
+        return _Step(event, mask, bits(writes), home, frozenset(edge.source for _, edge in edges))
+
+    steps = [step(event) for event in (*watched, *controller.silent)]
+    domains = [subject_domain(system, subject) for subject in places]
+    budget = MAXIMUM_VALUATIONS
+    for number, first in enumerate(steps):
+        if should_stop():
+            raise SynthesisCancelled("the check of the controller was stopped")
+        for second in steps[:number]:
+            if not (first.writes & (second.reads | second.writes) or second.writes & first.reads):
+                continue
+            if first.home is not None and first.home == second.home and not first.sources & second.sources:
+                continue
+            if first.event in watched or second.event in watched:
+                return False
+            read = [place for place in range(len(domains)) if (first.reads | second.reads) >> place & 1]
+            budget -= prod(len(domains[place]) for place in read)
+            if budget < 0 or not _commute(controller, first.event, second.event, read, domains):
+                return False
+    return True
+
+
+def _commute(
+    controller: Controller,
+    first: str,
+    second: str,
+    read: list[int],
+    domains: list[tuple[Value, ...] | range],
+) -> bool:
+    """Whether two steps that are enabled together lead to one state, for all values of what they read."""
+    base = list(controller.start[0])
+    for values in product(*(domains[place] for place in read)):
+        for place, value in zip(read, values, strict=True):
+            base[place] = value
+        state = tuple(base)
+        after_first, after_second = _taken(controller, state, first), _taken(controller, state, second)
+        if after_first is None or after_second is None or after_first == after_second:
+            continue
+        end = _taken(controller, after_first, second)
+        if end is None or end != _taken(controller, after_second, first):
+            return False
+    return True
+
+
+def _taken(controller: Controller, state: State, event: str) -> State | None:
+    """Where a reset or tau leads, or None where it is not taken: a tau that would change nothing is not."""
+    target = controller.after(state, event)
+    return None if target == state else target
+
+
+def stays_nonblocking(model: Model, controller: Controller, added: Iterable[AddedCondition]) -> bool:
+    """Whether a controlled system that is nonblocking stays so under control.
+
+    Its silent steps are resets alone, and nothing else depends on whether they are taken at once: so every run to a
+    marked state, where services are idle, is also one with each reset directly after its answer. And the environment
+    and the executor do, one by one, whatever happens in the controlled system.
+    """
+    has_own_steps = any(is_tau(event) for event in controller.silent) or any(
+        item.kind is CommunicationKind.ACTION for item in model.communications
+    )
+    has_batches = any(len(batch) > 1 for batch in controller.batches)
+    services = {item.event(EventKind.RESET) for item in model.communications if item.kind is CommunicationKind.SERVICE}
+    answered = {item.name for item in controller.system.automata if services & item.alphabet}
+    reads_services = any(
+        item.event in services or any(node.automaton in answered for node in item.condition.nodes) for item in added
+    )
+    return controller.is_deterministic and not (has_own_steps or has_batches or reads_services)

@@ -1,0 +1,163 @@
+"""Random controllers against the reference executor, which is led through everything that its world can do."""
+
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from robosc.execution.interpreter import InterpretedSystem
+from robosc.model.structure import Deployment
+from robosc.properties import Properties, check_controller
+from robosc.properties.controller import Controller
+from robosc.properties.orders import Orders
+from robosc.properties.search import search
+from robosc.properties.structure import always_end, never_conflict, stays_nonblocking
+from robosc.supervisor.structure import Supervisor
+from support.controller_twin import twin_of
+from support.random_controllers import random_controller, random_robot
+from support.random_supervisors import random_supervisor
+
+LIMIT = 2_000
+TWIN_LIMIT = 16
+DATA = (None, False, True, {"n": 1, "m": 1}, {"n": 1, "m": 6}, {"n": 6, "m": 1}, {"n": 6, "m": 6})
+
+
+def checked(supervisor: Supervisor) -> Properties:
+    return check_controller(supervisor.model, supervisor.deployment, supervisor.added, is_nonblocking=True)
+
+
+def failures(found: Properties) -> tuple[bool, bool, bool]:
+    outcomes = (found.finite_response, found.confluence, found.nonblocking)
+    assert "not checked" not in outcomes
+    assert [item is not None for item in (found.livelock, found.conflict, found.blocking)] == [
+        item == "failed" for item in outcomes
+    ]
+    return outcomes[0] == "failed", outcomes[1] == "failed", outcomes[2] == "failed"
+
+
+def test_the_executor_shows_what_the_automaton_has(record_property: Callable[[str, object], None]) -> None:
+    shares: Counter[str] = Counter()
+    for seed in range(70):
+        supervisor = random_controller(seed)
+        twin = None if supervisor is None else twin_of(supervisor, TWIN_LIMIT)
+        if supervisor is None or twin is None:
+            shares["no supervisor" if supervisor is None else "too large"] += 1
+            continue
+        controller = Controller(supervisor.model, Deployment.CONTROLLER, supervisor.added)
+        found = search(controller, limit=LIMIT, orders=Orders(controller, LIMIT))
+        assert found.is_complete
+        assert found.states == len(twin.states), seed
+        shown = (twin.has_livelock, twin.has_conflict, twin.is_blocking)
+        assert (found.livelock is not None, found.conflict is not None, found.blocking is not None) == shown, seed
+        properties = checked(supervisor)
+        assert failures(properties) == shown, seed
+        for name, has_failed in zip(("livelock", "conflict", "blocking"), shown, strict=True):
+            shares[name] += has_failed
+        shares["compared"] += 1
+        shares["without a search"] += "structure" in properties.method
+    for name, count in sorted(shares.items()):
+        record_property(name, count)
+    assert shares["compared"] > 20
+    assert min(shares["livelock"], shares["conflict"], shares["blocking"]) >= 2
+
+
+def _after(system: InterpretedSystem, states: list[dict[Any, Any]], event: str) -> list[dict[Any, Any]]:
+    """Every state that an event leads to from some states, whatever its data."""
+    found: list[dict[Any, Any]] = []
+    is_ours = system._events[event].is_controllable
+    for state in states:
+        for data in (None,) if is_ours else DATA:
+            system._state = state
+            if is_ours and not system.enabled(event):
+                continue
+            reading = None if is_ours else system.read(event, data)
+            if system.step(event, reading) is not None and system._state not in found:
+                found.append(system._state)
+    return found
+
+
+def _replayed(supervisor: Supervisor, events: tuple[str, ...]) -> tuple[InterpretedSystem, list[dict[Any, Any]]]:
+    system = InterpretedSystem(supervisor)
+    states = [system._initial]
+    for event in events:
+        states = _after(system, states, event)
+    return system, states
+
+
+def _is_stable(system: InterpretedSystem, state: dict[Any, Any]) -> bool:
+    system._state = state
+    return not any(system.enabled(event) for event in system.description.resets + system.description.taus)
+
+
+def test_traces_tell_the_truth() -> None:
+    """Each can be replayed, a cycle leads back to where it began, and two orders end where they say they do."""
+    kinds: Counter[str] = Counter()
+    for seed in range(150):
+        supervisor = random_robot(seed)
+        found = check_controller(supervisor.model, Deployment.CONTROLLER, (), is_nonblocking=False, limit=LIMIT)
+        if found.livelock is not None:
+            system, states = _replayed(supervisor, found.livelock.trace)
+            kinds["livelock"] += 1
+            again: list[list[dict[Any, Any]]] = [[state] for state in states]
+            for event in found.livelock.cycle:
+                again = [_after(system, item, event) for item in again]
+            assert any(item == [state] for state, item in zip(states, again, strict=True)), seed
+        if found.conflict is not None:
+            system, states = _replayed(supervisor, found.conflict.trace)
+            kinds["conflict"] += 1
+            ends = []
+            for order in (found.conflict.chosen, found.conflict.other):
+                targets: list[list[dict[Any, Any]]] = [[state] for state in states]
+                for event in order.events:
+                    targets = [_after(system, item, event) for item in targets]
+                ends.append(targets)
+                if order.end is not None:
+                    assert any(item and _is_stable(system, item[0]) for item in targets), seed
+                else:
+                    assert order.cycle
+            assert any(one and other and one != other for one, other in zip(*ends, strict=True)), seed
+        if found.blocking is not None:
+            kinds["blocking"] += 1
+            assert _replayed(supervisor, found.blocking.trace)[1], seed
+    assert all(count >= 10 for count in kinds.values()), kinds
+    assert len(kinds) == 3
+
+
+def test_what_is_proved_by_structure_is_true(record_property: Callable[[str, object], None]) -> None:
+    proved: Counter[str] = Counter()
+    for seed in range(250):
+        supervisor = random_robot(seed)
+        controller = Controller(supervisor.model, Deployment.CONTROLLER, ())
+        found = search(controller, limit=LIMIT, orders=Orders(controller, LIMIT))
+        if always_end(controller.system):
+            proved["ends"] += 1
+            assert found.livelock is None, seed
+            if never_conflict(controller, ()):
+                proved["confluent"] += 1
+                assert found.conflict is None, seed
+        elif found.livelock is None:
+            proved["ends, but not by structure"] += 1
+    for seed in range(70):
+        made = random_controller(seed, is_plain=True)
+        if made is not None:
+            controller = Controller(made.model, Deployment.CONTROLLER, made.added)
+            if stays_nonblocking(made.model, controller, made.added):
+                proved["nonblocking"] += 1
+                assert search(controller, limit=LIMIT, orders=None).blocking is None, seed
+    for name, count in sorted(proved.items()):
+        record_property(name, count)
+    assert min(proved["ends"], proved["confluent"]) > 50
+    assert proved["nonblocking"] > 5
+
+
+@pytest.mark.parametrize("seed", range(0, 60, 3))
+def test_any_supervisor_is_judged(seed: int) -> None:
+    """Supervisors that nobody synthesized, with everything that the language has; the same twice."""
+    supervisor = random_supervisor(seed)
+    first, second = (
+        check_controller(supervisor.model, supervisor.deployment, supervisor.added, is_nonblocking=False, limit=150)
+        for _ in range(2)
+    )
+    assert first == second
+    assert len(first.method) < 500

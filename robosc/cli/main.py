@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 from robosc._version import __version__
-from robosc.cli import check, doc, explain, explore, generate, new, synth
+from robosc.cli import check, doc, explain, explore, generate, new, synth, verify
 from robosc.cli import format as format_
 from robosc.cli.output import ExitCode, UsageError, prepare_streams, print_diagnostics
 from robosc.errors import LanguageError, RoboscError
@@ -33,7 +33,7 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"robosc {__version__}")
     commands = parser.add_subparsers(title="commands", dest="command", required=True, metavar="COMMAND")
-    for command in (new, check, format_, synth, explore, generate, explain, doc):
+    for command in (new, check, format_, synth, explore, verify, generate, explain, doc):
         command.add_parser(commands)
     return parser
 

@@ -61,6 +61,10 @@ class UnknownTargetError(RoboscError, LookupError):
 
 # Name, description and place of the built-in targets: listing them imports none.
 _BUILT_IN: dict[str, tuple[str, str]] = {
+    "promela": (
+        "the controlled system as a model for the model checker spin",
+        "robosc.targets.promela:TARGET",
+    ),
     "python": (
         "the supervisor and its executor as a Python package without any dependency",
         "robosc.targets.python:TARGET",

@@ -1,10 +1,11 @@
-"""`robosc verify`: whether a supervisor that someone hands over is right for a model."""
+"""`robosc verify`: whether a supervisor that someone hands over is right for a model, and properties of its robot."""
 
 import argparse
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from robosc.cli import properties
 from robosc.cli.arguments import add_engine_argument, add_model_arguments, add_verify_limit_argument, read_bundle
 from robosc.cli.output import (
     ExitCode,
@@ -25,10 +26,15 @@ if TYPE_CHECKING:
 FOREIGN_STATES = 1_000_000
 """States up to which a foreign supervisor is searched one by one: a minute or so at most."""
 
+_USAGE = """robosc verify [options] FILE.rsup MODEL
+       robosc verify [options] [FILE.rsup] MODEL --property PROPERTY"""
+
 _DESCRIPTION = """\
-Check a supervisor file against the texts of its model, believing nothing that the file says of itself: it must hold
-the model of the texts, its figures must be right, and the robot under it must be safe, controllable and nonblocking.
-That it forbids no more than it must is checked for systems of moderate size.
+With FILE.rsup: check a supervisor file against the texts of its model, believing nothing that the file says of itself:
+it must hold the model of the texts, its figures must be right, and the robot under it must be safe, controllable and
+nonblocking. That it forbids no more than it must is checked for systems of moderate size.
+With properties: verify them in the robot under its supervisor, which is synthesized unless a file is given and passes,
+with a run that shows why each of them holds or fails.
 """
 
 
@@ -36,17 +42,20 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     """Add the command."""
     parser = commands.add_parser(
         "verify",
-        help="check a supervisor file against its model",
+        help="check a supervisor file against its model; verify properties of the robot under its supervisor",
         description=_DESCRIPTION,
-        usage="robosc verify [options] FILE.rsup MODEL",
+        usage=_USAGE,
+        epilog=properties.EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     # Optional to the parser alone, so that another question about a MODEL can do without it.
     parser.add_argument("supervisor", nargs="?", type=Path, metavar="FILE.rsup", help="the supervisor to check")
     add_model_arguments(parser)
+    properties.add_arguments(parser)
     parser.add_argument(
         "--deployment",
         choices=[str(deployment) for deployment in Deployment],
-        help="refuse a supervisor made for another deployment (default: as the file says)",
+        help="refuse a supervisor made for another deployment (default: as the file says; without a file: controller)",
     )
     add_verify_limit_argument(parser, "--limit", FOREIGN_STATES)
     parser.add_argument("--strict", action="store_true", help="what could not be checked counts as failed")
@@ -56,17 +65,28 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Check; 0 if the supervisor passed, 1 if not.
+    """Check; 0 if the supervisor passed and every property holds, 1 if not.
 
     Raises:
-        UsageError: A file is not there or cannot be read, or there is no supervisor to check.
+        UsageError: A file is not there or cannot be read, or there is nothing to check.
     """
-    if arguments.supervisor is None:
-        raise UsageError("verify needs a supervisor file and its model: robosc verify FILE.rsup MODEL")
-    return _verify_supervisor(arguments)
+    has_properties = bool(arguments.property or arguments.properties)
+    if arguments.supervisor is not None:
+        if not has_properties and (arguments.reorder or arguments.max_nodes):
+            raise UsageError("--reorder and --max-nodes are for properties: they need --property or --properties")
+        return _verify_supervisor(arguments)
+    if not has_properties:
+        raise UsageError(
+            "verify needs a supervisor file and its model (robosc verify FILE.rsup MODEL), "
+            "or properties (robosc verify MODEL --property PROPERTY)"
+        )
+    if arguments.strict or arguments.limit != FOREIGN_STATES:
+        raise UsageError("--limit and --strict say how to check a supervisor file: they need FILE.rsup")
+    arguments.deployment = arguments.deployment or str(Deployment.CONTROLLER)
+    return properties.run(arguments)
 
 
-def _verify_supervisor(arguments: argparse.Namespace) -> ExitCode:
+def _verify_supervisor(arguments: argparse.Namespace) -> int:
     from robosc.supervisor.codec import decode
     from robosc.supervisor.recheck import recheck
     from robosc.synthesis.engines import resolve_engine
@@ -92,6 +112,9 @@ def _verify_supervisor(arguments: argparse.Namespace) -> ExitCode:
     finally:
         progress.clear()
     has_passed = found.judgement is not None and not found.faults and not (arguments.strict and found.unchecked())
+    if has_passed and (arguments.property or arguments.properties):
+        # Of a supervisor that passed only the verdicts are asked for.
+        return properties.verify(arguments, supervisor)
     if arguments.json:
         print_json(_document(found, supervisor, has_passed=has_passed))
     else:

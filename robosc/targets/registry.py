@@ -65,6 +65,10 @@ _BUILT_IN: dict[str, tuple[str, str]] = {
         "the synthesis problem and the controlled system in CIF, for Eclipse ESCET",
         "robosc.targets.cif:TARGET",
     ),
+    "promela": (
+        "the controlled system as a model for the model checker spin",
+        "robosc.targets.promela:TARGET",
+    ),
     "python": (
         "the supervisor and its executor as a Python package without any dependency",
         "robosc.targets.python:TARGET",

@@ -1,0 +1,171 @@
+"""Verification of properties of the controlled system: the options, and what is printed."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from robosc.cli import synth
+from robosc.cli.arguments import engine_options, read_bundle
+from robosc.cli.output import (
+    ExitCode,
+    ProgressLine,
+    UsageError,
+    diagnostics_json,
+    print_diagnostics,
+    print_json,
+)
+from robosc.errors import LanguageError
+from robosc.source import Bundle, SourceFile
+
+if TYPE_CHECKING:
+    from robosc.automata import System
+    from robosc.model.structure import Model
+    from robosc.model_checking import Property, Verdict
+    from robosc.supervisor import Supervisor
+
+EPILOG = """\
+properties:
+  invariant E           E is true in every state (the same as AG E)
+  reachable E           E is true in some state (the same as EF E)
+  AG p  AF p  AX p      in every run: always p, some time p, p after the next step
+  EG p  EF p  EX p      in some run: the same
+  A[p U q]  E[p U q]    in every run, in some run: p until q, and q comes
+  enabled(c.request)    the event can happen
+  !p, p and q, p or q, p => q
+  name: p               a property with a name
+
+E is a condition of the language over component states and synthesis variables; service.location and
+action.location tell where a call is (idle, waiting or executing, ready, failed). Operators take one
+operand, as '!' does: write AG (a or b). docs/verification.md has more.
+
+exit status:
+  0  every property holds
+  1  a property fails, the model has errors, or no supervisor exists
+  2  wrong use, or a property that cannot be understood
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What to verify."""
+    parser.add_argument(
+        "--property",
+        action="append",
+        default=[],
+        metavar="PROPERTY",
+        help="what is to hold of the robot, such as 'invariant !Base.moving or Gate.open' (may be repeated)",
+    )
+    parser.add_argument(
+        "--properties",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="FILE",
+        help="a file with a property on each line; lines that begin with # are comments (may be repeated)",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Synthesize and verify; 0 if every property holds, 1 if one fails or there is no supervisor, 2 for wrong ones."""
+    from robosc.model import check
+
+    bundle = read_bundle(arguments)
+    # What is wrong with a property is told before the synthesis, which may take long.
+    model = check(bundle).model
+    if model is not None and read_properties(arguments, model) is None:
+        return ExitCode.USAGE
+    made = synth.make(arguments, bundle, allow_livelock=True)
+    if made.supervisor is None:
+        if arguments.json:
+            print_json({"status": str(made.status), "reason": made.reason, **diagnostics_json(made.diagnostics)})
+        else:
+            synth.report_problems(made, bundle)
+        return ExitCode.FAILED
+    return verify(arguments, made.supervisor)
+
+
+def verify(arguments: argparse.Namespace, supervisor: "Supervisor") -> int:
+    """Verify the properties that the arguments name in a supervisor's controlled system, and print the verdicts."""
+    from robosc.automata import to_automata
+    from robosc.model_checking import verdict_json, verdict_text
+
+    properties = read_properties(arguments, supervisor.model)
+    if properties is None:
+        return ExitCode.USAGE
+    system = to_automata(supervisor.model, supervisor.deployment)
+    verdicts = _verdicts(arguments, system, supervisor, properties)
+    holds = all(verdict.holds for verdict in verdicts)
+    if arguments.json:
+        print_json(
+            {
+                "status": "holds" if holds else "fails",
+                "properties": [verdict_json(verdict, system, supervisor.model) for verdict in verdicts],
+            }
+        )
+    else:
+        for verdict in (item for item in verdicts if not (arguments.quiet and item.holds)):
+            sys.stdout.write(verdict_text(verdict, system))
+    return ExitCode.OK if holds else ExitCode.FAILED
+
+
+def read_properties(arguments: argparse.Namespace, model: "Model") -> "tuple[Property, ...] | None":
+    """The properties that the arguments name, or None after reporting what is wrong with them.
+
+    Raises:
+        UsageError: A file cannot be read, or there is no property in any.
+    """
+    from robosc.model_checking import properties_of
+
+    texts = [SourceFile(f"property {number}", text) for number, text in enumerate(arguments.property, start=1)]
+    listings: list[SourceFile] = []
+    try:
+        listings += [_listing(path) for path in arguments.properties]
+        properties = properties_of(model, texts, listings)
+    except LanguageError as error:
+        _report_faults(arguments, error, [*texts, *listings])
+        return None
+    if not properties:
+        raise UsageError(f"there is no property in {' and '.join(map(str, arguments.properties))}")
+    return properties
+
+
+def _listing(path: Path) -> SourceFile:
+    """A file of properties.
+
+    Raises:
+        UsageError: It is not there or cannot be read.
+        LanguageError: It is no text.
+    """
+    from robosc.language.bundle import MAXIMUM_BYTES, decode_source
+
+    try:
+        with path.open("rb") as file:
+            return SourceFile(str(path), decode_source(file.read(MAXIMUM_BYTES + 1), str(path)))
+    except OSError as error:
+        raise UsageError(f"cannot read {path}: {error.strerror or error}") from error
+
+
+def _report_faults(arguments: argparse.Namespace, error: LanguageError, files: Sequence[SourceFile]) -> None:
+    if arguments.json:
+        print_json({"status": "property errors", **diagnostics_json(error.diagnostics)})
+    else:
+        print_diagnostics(error.diagnostics, Bundle(files[0], tuple(files[1:])) if files else None)
+
+
+def _verdicts(
+    arguments: argparse.Namespace, system: "System", supervisor: "Supervisor", properties: "Sequence[Property]"
+) -> "tuple[Verdict, ...]":
+    from robosc.model_checking import verify_properties
+
+    progress = ProgressLine()
+    try:
+        return verify_properties(
+            system,
+            supervisor.added,
+            properties,
+            engine=engine_options(arguments),
+            on_progress=lambda step: progress.show(f"verification: {step}"),
+        )
+    finally:
+        progress.clear()

@@ -1,0 +1,20 @@
+"""Model checking of the controlled system: properties in computation tree logic, verdicts, and runs that show them."""
+
+from robosc.model_checking.checking import verify_properties
+from robosc.model_checking.formulas import Property, formula_text
+from robosc.model_checking.outcome import Remainder, Run, RunKind, Verdict
+from robosc.model_checking.report import verdict_json, verdict_text
+from robosc.model_checking.resolution import properties_of
+
+__all__ = [
+    "Property",
+    "Remainder",
+    "Run",
+    "RunKind",
+    "Verdict",
+    "formula_text",
+    "properties_of",
+    "verdict_json",
+    "verdict_text",
+    "verify_properties",
+]

@@ -1,0 +1,165 @@
+"""Symbolic model checking of computation tree logic: a set of states for every part of a formula, by fixed points.
+
+Sources: E. M. Clarke, E. A. Emerson and A. P. Sistla, "Automatic verification of finite-state concurrent systems using
+temporal logic specifications", ACM TOPLAS 8(2), 1986, pp. 244-263 (semantics, reduction to EX, EU and EG);
+J. R. Burch, E. M. Clarke, K. L. McMillan, D. L. Dill and L. J. Hwang, "Symbolic model checking: 10^20 states and
+beyond", Information and Computation 98(2), 1992, pp. 142-170, sec. 5 (fixed points of predicates). Least fixed points
+are closures (see `robosc.synthesis.closure`), so their events are taken in an order that keeps diagrams small.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from robosc.automata.structure import System
+from robosc.model_checking.evidence import Evidence
+from robosc.model_checking.formulas import (
+    Condition,
+    Enabled,
+    Finally,
+    Formula,
+    Globally,
+    Joined,
+    Next,
+    Not,
+    Property,
+    Until,
+)
+from robosc.model_checking.outcome import Verdict
+from robosc.model_checking.structure import KripkeStructure
+from robosc.supervisor.structure import AddedCondition
+from robosc.synthesis import EngineOptions, Progress, resolve_engine
+from robosc.synthesis.closure import Step
+from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.engines import engine_options, limited, make_manager, node_check
+from robosc.synthesis.symbolic import Symbols
+from robosc.synthesis.watch import Watch
+
+
+def verify_properties(
+    system: System,
+    added: Sequence[AddedCondition],
+    properties: Sequence[Property],
+    *,
+    engine: str | EngineOptions = "auto",
+    should_stop: Callable[[], bool] = lambda: False,
+    on_progress: Callable[[Progress], None] = lambda progress: None,
+) -> tuple[Verdict, ...]:
+    """Whether properties hold in the controlled system, in their order; the same for every engine.
+
+    Args:
+        system: Plants and event conditions.
+        added: What the supervisor adds to events.
+        properties: The properties.
+        engine: Name of the engine for decision diagrams, or more about it. The order changes, if it may, until all
+            states are known.
+        should_stop: Asked before each step of the work with one event; once true, the work ends.
+        on_progress: Told where the work is.
+
+    Raises:
+        SynthesisCancelled: `should_stop` became true.
+        NodeLimitError: Diagrams became larger than the engine's options allow.
+        UnknownEngineError: There is no such engine.
+        UnsupportedModelError: A condition computes with too many doubles.
+    """
+    options = engine_options(engine)
+    manager = make_manager(resolve_engine(options.name))
+    watch = Watch(should_stop, on_progress, node_check(manager, options.maximum_nodes))
+    with limited(manager, options.maximum_nodes):
+        encoding = Encoding(system, manager)
+        structure = KripkeStructure(system, encoding, added, watch, is_reordering=options.is_reordering)
+        return tuple(_Checker(structure).verdict(item) for item in properties)
+
+
+class _Checker:
+    """Judges one property."""
+
+    def __init__(self, structure: KripkeStructure) -> None:
+        self._structure = structure
+        self._manager = structure.manager
+        self._watch = structure.watch
+        self._symbols = Symbols(structure.encoding)
+        # By identity: to compare formulas would take longer than to work them out. The formula lives in the property.
+        self._known: dict[int, tuple[Formula, Any]] = {}
+
+    def verdict(self, claim: Property) -> Verdict:
+        """Whether it holds in every initial state, and a run that shows it."""
+        outside = self._structure.initial & ~self._whole(claim.formula)
+        holds = bool(outside == self._manager.false)
+        start = self._structure.one(self._structure.initial if holds else outside)
+        evidence = Evidence(self._structure, self.where, self._forever)
+        return Verdict(claim, holds, evidence.run(claim.formula, start, holds=holds))
+
+    def where(self, formula: Formula) -> Any:
+        """The states in which a formula holds."""
+        found = self._known.get(id(formula))
+        if found is None:
+            self._watch.check_stop()
+            found = self._known[id(formula)] = (formula, self._structure.states & self._work_out(formula))
+        return found[1]
+
+    def _whole(self, formula: Formula) -> Any:
+        """The same for a whole property, as far as it takes to tell where among the initial states it holds."""
+        initial, false = self._structure.initial, self._manager.false
+        match formula:
+            case Finally(quantifier="E", operand=operand):
+                return self._leading_to(self.where(operand), lambda found: bool(initial & ~found == false))
+            case Globally(quantifier="A", operand=operand):
+                return ~self._leading_to(self._not(self.where(operand)), lambda found: bool(initial & ~found == false))
+            case _:
+                return self.where(formula)
+
+    def _not(self, states: Any) -> Any:
+        return self._structure.states & ~states
+
+    def _work_out(self, formula: Formula) -> Any:
+        match formula:
+            case Condition(expression=expression):
+                return self._symbols.holds(expression)
+            case Enabled(event=event):
+                return self._structure.enabled(event)
+            case Not(operand=operand):
+                return self._not(self.where(operand))
+            case Joined(operator=operator, left=left, right=right):
+                first, second = self.where(left), self.where(right)
+                return first & second if operator == "and" else first | second
+            case Next(quantifier=quantifier, operand=operand):
+                inside = self.where(operand)
+                if quantifier == "E":
+                    return self._structure.before(inside)
+                return self._not(self._structure.before(self._not(inside)))
+            case Finally(quantifier=quantifier, operand=operand):
+                inside = self.where(operand)
+                return self._leading_to(inside) if quantifier == "E" else self._not(self._forever(self._not(inside)))
+            case Globally(quantifier=quantifier, operand=operand):
+                inside = self.where(operand)
+                return self._forever(inside) if quantifier == "E" else self._not(self._leading_to(self._not(inside)))
+            case Until(quantifier=quantifier, left=left, right=right):
+                first, second = self.where(left), self.where(right)
+                if quantifier == "E":
+                    return self._until(first, second)
+                late, never = self._not(second), self._not(first | second)
+                return self._not(self._until(late, never) | self._forever(late))
+
+    def _leading_to(self, states: Any, is_enough: Callable[[Any], bool] = lambda found: False) -> Any:
+        return self._until(self._structure.states, states, is_enough)
+
+    def _until(self, through: Any, goal: Any, is_enough: Callable[[Any], bool] = lambda found: False) -> Any:
+        """The least fixed point of `goal or (through and EX ...)`."""
+        if goal == self._manager.false:
+            return goal
+        steps = [
+            Step(lambda states, move=move: through & move.sources(states), move.names)  # type: ignore[misc]
+            for move in self._structure.moves
+        ]
+        return self._structure.closure(steps).of(goal, "states that lead there", is_enough)
+
+    def _forever(self, states: Any) -> Any:
+        """The greatest fixed point of `states and EX ...`."""
+        rounds = 0
+        while True:
+            kept = states & self._structure.before(states)
+            rounds += 1
+            self._watch.tell("states that can stay", rounds, kept)
+            if kept == states:
+                return kept
+            states = kept

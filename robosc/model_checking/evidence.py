@@ -1,0 +1,132 @@
+"""A run that shows why a formula holds in a state or does not, as far as one run can show it.
+
+That there is a run with some property is shown by such a run; that all runs have one is shown by none, but the
+opposite is. So a formula is followed into the states that a run leads to, as long as what is left to show there is of
+the first kind (E. M. Clarke, O. Grumberg, K. L. McMillan and X. Zhao, "Efficient generation of counterexamples and
+witnesses in symbolic model checking", DAC 1995, pp. 427-432); what is not is named with its place in the run.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from robosc.model_checking.formulas import (
+    Condition,
+    Enabled,
+    Finally,
+    Formula,
+    Globally,
+    Joined,
+    Next,
+    Not,
+    Until,
+)
+from robosc.model_checking.outcome import Remainder, Run, RunKind
+from robosc.model_checking.runs import Path, Runs
+from robosc.model_checking.structure import KripkeStructure
+
+
+@dataclass(frozen=True, slots=True)
+class _Shown:
+    """What has been found: the way, where it closes, and what is left to show."""
+
+    path: Path
+    loop: int | None = None
+    left: tuple[Remainder, ...] = ()
+
+
+class Evidence:
+    """Finds runs that show something.
+
+    Args:
+        structure: What runs go through.
+        where: The states in which a formula holds.
+        forever: The states from which a run can stay in given ones for ever.
+    """
+
+    def __init__(
+        self, structure: KripkeStructure, where: Callable[[Formula], Any], forever: Callable[[Any], Any]
+    ) -> None:
+        self._structure = structure
+        self._where = where
+        self._forever = forever
+        self._runs = Runs(structure)
+
+    def run(self, formula: Formula, start: Any, *, holds: bool) -> Run | None:
+        """A run from a single state that shows that a formula holds there, or does not; None if none shows anything."""
+        shown = self._show(formula, holds, Path((start,)))
+        if shown.left and not shown.path.events:
+            return None
+        return Run(
+            RunKind.WITNESS if holds else RunKind.COUNTEREXAMPLE,
+            tuple(self._structure.values(state) for state in shown.path.states),
+            shown.path.events,
+            shown.loop,
+            shown.left,
+        )
+
+    def _show(self, formula: Formula, holds: bool, path: Path) -> _Shown:
+        """Go on from the end of a path, where a formula is known to hold, or not to."""
+        match formula:
+            case Condition() | Enabled():
+                return _Shown(path)
+            case Not(operand=operand):
+                return self._show(operand, not holds, path)
+            case Joined(operator=operator, left=left, right=right):
+                if (operator == "and") == holds:
+                    return self._show_both(left, right, holds, path)
+                return self._show_either(left, right, holds, path)
+            case _ if (formula.quantifier == "E") != holds:
+                return _Shown(path, left=(Remainder(len(path.events), formula, holds),))
+            case Next(operand=operand):
+                step = self._runs.step(path.end, self._states(operand, holds))
+                return self._show(operand, holds, path.then(step))
+            case Finally(operand=operand):
+                if holds:
+                    return self._reach(self._structure.states, operand, holds, path)
+                return self._stay(self._states(operand, False), path)
+            case Globally(operand=operand):
+                if holds:
+                    return self._stay(self._where(operand), path)
+                return self._reach(self._structure.states, operand, holds, path)
+            case Until(left=left, right=right):
+                if holds:
+                    return self._reach(self._where(left), right, holds, path)
+                return self._break(left, right, path)
+
+    def _states(self, formula: Formula, holds: bool) -> Any:
+        """Where a formula holds, or does not."""
+        inside = self._where(formula)
+        return inside if holds else self._structure.states & ~inside
+
+    def _show_either(self, left: Formula, right: Formula, holds: bool, path: Path) -> _Shown:
+        """Go on for the one of two parts that is the simpler to show; one at least is so."""
+        false = self._structure.manager.false
+        parts = [part for part in (left, right) if path.end & self._states(part, holds) != false]
+        shown = [self._show(part, holds, path) for part in parts]
+        return min(shown, key=lambda found: (len(found.left), len(found.path.events)))
+
+    def _show_both(self, left: Formula, right: Formula, holds: bool, path: Path) -> _Shown:
+        """Go on for two parts; one run goes one way, so where both need one the second is left."""
+        first, second = self._show(left, holds, path), self._show(right, holds, path)
+        place = len(path.events)
+        if len(first.path.events) == place:
+            return replace(second, left=(*first.left, *second.left))
+        left_over = second.left if len(second.path.events) == place else (Remainder(place, right, holds),)
+        return replace(first, left=(*first.left, *left_over))
+
+    def _reach(self, within: Any, operand: Formula, holds: bool, path: Path) -> _Shown:
+        """A run to a state where a formula holds, or does not, and on for what is to be shown there."""
+        way = self._runs.path(path.end, within, self._states(operand, holds))
+        return self._show(operand, holds, path.then(way))
+
+    def _stay(self, states: Any, path: Path) -> _Shown:
+        """A run that stays in some states for ever."""
+        lasso, loop = self._runs.lasso(path.end, self._forever(states))
+        return _Shown(path.then(lasso), len(path.events) + loop)
+
+    def _break(self, left: Formula, right: Formula, path: Path) -> _Shown:
+        """A run on which `left` ends before `right` begins; where there is none, one on which `right` never does."""
+        late = self._states(right, False)
+        way = self._runs.search(path.end, late, late & self._states(left, False))
+        return self._stay(late, path) if way is None else self._show_both(left, right, False, path.then(way))

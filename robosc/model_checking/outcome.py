@@ -1,0 +1,69 @@
+"""What verification returns: verdicts with the runs that show them, as plain values."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from robosc.expressions import Value
+from robosc.model_checking.formulas import Formula, Property
+
+State = tuple[Value, ...]
+"""A state, in the order of `robosc.automata.state.subjects`."""
+
+
+class RunKind(StrEnum):
+    """What a run shows."""
+
+    WITNESS = "witness"
+    """That the property holds."""
+    COUNTEREXAMPLE = "counterexample"
+    """That it does not."""
+
+
+@dataclass(frozen=True, slots=True)
+class Remainder:
+    """What else has to be so for a run to show what it is to show, and this run does not show.
+
+    Attributes:
+        place: Place of the state in the run.
+        formula: Part of the property.
+        holds: Whether it holds in that state.
+    """
+
+    place: int
+    formula: Formula
+    holds: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A run of the controlled system from an initial state.
+
+    Attributes:
+        kind: What it shows.
+        states: The states that it goes through, one more than events.
+        events: What happens between each two; None where nothing can happen and the state stays as it is.
+        loop: Place of the state to which the run comes back from its last one, which is that state again; None for a
+            run that ends.
+        left: What it leaves to be shown; empty if it shows everything.
+    """
+
+    kind: RunKind
+    states: tuple[State, ...]
+    events: tuple[str | None, ...]
+    loop: int | None = None
+    left: tuple[Remainder, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """The outcome for one property.
+
+    Attributes:
+        property: The property.
+        holds: Whether it holds in every initial state.
+        run: A run that shows why, or None where no single run does.
+    """
+
+    property: Property
+    holds: bool
+    run: Run | None

@@ -1,0 +1,93 @@
+"""Verdicts for people and for machines: each state of a run in the words of the model."""
+
+import textwrap
+from collections.abc import Iterator
+
+from robosc.automata.state import Subject, subject_domain, subjects
+from robosc.automata.structure import System
+from robosc.expressions import Value
+from robosc.model.structure import Model
+from robosc.model_checking.formulas import formula_text
+from robosc.model_checking.outcome import Run, State, Verdict
+
+_NOTHING = "(nothing can happen any more)"
+_WIDTH, _NARROWEST = 110, 40
+"""Columns of a line, and of what changes at least."""
+
+
+def verdict_text(verdict: Verdict, system: System) -> str:
+    """A verdict as lines; the run event by event, each with what it changes."""
+    claim = verdict.property
+    name = f"{claim.name}: " if claim.name else ""
+    lines = [f"{'holds' if verdict.holds else 'FAILS'}  {name}{claim.text}"]
+    if verdict.run is not None:
+        lines += [f"       {line}".rstrip() for line in _run_lines(verdict.run, system)]
+    return "\n".join(lines) + "\n"
+
+
+def _run_lines(run: Run, system: System) -> Iterator[str]:
+    yield f"{run.kind}:"
+    width = max(len(event or _NOTHING) for event in ("initially", *run.events))
+    before: dict[str, str] = {}
+    for number, state in enumerate(run.states):
+        shown = {str(subject): _value_text(value) for subject, value in _shown(system, state)}
+        changes = ", ".join(f"{name} = {value}" for name, value in shown.items() if before.get(name) != value)
+        before = shown
+        event = run.events[number - 1] or _NOTHING if number else "initially"
+        margin = f"{number:4}  {event.ljust(width)}  "
+        lines = textwrap.wrap(changes, max(_WIDTH - len(margin), _NARROWEST), break_long_words=False)
+        yield margin + (lines[0] if lines else "")
+        yield from (" " * len(margin) + line for line in lines[1:])
+    if run.loop is not None:
+        yield f"      and so on for ever from {run.loop}"
+    for item in run.left:
+        holds = "holds" if item.holds else "does not hold"
+        yield f"      in {item.place}, '{formula_text(item.formula)}' {holds}, which this run does not show"
+
+
+def _shown(system: System, state: State) -> Iterator[tuple[Subject, Value]]:
+    """What can change: the plants of messages have one location only."""
+    for subject, value in zip(subjects(system), state, strict=True):
+        if subject.variable is not None or len(subject_domain(system, subject)) > 1:
+            yield subject, value
+
+
+def _value_text(value: Value) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def verdict_json(verdict: Verdict, system: System, model: Model) -> dict[str, object]:
+    """A verdict as JSON values."""
+    return {
+        "name": verdict.property.name or None,
+        "property": verdict.property.text,
+        "holds": verdict.holds,
+        "run": None if verdict.run is None else _run_json(verdict.run, system, model),
+    }
+
+
+def _run_json(run: Run, system: System, model: Model) -> dict[str, object]:
+    return {
+        "kind": str(run.kind),
+        "states": [_state_json(system, model, state) for state in run.states],
+        "events": list(run.events),
+        "loop": run.loop,
+        "left": [
+            {"state": item.place, "property": formula_text(item.formula), "holds": item.holds} for item in run.left
+        ],
+    }
+
+
+def _state_json(system: System, model: Model, state: State) -> dict[str, dict[str, Value]]:
+    """A state in the form that `robosc explore --json` gives it."""
+    components = {component.name for component in model.components}
+    found: dict[str, dict[str, Value]] = {"components": {}, "variables": {}, "communications": {}}
+    for subject, value in zip(subjects(system), state, strict=True):
+        kind, _, name = subject.automaton.partition(" ")
+        if subject.variable is not None:
+            found["variables"][str(subject)] = value
+        elif subject.automaton in components:
+            found["components"][subject.automaton] = value
+        elif kind in ("service", "action"):
+            found["communications"][name] = value
+    return found

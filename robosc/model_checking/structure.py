@@ -1,0 +1,177 @@
+"""The controlled system as a Kripke structure of predicates: its states, its steps, and the state behind a predicate.
+
+Every event of the controlled system is a way on. A state without any has itself as its only successor, as is usual
+where every state needs one: its runs stay there for ever (so does spin, which lets a finished run stutter).
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from robosc.automata.state import subjects
+from robosc.automata.structure import System
+from robosc.expressions import Value
+from robosc.supervisor.structure import AddedCondition, DecisionDiagram
+from robosc.synthesis.closure import Closure, Step
+from robosc.synthesis.encoding import Bits, Encoding
+from robosc.synthesis.engines import reordering
+from robosc.synthesis.fixed_point import initial_states
+from robosc.synthesis.nodes import cofactors, is_constant
+from robosc.synthesis.transitions import Steps, transition_of
+from robosc.synthesis.watch import Watch
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """A way on from some states.
+
+    Attributes:
+        event: The event, or None where nothing happens any more.
+        image: The states that it leads to from a set of states.
+        sources: The states of the structure from which it can lead into a set of states.
+        names: The current-state variables that it reads or changes.
+    """
+
+    event: str | None
+    image: Callable[[Any], Any]
+    sources: Callable[[Any], Any]
+    names: frozenset[str]
+
+
+class KripkeStructure:
+    """The reachable states of a controlled system and the moves between them.
+
+    Args:
+        system: Plants and event conditions.
+        encoding: Its variables.
+        added: What the supervisor adds.
+        watch: Who waits.
+        is_reordering: Whether the engine may change its order while the states are found.
+
+    Attributes:
+        manager: The manager of all predicates.
+        initial: The initial states.
+        states: Every state.
+        moves: Every way on, in the system's order of events; last the one of states without events.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        encoding: Encoding,
+        added: Sequence[AddedCondition],
+        watch: Watch,
+        *,
+        is_reordering: bool = False,
+    ) -> None:
+        self.encoding = encoding
+        self.manager = encoding.manager
+        self.watch = watch
+        self.initial = initial_states(encoding)
+        conditions = {item.event: item.condition for item in added}
+        steps: list[tuple[Steps, Any]] = []
+        for event in system.events:
+            watch.check_stop()
+            found = Steps(encoding, transition_of(encoding, event))
+            allowed = found.plant & found.condition if event.is_controllable else self.manager.true
+            if event.name in conditions:
+                allowed = allowed & diagram_predicate(encoding, conditions[event.name])
+            steps.append((found, allowed))
+            watch.tell("encoding", len(steps), found.plant)
+        closure = self.closure([_onwards(found, allowed) for found, allowed in steps])
+        with reordering(encoding.manager, encoding.order, is_wanted=is_reordering):
+            self.states = closure.of(self.initial, "reachability")
+        moves = [self._move(found, self.states & allowed) for found, allowed in steps]
+        self._enabled = {str(move.event): move.sources(self.manager.true) for move in moves}
+        # No closure over the structure itself: the cycle could let the manager go before its predicates.
+        ends = self.states & ~encoding.any_of(self._enabled.values())
+        end = Move(None, lambda states: states & ends, lambda states: states & ends, frozenset())
+        self.moves = (*moves, end)
+
+    def closure(self, steps: Sequence[Step]) -> Closure:
+        """What closes sets of states under some steps."""
+        return Closure(steps, self.encoding.state_names, self.watch)
+
+    def _move(self, steps: Steps, allowed: Any) -> Move:
+        return Move(
+            steps.event.name,
+            lambda states: steps.image(states & allowed),
+            lambda states: allowed & steps.some(states),
+            steps.names,
+        )
+
+    def enabled(self, event: str) -> Any:
+        """The states in which an event can happen."""
+        return self._enabled[event]
+
+    def before(self, states: Any) -> Any:
+        """The states that some move leads into `states` from."""
+        found = self.manager.false
+        for move in self.moves:
+            self.watch.check_stop()
+            found = found | move.sources(states)
+        return found
+
+    def after(self, states: Any) -> Any:
+        """The states that some move leads to from `states`."""
+        found = self.manager.false
+        for move in self.moves:
+            self.watch.check_stop()
+            found = found | move.image(states)
+        return found
+
+    def one(self, states: Any) -> Any:
+        """One of some states, as a predicate: the one whose bits read as the lowest number, whatever the engine."""
+        return self.encoding.all_of(
+            self.manager.var(name) if value else ~self.manager.var(name)
+            for name, value in reversed(self._assignment(states).items())
+        )
+
+    def values(self, state: Any) -> tuple[Value, ...]:
+        """The state that is alone in a predicate, as a tuple in the order of `subjects`."""
+        assignment = self._assignment(state)
+        return tuple(_value(self.encoding.subjects[item], assignment) for item in subjects(self.encoding.system))
+
+    def _assignment(self, states: Any) -> dict[str, bool]:
+        values = dict.fromkeys(self.encoding.state_names, False)
+        node = states
+        while not is_constant(self.manager, node):
+            low, high = cofactors(node)
+            values[node.var] = low == self.manager.false
+            node = high if values[node.var] else low
+        return values
+
+
+def _onwards(steps: Steps, allowed: Any) -> Step:
+    return Step(lambda states: steps.image(states & allowed), steps.names)
+
+
+def _value(bits: Bits, assignment: Mapping[str, bool]) -> Value:
+    index = 0
+    for name in bits.names:
+        index = 2 * index + assignment[name]
+    return bits.domain[index]
+
+
+def diagram_predicate(encoding: Encoding, diagram: DecisionDiagram) -> Any:
+    """Where a decision diagram over locations and variables is true."""
+    manager = encoding.manager
+    by_name = {(subject.automaton, subject.variable): bits for subject, bits in encoding.subjects.items()}
+    built = [manager.false, manager.true]
+    for node in diagram.nodes:
+        bits = by_name[node.automaton, node.variable]
+        found = built[node.children[0]]
+        for start, child in zip(node.starts[1:], node.children[1:], strict=True):
+            found = manager.ite(_at_least(manager, bits, start), built[child], found)
+        built.append(found)
+    return built[diagram.root]
+
+
+def _at_least(manager: Any, bits: Bits, index: int) -> Any:
+    """Where the index that some bits encode is not below `index`."""
+    found = manager.true
+    for place, name in enumerate(reversed(bits.names)):
+        variable = manager.var(name)
+        has_bit = (index >> place) & 1
+        found = manager.ite(variable, found, manager.false) if has_bit else manager.ite(variable, manager.true, found)
+    return found

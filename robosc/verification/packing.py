@@ -57,7 +57,7 @@ class Packing:
 
     def initial(self) -> tuple[int, ...]:
         """The initial states."""
-        return (self.encode(self.semantics.initial),)
+        return tuple(map(self.encode, self.semantics.initial_states))
 
     def encode(self, state: State) -> int:
         """The number of a state."""
@@ -83,6 +83,7 @@ class Packing:
         deciding = {
             self.places[Subject(item.name)] for item in self.system.automata if item.marked != {*item.locations}
         }
+        deciding |= {self.places[subject] for subject in subjects_read(self.system.marker)}
         return remembering(self.field(deciding), lambda code: self.semantics.is_marked(self.decode(code)))
 
     def broken_invariants(self) -> list[CodeTest]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from robosc.automata.controlled import TRANSITIONS_PER_STATE, Added
 from robosc.automata.semantics import TooManyChoicesError
 from robosc.errors import SynthesisCancelled
-from robosc.verification.packing import EventTable, Packing
+from robosc.verification.packing import CodeTest, EventTable, Packing
 
 STOP_INTERVAL = 256
 """States handled between two questions whether to stop."""
@@ -91,8 +91,15 @@ class Reached:
         return tuple(reversed(events))
 
 
-def search(packing: Packing, added: Added, effort: Effort) -> Reached | None:
+def _anywhere(code: int) -> bool:
+    """The supervisor lets the system begin wherever it likes."""
+    return True
+
+
+def search(packing: Packing, added: Added, effort: Effort, begins: CodeTest = _anywhere) -> Reached | None:
     """Every state of the controlled system, or None if there are more than the effort allows.
+
+    It begins in the initial states in which the supervisor lets it begin.
 
     A controllable event happens where the plants, the ranges, its event conditions and its added condition
     allow it; an uncontrollable one where the plants do and what is added to it, if anything, holds.
@@ -101,7 +108,10 @@ def search(packing: Packing, added: Added, effort: Effort) -> Reached | None:
         SynthesisCancelled: The work is to end.
     """
     tables = packing.tables(sorted(packing.system.events, key=lambda event: event.name), added)
-    codes = list(dict.fromkeys(packing.initial()))
+    try:
+        codes = [code for code in dict.fromkeys(packing.initial()) if begins(code)]
+    except TooManyChoicesError:
+        return None
     numbers = {code: number for number, code in enumerate(codes)}
     found = Reached(
         packing, tables, codes, array("I", range(len(codes))), array("I", [0] * len(codes)), array("I"), array("L", [0])

@@ -13,7 +13,7 @@ from robosc.automata.compile import State
 from robosc.automata.controlled import Added
 from robosc.automata.state import subjects
 from robosc.automata.structure import System
-from robosc.verification.packing import Packing
+from robosc.verification.packing import CodeTest, Packing
 from robosc.verification.permissive import Allowed, allowed
 from robosc.verification.search import Effort, Reached, blocking_state, search
 
@@ -90,6 +90,7 @@ def verify(
     system: System,
     added: Added,
     *,
+    initial: Callable[[State], bool] | None = None,
     limit: int = DEFAULT_LIMIT,
     permissive_limit: int = DEFAULT_PERMISSIVE_LIMIT,
     should_stop: Callable[[], bool] = lambda: False,
@@ -100,6 +101,7 @@ def verify(
     Args:
         system: Plants and event conditions.
         added: For each event to which the supervisor adds a condition, that condition over states.
+        initial: In which of its initial states the supervisor lets the system begin; None: in all of them.
         limit: Number of states of the controlled system beyond which nothing is checked.
         permissive_limit: Number of states that the plants reach under the event conditions beyond which
             permissiveness is not checked. Both count `TRANSITIONS_PER_STATE` transitions as a state, too.
@@ -112,7 +114,8 @@ def verify(
     """
     require_known(system, added)
     packing = Packing(system)
-    found = search(packing, added, Effort(limit, should_stop, on_progress, "states"))
+    begins = (lambda code: True) if initial is None else packing.condition(initial)
+    found = search(packing, added, Effort(limit, should_stop, on_progress, "states"), begins)
     if found is None:
         skipped = Outcome.NOT_CHECKED
         return Verification(None, None, skipped, skipped, skipped, skipped)
@@ -123,7 +126,7 @@ def verify(
         effort = Effort(permissive_limit, should_stop, on_progress, "states of the uncontrolled system")
         recomputed = allowed(packing, found.tables, effort)
         if recomputed is not None:
-            failures["maximally permissive"] = judge.restrictive(recomputed)
+            failures["maximally permissive"] = judge.restrictive(recomputed, begins)
     return verification(len(found.codes), len(found.targets), failures)
 
 
@@ -200,8 +203,13 @@ class _Judge:
         number = blocking_state(self.found)
         return None if number is None else self._failure("nonblocking", number, "no marked state can be reached")
 
-    def restrictive(self, recomputed: Allowed) -> Failure | None:
-        """A reachable state where a controllable event is disabled that a supervisor could allow."""
+    def restrictive(self, recomputed: Allowed, begins: CodeTest) -> Failure | None:
+        """A reachable state where a controllable event, or an initial one, is disabled that could be allowed."""
+        packing = self.found.packing
+        for code in packing.initial():
+            if not begins(code) and recomputed.good[recomputed.numbers[code]]:
+                reason = "the system may not begin here although it could"
+                return failure(packing.system, "maximally permissive", (), packing.decode(code), reason)
         limited = [
             (place, table.event.name, table.condition)
             for place, table in enumerate(self.found.tables)

@@ -11,8 +11,10 @@ _LOOKS_LIKE_A_CODE = re.compile(r"[a-z0-9]+(-[a-z0-9]+)+")
 
 _IS_ONE_WORD = re.compile(r"[a-z0-9]+")
 
-NO_CODES = frozenset({"utf-8", "utf-8-sig", "robosc-supervisor"})
-"""Texts of the source that look like codes and are none."""
+NO_CODES = frozenset(
+    {"utf-8", "utf-8-sig", "robosc-supervisor", "explain-synthesis", "only-uncontrollable", "unreachable-state"}
+)
+"""Texts of the source that look like codes and are none, a command and its remarks about a supervisor among them."""
 
 # The pages themselves, and the models that a new robot begins with.
 _ELSEWHERE = ("explain", "starter")

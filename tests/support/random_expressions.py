@@ -19,6 +19,7 @@ from robosc.expressions import (
     StateTest,
     Unary,
     VariableRead,
+    children,
 )
 
 COLOUR = EnumType("Colour", ("red", "green", "blue"))
@@ -109,3 +110,13 @@ def _conditions(children: st.SearchStrategy[Expression]) -> st.SearchStrategy[Ex
 
 
 conditions: st.SearchStrategy[Expression] = st.recursive(_atoms, _conditions, max_leaves=6)
+
+
+def _is_of_the_language(expression: Expression) -> bool:
+    """Whether RoboSC has words for all of it: only automata divide whole numbers."""
+    if isinstance(expression, Binary) and expression.operator in ("div", "mod"):
+        return False
+    return all(_is_of_the_language(item) for item in children(expression))
+
+
+language_conditions = conditions.filter(_is_of_the_language)

@@ -20,6 +20,7 @@ def verify_symbolically(
     system: System,
     added: Mapping[str, Decision],
     *,
+    initial: Decision | None = None,
     limit: int = DEFAULT_WORK,
     engine: str = "auto",
     should_stop: Callable[[], bool] = lambda: False,
@@ -30,6 +31,7 @@ def verify_symbolically(
     Args:
         system: Plants and event conditions.
         added: For each event to which the supervisor adds a condition, that condition.
+        initial: In which of its initial states the supervisor lets the system begin; None: in all of them.
         limit: Nodes of diagrams, each counted whenever it is made, after which nothing more is checked. The same
             work counts alike with every engine.
         engine: `autoref` for decision diagrams in plain Python; else the fastest installed are used.
@@ -42,7 +44,7 @@ def verify_symbolically(
     """
     require_known(system, added)
     try:
-        return _Check(system, added, engine, Work(limit, should_stop, on_progress)).verification()
+        return _Check(system, added, initial, engine, Work(limit, should_stop, on_progress)).verification()
     except TooMuchWorkError:
         skipped = Outcome.NOT_CHECKED
         return Verification(None, None, skipped, skipped, skipped, skipped)
@@ -51,14 +53,19 @@ def verify_symbolically(
 class _Check:
     """One check: its decision diagrams live and end with it."""
 
-    def __init__(self, system: System, added: Mapping[str, Decision], engine: str, work: Work) -> None:
+    def __init__(
+        self, system: System, added: Mapping[str, Decision], initial: Decision | None, engine: str, work: Work
+    ) -> None:
         self._system = system
         self._variables = Variables(system, engine, work)
         relations = Relations(self._variables, dict(added))
         self._invariant = relations.holds(system.invariants)
         self._relations = [relations.relation(event) for event in system.events]
         self._reachability = Reachability(self._variables, self._relations)
-        self._initial = self._variables.initial()
+        self._initial = self._variables.initial() & relations.holds([system.initial])
+        if initial is not None:
+            self._initial = self._initial & self._variables.decision(initial)
+        self._marked = self._variables.marked() & relations.holds([system.marker])
         self._reachable = self._reachability.reachable(self._initial)
 
     def verification(self) -> Verification:
@@ -95,7 +102,7 @@ class _Check:
 
     def _blocking(self) -> Failure | None:
         """A reachable state from which no marked one is reachable."""
-        reaching = self._reachability.reaching(self._variables.marked())
+        reaching = self._reachability.reaching(self._marked)
         blocking = self._reachable & ~reaching
         return self._failure("nonblocking", blocking, "no marked state can be reached")
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from robosc.automata.decision import Decision
 from robosc.automata.state import Subject, subject_type
-from robosc.automata.structure import Assignment, Automaton, Edge, Event
+from robosc.automata.structure import Assignment, Automaton, Edge, Event, Role
 from robosc.expressions import BooleanType, Expression, IntegerType, Value
 from robosc.verification.symbolic.expressions import Expressions
 from robosc.verification.symbolic.variables import Variables, after, cofactors
@@ -89,8 +89,10 @@ class Relations:
         variables, manager = self._variables, self._variables.manager
         automata = [item for item in variables.system.automata if event.name in item.alphabet]
         places = sorted(place for item in automata for place in self._changed(item, event.name))
-        parts = [self._part(item, event.name, set(places)) for item in automata]
-        possible = variables.all_of(part.possible for part in parts) if parts else manager.false
+        plants = [self._part(item, event.name, set(places)) for item in automata if item.role is Role.PLANT]
+        watching = [self._part(item, event.name, set(places)) for item in automata if item.role is Role.REQUIREMENT]
+        parts = [*plants, *watching]
+        possible = variables.all_of(part.possible for part in plants) if plants else manager.false
         data = variables.possible_data(event.name)
         names_of_data = [
             name
@@ -99,13 +101,15 @@ class Relations:
             for name in (*digits.names, *([] if digits.known is None else [digits.known]))
         ]
         leaving = variables.any_of(part.leaves_range for part in parts) & data
-        steps = data if parts else manager.false
+        steps = data if plants else manager.false
         for part in parts:
             steps = variables.work.count(steps & part.steps)
         if names_of_data:
             leaving, steps = manager.exist(names_of_data, leaving), manager.exist(names_of_data, steps)
         leaving = possible & leaving
         conditions = self.holds(item.condition for item in variables.system.conditions if item.event == event.name)
+        # A requirement that has no edge for the event is against it, and stays as it is.
+        conditions = variables.all_of([conditions, *(part.possible for part in watching)])
         added = self._added.get(event.name)
         allowed = manager.true if added is None else variables.work.count(variables.decision(added))
         enabled = possible & ~leaving if event.is_controllable else possible
@@ -142,6 +146,9 @@ class Relations:
                 leaving, updated = self._edge(automaton, edge, own)
                 leaves_range = leaves_range | (taken & leaving)
                 steps = variables.work.count(steps | (taken & updated))
+        if automaton.role is Role.REQUIREMENT:
+            stays = variables.all_of(variables.unchanged(place) for place in sorted(own))
+            steps = variables.work.count(steps | (~possible & stays))
         return _Part(possible, leaves_range, steps)
 
     def _edge(self, automaton: Automaton, edge: Edge, changed: set[int]) -> tuple[Any, Any]:

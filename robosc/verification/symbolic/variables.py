@@ -8,8 +8,7 @@ from typing import Any
 from robosc.automata.compile import State
 from robosc.automata.decision import Decision
 from robosc.automata.inputs import connected_inputs, valuations
-from robosc.automata.semantics import Semantics
-from robosc.automata.state import Subject, subject_domain, subjects
+from robosc.automata.state import Subject, initial_values, subject_domain, subjects
 from robosc.automata.structure import InputVariable, System
 from robosc.expressions import IntegerType, Received, Value, domain, leaves
 from robosc.recursion import allow_depth
@@ -196,8 +195,11 @@ class Variables:
         )
 
     def initial(self) -> Any:
-        """The initial states."""
-        return self.states((Semantics(replace(self.system, events=(), invariants=())).initial,))
+        """Where every place has a value that it may begin with."""
+        return self.all_of(
+            self.any_of(self.has_value(digits, value) for value in values)
+            for digits, values in zip(self.places, initial_values(self.system), strict=True)
+        )
 
     def marked(self) -> Any:
         """Where every automaton is in a marked location."""

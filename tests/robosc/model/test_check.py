@@ -26,7 +26,7 @@ from robosc.expressions.tree import children, leaves
 from robosc.language.words import RESERVED_WORDS
 from robosc.model.structure import ObjectValue, RequirementForm, Update
 from support.models import EXAMPLE_NAMES, checked, example_bundle, example_model, model_of
-from support.random_expressions import conditions
+from support.random_expressions import language_conditions
 
 
 @pytest.mark.parametrize("name", EXAMPLE_NAMES)
@@ -505,7 +505,7 @@ def writable(expression: Expression) -> bool:
 
 
 @settings(max_examples=80, deadline=None)
-@given(conditions)
+@given(language_conditions)
 def test_a_printed_expression_reads_back_as_itself(condition: Expression) -> None:
     if not writable(condition):
         return

@@ -18,8 +18,8 @@ from robosc.expressions import BooleanType, IntegerType, Received
 from robosc.expressions.tree import Binary, Constant, VariableRead
 from robosc.model.structure import Deployment
 from robosc.supervisor.conditions import state_predicate, state_predicates
-from robosc.synthesis import Progress, SynthesisStatus, UnknownEngineError, synthesize
-from robosc.verification import synthesize_explicit
+from robosc.synthesis import Progress, SynthesisResult, SynthesisStatus, UnknownEngineError, synthesize
+from robosc.verification import Outcome, synthesize_explicit, verify, verify_symbolically
 from support.models import EXAMPLE_NAMES, example_model
 from support.random_systems import kind, random_system, wide_system
 
@@ -69,7 +69,20 @@ def agree(system: System) -> str:
     graph = controlled_graph(semantics, added, initial=begins, limit=LIMIT)
     assert graph is not None
     assert set(graph.states) == set(explicit.reachable)
+    assert_verified(system, first)
     return "disables" if disables else "free"
+
+
+def assert_verified(system: System, result: SynthesisResult) -> None:
+    """All four properties hold for the independent verifiers, state by state and on sets of states."""
+    added = state_predicates(system, result.added)
+    initial = None if result.initial is None else state_predicate(system, result.initial)
+    one_by_one = verify(system, added, initial=initial, limit=LIMIT, permissive_limit=LIMIT)
+    checked = (one_by_one.safe, one_by_one.controllable, one_by_one.nonblocking, one_by_one.maximally_permissive)
+    assert set(checked) == {Outcome.PASSED}, one_by_one.message
+    on_sets = verify_symbolically(system, added, initial=initial, limit=10**9)
+    assert {on_sets.safe, on_sets.controllable, on_sets.nonblocking} == {Outcome.PASSED}, on_sets.message
+    assert one_by_one.states == on_sets.states == result.statistics.states
 
 
 @pytest.mark.timeout(300 + EXAMPLES)

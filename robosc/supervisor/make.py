@@ -8,12 +8,13 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
 import msgspec
 
+from robosc import explanation as explanations
 from robosc.automata import System, to_automata
 from robosc.errors import Diagnostic, NodeLimitError, sorted_diagnostics
-from robosc.explanation import EmptyExplanation, explain_empty
 from robosc.model import check
 from robosc.model.layers import layer_findings
 from robosc.model.places import Places
@@ -32,6 +33,9 @@ from robosc.synthesis import (
 )
 from robosc.synthesis import Progress as SynthesisProgress
 from robosc.verification import DEFAULT_STATES, Limits
+
+if TYPE_CHECKING:
+    from robosc.explanation import EmptyExplanation
 
 LIVELOCK_REASON = "no supervisor is made, because silent steps never end (--allow-livelock overrides this)"
 
@@ -77,7 +81,7 @@ class Made:
     diagnostics: tuple[Diagnostic, ...]
     statistics: Statistics | None = None
     reason: str = ""
-    explanation: EmptyExplanation | None = None
+    explanation: "EmptyExplanation | None" = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +166,7 @@ def make_supervisor(
         explanation = None
         # Whatever the limit of nodes, that there is no supervisor is known.
         with suppress(NodeLimitError):
-            explanation = explain_empty(
+            explanation = explanations.explain_empty(
                 model,
                 places,
                 system,

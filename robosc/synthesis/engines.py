@@ -8,7 +8,6 @@ import importlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib.metadata import entry_points
 from typing import Any, Protocol
 
 from robosc.errors import NodeLimitError, RoboscError
@@ -107,6 +106,8 @@ def register(name: str, factory: Callable[[], Manager]) -> None:
 
 def engine_names() -> tuple[str, ...]:
     """Every engine that is known."""
+    from importlib.metadata import entry_points
+
     return tuple(sorted({*_FACTORIES, *(point.name for point in entry_points(group=ENTRY_POINTS))}))
 
 
@@ -134,6 +135,8 @@ def make_manager(name: str) -> Manager:
     """
     if name in _FACTORIES:
         return _FACTORIES[name]()
+    from importlib.metadata import entry_points
+
     point = next(iter(entry_points(group=ENTRY_POINTS, name=name)))
     try:
         factory: Callable[[], Manager] = point.load()

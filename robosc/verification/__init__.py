@@ -5,7 +5,6 @@ Shares nothing with synthesis but the automata and their explicit meaning (an im
 
 from robosc.verification.explicit import ExplicitSupervisor, synthesize_explicit
 from robosc.verification.judge import DEFAULT_STATES, Judgement, Limits, judge
-from robosc.verification.symbolic import verify_symbolically
 from robosc.verification.verify import Failure, Outcome, Verification, verify
 
 __all__ = [
@@ -19,5 +18,4 @@ __all__ = [
     "judge",
     "synthesize_explicit",
     "verify",
-    "verify_symbolically",
 ]

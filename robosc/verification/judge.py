@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from robosc.automata.controlled import TRANSITIONS_PER_STATE
 from robosc.automata.decision import Decision
 from robosc.automata.structure import System
-from robosc.verification.symbolic import verify_symbolically
 from robosc.verification.verify import Outcome, Verification, verify
 
 DEFAULT_STATES = 200_000
@@ -86,6 +85,9 @@ def judge(
         reason = f"more than {limits.states} states, or {TRANSITIONS_PER_STATE * limits.states} transitions"
     else:
         reason = f"more than {limits.states} states"
+    # Most systems are small: who only searches them one by one need not load what works on sets of states.
+    from robosc.verification.symbolic import verify_symbolically
+
     found = verify_symbolically(
         system, added, limit=limits.work, engine=engine, should_stop=should_stop, on_progress=on_progress
     )

@@ -9,6 +9,7 @@ import resource
 import subprocess
 import sys
 import time
+from math import log
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -18,7 +19,7 @@ from figures import text_table
 LIMIT_S = 60.0
 
 SIZES: dict[str, tuple[int, ...]] = {
-    "dining philosophers": (5, 10, 20, 50, 100),
+    "dining philosophers": (5, 10, 20, 50, 100, 200),
     "transfer line": (1, 2, 4, 8, 12),
     "token ring": (5, 20, 60, 200),
     "cat and mouse, 1 pair": (1, 3, 5),
@@ -27,7 +28,7 @@ SIZES: dict[str, tuple[int, ...]] = {
     "random robot": (5, 20, 40, 60),
 }
 
-HEADER = ("family, size", "engine", "states", "rounds", "peak nodes", "adds to", "time, s", "memory, MB")
+HEADER = ("family, size", "engine", "states", "rounds", "peak nodes", "adds to", "time, s", "grows as", "memory, MB")
 
 
 def measured(family: str, size: int, engine: str) -> dict[str, object]:
@@ -53,8 +54,15 @@ def measured(family: str, size: int, engine: str) -> dict[str, object]:
     }
 
 
-def _row(family: str, size: int, engine: str) -> list[str] | None:
-    """One line of the table, or None where the limit has passed."""
+def _row(family: str, size: int, engine: str, before: tuple[int, float] | None) -> tuple[list[str], float] | None:
+    """One line of the table and its time, or None where the limit has passed.
+
+    Args:
+        family: Name of the family.
+        size: Its size.
+        engine: Engine of the synthesis.
+        before: The size and time of the line before: the exponent of the growth since then is told.
+    """
     done = subprocess.run(
         [sys.executable, __file__, family, str(size), engine],
         capture_output=True,
@@ -67,7 +75,9 @@ def _row(family: str, size: int, engine: str) -> list[str] | None:
         return None
     states = found["states"] if len(found["states"]) < 10 else f"{float(found['states']):.2e}"
     figures = (states, f"{found['rounds']}", f"{found['peak_nodes']:,}", f"{found['added']}")
-    return [f"{family}, {size}", engine, *figures, f"{found['seconds']:.3f}", f"{found['memory_kib'] / 1024:.0f}"]
+    seconds, memory = found["seconds"], f"{found['memory_kib'] / 1024:.0f}"
+    growth = f"n^{log(seconds / before[1]) / log(size / before[0]):.1f}" if before else ""
+    return [f"{family}, {size}", engine, *figures, f"{seconds:.3f}", growth, memory], seconds
 
 
 def table() -> str:
@@ -75,12 +85,16 @@ def table() -> str:
     rows = []
     for family, sizes in SIZES.items():
         engines = ["cudd", "autoref"]
+        last: dict[str, tuple[int, float]] = {}
         for size in sizes:
             for engine in tuple(engines):
-                row = _row(family, size, engine)
-                if row is None:
+                measured_row = _row(family, size, engine, last.get(engine))
+                if measured_row is None:
                     engines.remove(engine)
-                    row = [f"{family}, {size}", engine, *[""] * 4, f"> {LIMIT_S:.0f}", ""]
+                    rows.append([f"{family}, {size}", engine, *[""] * 4, f"> {LIMIT_S:.0f}", "", ""])
+                    continue
+                row, seconds = measured_row
+                last[engine] = (size, seconds)
                 rows.append(row)
     return text_table("synthesis: families of growing size, whole process's memory", HEADER, rows)
 

@@ -19,7 +19,8 @@ from robosc.expressions.tree import Binary, Constant, VariableRead
 from robosc.model.structure import Deployment
 from robosc.supervisor.conditions import state_predicate, state_predicates
 from robosc.synthesis import Progress, SynthesisResult, SynthesisStatus, UnknownEngineError, synthesize
-from robosc.verification import Outcome, synthesize_explicit, verify, verify_symbolically
+from robosc.verification import Outcome, synthesize_explicit, verify
+from robosc.verification.symbolic import verify_symbolically
 from support.models import EXAMPLE_NAMES, example_model
 from support.random_systems import kind, random_system, wide_system
 

@@ -15,7 +15,8 @@ from robosc.expressions import Binary, BooleanType, Call, Conditional, IntegerTy
 from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.structure import AddedCondition, DecisionDiagram
 from robosc.synthesis import SynthesisStatus, synthesize
-from robosc.verification import Outcome, Verification, verify, verify_symbolically
+from robosc.verification import Outcome, Verification, verify
+from robosc.verification.symbolic import verify_symbolically
 from robosc.verification.symbolic.order import cuthill_mckee, place_order
 from robosc.verification.symbolic.reach import Reachability
 from robosc.verification.symbolic.work import TooMuchWorkError, Work

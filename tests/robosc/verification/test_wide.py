@@ -7,7 +7,8 @@ from robosc.automata import System
 from robosc.automata.decision import Decision
 from robosc.supervisor.conditions import state_predicate, state_predicates
 from robosc.synthesis import SynthesisStatus, synthesize
-from robosc.verification import Outcome, Verification, synthesize_explicit, verify, verify_symbolically
+from robosc.verification import Outcome, Verification, synthesize_explicit, verify
+from robosc.verification.symbolic import verify_symbolically
 from support.random_systems import wide_system
 from support.systems import automaton, system
 

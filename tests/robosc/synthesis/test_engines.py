@@ -54,7 +54,7 @@ def offer(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
     def found(*, group: str, name: str | None = None) -> list[EntryPoint]:
         return [point] if group == module.ENTRY_POINTS and name in (None, "foreign") else []
 
-    monkeypatch.setattr(module, "entry_points", found)
+    monkeypatch.setattr("importlib.metadata.entry_points", found)
 
 
 def test_an_engine_of_another_package_is_found(monkeypatch: pytest.MonkeyPatch) -> None:

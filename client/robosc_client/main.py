@@ -20,7 +20,7 @@ from robosc.cli.arguments import (
 from robosc.cli.check import report_check
 from robosc.cli.generate import add_generate_arguments, report_generated
 from robosc.cli.main import guarded
-from robosc.cli.output import ExitCode, ProgressLine
+from robosc.cli.output import ExitCode, ProgressLine, require_other_file
 from robosc.cli.synth import add_output_argument, report_synthesis
 from robosc.errors import InvalidSupervisorError, LanguageError, UnsupportedModelError
 from robosc.model.structure import Deployment
@@ -131,6 +131,7 @@ def _check(arguments: argparse.Namespace, client: Client) -> int:
 
 
 def _synth(arguments: argparse.Namespace, client: Client) -> int:
+    require_other_file(arguments.output, arguments.model)
     bundle = read_bundle(arguments)
     line = ProgressLine()
     try:

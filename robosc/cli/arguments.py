@@ -53,13 +53,18 @@ def add_deployment_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def add_engine_argument(parser: argparse.ArgumentParser) -> None:
-    """The engine for decision diagrams, and how it works."""
+    """The engine for decision diagrams."""
     parser.add_argument(
         "--engine",
         default="auto",
         metavar="NAME",
         help="engine for decision diagrams: cudd, autoref (plain Python), or auto: the fastest installed (the default)",
     )
+
+
+def add_engine_options(parser: argparse.ArgumentParser) -> None:
+    """The engine for decision diagrams, and how it works on this machine."""
+    add_engine_argument(parser)
     parser.add_argument(
         "--reorder",
         action="store_true",
@@ -85,7 +90,7 @@ def _positive(text: str) -> int:
 
 
 def engine_options(arguments: argparse.Namespace) -> "EngineOptions":
-    """What `add_engine_argument` has read."""
+    """What `add_engine_options` has read."""
     from robosc.synthesis import EngineOptions
 
     return EngineOptions(arguments.engine or "auto", arguments.reorder, arguments.max_nodes)

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from robosc.cli import synth
-from robosc.cli.arguments import add_deployment_argument, add_engine_argument, add_model_arguments, read_bundle
+from robosc.cli.arguments import add_deployment_argument, add_engine_options, add_model_arguments, read_bundle
 from robosc.cli.output import (
     ExitCode,
     UsageError,
@@ -42,7 +42,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "requirements that never restrict, requests that compete",
     )
     add_deployment_argument(parser)
-    add_engine_argument(parser)
+    add_engine_options(parser)
     # Not given, they are told from given without a synthesis, where they would mean nothing.
     parser.set_defaults(run=run, deployment=None, engine=None)
 

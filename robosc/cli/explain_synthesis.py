@@ -6,7 +6,7 @@ import sys
 from robosc.cli import synth
 from robosc.cli.arguments import (
     add_deployment_argument,
-    add_engine_argument,
+    add_engine_options,
     add_model_arguments,
     engine_options,
     read_bundle,
@@ -51,7 +51,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "--after", metavar="EVENTS", help="explain what can happen after this run: events separated by commas"
     )
     add_deployment_argument(parser)
-    add_engine_argument(parser)
+    add_engine_options(parser)
     parser.set_defaults(run=run)
 
 

@@ -4,7 +4,7 @@ import argparse
 import sys
 
 from robosc.cli import synth
-from robosc.cli.arguments import add_deployment_argument, add_engine_argument, add_model_arguments, read_bundle
+from robosc.cli.arguments import add_deployment_argument, add_engine_options, add_model_arguments, read_bundle
 from robosc.cli.output import ExitCode, diagnostics_json, print_json
 
 DEFAULT_LIMIT = 100_000
@@ -37,7 +37,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="give up beyond N states (default: %(default)s)",
     )
     add_deployment_argument(parser)
-    add_engine_argument(parser)
+    add_engine_options(parser)
     parser.set_defaults(run=run)
 
 

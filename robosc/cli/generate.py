@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from robosc.cli import synth
 from robosc.cli.arguments import (
     add_deployment_argument,
-    add_engine_argument,
+    add_engine_options,
     add_livelock_argument,
     add_model_arguments,
     read_bundle,
@@ -42,7 +42,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     add_model_arguments(parser)
     add_generate_arguments(parser)
     add_deployment_argument(parser)
-    add_engine_argument(parser)
+    add_engine_options(parser)
     add_livelock_argument(parser)
     parser.set_defaults(run=run)
 

@@ -89,6 +89,16 @@ def has_errors(diagnostics: Sequence[Diagnostic], *, strict: bool = False) -> bo
     return any(diagnostic.severity in grave for diagnostic in diagnostics)
 
 
+def require_other_file(output: Path | None, model: Path) -> None:
+    """Do nothing if what is written does not replace the model.
+
+    Raises:
+        UsageError: It would.
+    """
+    if output is not None and output.exists() and model.exists() and output.samefile(model):
+        raise UsageError(f"{output} is the model itself: write to another file")
+
+
 def write_bytes(path: Path, content: bytes) -> None:
     """Write a result file whole or not at all; what is no plain file (a device, a pipe) is written to as it is.
 

@@ -8,14 +8,22 @@ from typing import TYPE_CHECKING, Protocol
 from robosc.cli.arguments import (
     SYNTHESIS_STATES,
     add_deployment_argument,
-    add_engine_argument,
+    add_engine_options,
     add_livelock_argument,
     add_model_arguments,
     add_verify_limit_argument,
     engine_options,
     read_bundle,
 )
-from robosc.cli.output import ExitCode, ProgressLine, diagnostics_json, print_diagnostics, print_json, write_bytes
+from robosc.cli.output import (
+    ExitCode,
+    ProgressLine,
+    diagnostics_json,
+    print_diagnostics,
+    print_json,
+    require_other_file,
+    write_bytes,
+)
 from robosc.model.structure import Deployment
 from robosc.source import Bundle
 
@@ -46,7 +54,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     add_model_arguments(parser)
     add_output_argument(parser)
     add_deployment_argument(parser)
-    add_engine_argument(parser)
+    add_engine_options(parser)
     add_verify_limit_argument(parser, "--verify-limit", SYNTHESIS_STATES)
     add_livelock_argument(parser)
     parser.set_defaults(run=run)
@@ -59,6 +67,7 @@ def add_output_argument(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Synthesize; 0 with a supervisor, 1 without."""
+    require_other_file(arguments.output, arguments.model)
     bundle = read_bundle(arguments)
     allow_livelock, verify_limit = arguments.allow_livelock, arguments.verify_limit
     made = make(arguments, bundle, allow_livelock=allow_livelock, verify_limit=verify_limit)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robosc.cli import properties
-from robosc.cli.arguments import add_engine_argument, add_model_arguments, add_verify_limit_argument, read_bundle
+from robosc.cli.arguments import add_engine_options, add_model_arguments, add_verify_limit_argument, read_bundle
 from robosc.cli.output import (
     ExitCode,
     ProgressLine,
@@ -58,9 +58,9 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="refuse a supervisor made for another deployment (default: as the file says; without a file: controller)",
     )
     add_verify_limit_argument(parser, "--limit", FOREIGN_STATES)
-    parser.add_argument("--strict", action="store_true", help="what could not be checked counts as failed")
+    parser.add_argument("--strict", action="store_true", help="permissiveness must have been checked, too")
     parser.add_argument("-q", "--quiet", action="store_true", help="print what is wrong and nothing else")
-    add_engine_argument(parser)
+    add_engine_options(parser)
     parser.set_defaults(run=run)
 
 
@@ -71,6 +71,8 @@ def run(arguments: argparse.Namespace) -> int:
         UsageError: A file is not there or cannot be read, or there is nothing to check.
     """
     has_properties = bool(arguments.property or arguments.properties)
+    if arguments.supervisor is None and arguments.model.suffix == ".rsup":
+        raise UsageError(f"{arguments.model} is a supervisor file: verify needs its model, too")
     if arguments.supervisor is not None:
         if not has_properties and (arguments.reorder or arguments.max_nodes):
             raise UsageError("--reorder and --max-nodes are for properties: they need --property or --properties")
@@ -111,7 +113,7 @@ def _verify_supervisor(arguments: argparse.Namespace) -> int:
         )
     finally:
         progress.clear()
-    has_passed = found.judgement is not None and not found.faults and not (arguments.strict and found.unchecked())
+    has_passed = found.has_passed and not (arguments.strict and found.unchecked())
     if has_passed and (arguments.property or arguments.properties):
         # Of a supervisor that passed only the verdicts are asked for.
         return properties.verify(arguments, supervisor)
@@ -148,7 +150,7 @@ def _report_malformed(arguments: argparse.Namespace, error: InvalidSupervisorErr
 def _document(found: "Recheck", supervisor: "Supervisor", *, has_passed: bool) -> dict[str, object]:
     judgement = found.judgement
     return {
-        "status": "passed" if has_passed else "failed",
+        "status": "passed" if has_passed else "failed" if found.faults or found.diagnostics else "not checked",
         "model": supervisor.model.name,
         "deployment": str(supervisor.deployment),
         "checks": {name: str(outcome) for name, outcome in found.outcomes().items()},
@@ -186,7 +188,7 @@ def _print_report(
     elif found.faults:
         lines.append(f"{arguments.supervisor}: failed: no right supervisor of {arguments.model}")
     elif not has_passed:
-        lines.append(f"{arguments.supervisor}: failed: not checked: {', '.join(unchecked)}")
+        lines.append(f"{arguments.supervisor}: not checked: {', '.join(unchecked)}")
     else:
         lines.append(f"{arguments.supervisor}: passed: a right supervisor of {arguments.model}")
     if not found.diagnostics and not arguments.quiet:

@@ -10,7 +10,6 @@ nonblocking and closed under uncontrollable events, so the state were good.
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from itertools import pairwise
 from typing import Any
 
 from robosc.automata.compile import State
@@ -18,6 +17,8 @@ from robosc.automata.state import subjects
 from robosc.errors import InternalError
 from robosc.explanation.obstacles import Obstacle, ObstacleKind
 from robosc.explanation.problems import Problems
+from robosc.model.structure import is_tau
+from robosc.synthesis.closure import Closure, Step
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.fixed_point import allowed, marked_states
 from robosc.synthesis.runs import Run, ShortestRuns
@@ -174,6 +175,10 @@ class Analysis:
         steps = self._steps[event]
         return good & steps.plant & allowed(steps, good)
 
+    def moving(self, event: str) -> Any:
+        """Where an event is more than a silent step that changes nothing, which is never taken."""
+        return self._steps[event].moving() if is_tau(event) else self._manager.true
+
     def hindrances(self, event: str, states: Any, good: Any | None = None) -> tuple[Hindrance, ...]:
         """What keeps an event from happening in some of the states, whatever else does.
 
@@ -280,23 +285,56 @@ class Analysis:
             )
         )
 
-    def detour(self, start: Any, goal: Any, good: Any) -> Detour | None:
-        """A shortest run of the plants alone from some states to a goal, and where it is stopped; None without any.
+    def detour(self, start: Any, goal: Any, good: Any, inside: Any | None = None) -> Detour | None:
+        """A way to a goal that the plants alone would have, and where it is stopped; None without any.
 
-        No run that stays in good states may lead there.
+        What is allowed leads on as far as it can, and only from there the plants alone: the event that is told is one
+        that no other way avoids.
+
+        Args:
+            start: Where the way begins.
+            goal: Where it leads to; what is allowed does not.
+            good: The states that must not be left.
+            inside: What can be reached by what is allowed, if that is known.
         """
-        possible = {steps.event.name: steps.plant for steps in self._free.steps}
-        steps = {item.event.name: item for item in self._free.steps}
-        runs = ShortestRuns(self._encoding, self._watch, tuple(steps.values()), possible, start)
-        run = runs.run_to(goal)
-        if run is None:
+        if inside is None:
+            inside = self._reachable_inside(start, good)
+        # Under the requirements first: what synthesis keeps from happening is told before what is forbidden anyhow.
+        steps = self._steps
+        possible = {name: item.plant & self._restricted(item) for name, item in steps.items()}
+        beyond = self._way(steps, possible, inside, goal)
+        if beyond is None:
+            steps = {item.event.name: item for item in self._free.steps}
+            possible = {name: item.plant for name, item in steps.items()}
+            beyond = self._way(steps, possible, inside, goal)
+        if beyond is None:
             return None
-        for place, (event, (before, after)) in enumerate(zip(run.events, pairwise(run.states), strict=True)):
-            here, there = self.predicate(before), self.predicate(after)
-            is_allowed = here & self.possible(event, good) & self._steps[event].some(there & good)
-            if is_allowed == self._manager.false:
-                return Detour(run.events, place, before, self.hindrances(event, here, good))
-        raise InternalError("a run is stopped nowhere that must be")
+        event, there = beyond.events[0], self.predicate(beyond.states[1])
+        # A shortest way out leaves at once what is allowed, from any of these states.
+        leaving = inside & possible[event] & steps[event].some(there)
+        before = self.runs(start, {name: self.possible(name, good) for name in self._steps}).run_to(leaving)
+        if before is None:
+            raise InternalError("what can be reached is not reached")
+        here = self.predicate(before.states[-1])
+        return Detour(
+            (*before.events, *beyond.events),
+            len(before.events),
+            before.states[-1],
+            self.hindrances(event, here, good),
+        )
+
+    def _way(self, steps: Mapping[str, Steps], possible: Mapping[str, Any], start: Any, goal: Any) -> Run | None:
+        return ShortestRuns(self._encoding, self._watch, tuple(steps.values()), possible, start).run_to(goal)
+
+    def _reachable_inside(self, start: Any, good: Any) -> Any:
+        """What is reached from some states by what is allowed, without leaving good ones."""
+
+        def onwards(steps: Steps) -> Step:
+            possible = self.possible(steps.event.name, good)
+            return Step(lambda states: steps.image(states & possible) & good, steps.names)
+
+        closure = Closure([onwards(steps) for steps in self._problem.steps], self._encoding.state_names, self._watch)
+        return closure.of(start, "reachability")
 
     def predicate(self, state: State) -> Any:
         """Where the state is this one."""

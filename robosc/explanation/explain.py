@@ -9,7 +9,7 @@ from typing import Any
 from robosc.automata.state import subjects
 from robosc.automata.structure import System
 from robosc.errors import Diagnostic, InternalError
-from robosc.explanation.analysis import Analysis, Hindrance, HindranceKind
+from robosc.explanation.analysis import Analysis, Detour, Hindrance, HindranceKind
 from robosc.explanation.blame import explain_lost
 from robosc.explanation.conflict import minimal_conflict
 from robosc.explanation.obstacles import obstacles_of
@@ -20,7 +20,7 @@ from robosc.explanation.structure import EventHere, EventReport, Explanation, Re
 from robosc.explanation.terms import Terms
 from robosc.explanation.words import events_text
 from robosc.model.places import Places
-from robosc.model.structure import Deployment, Model
+from robosc.model.structure import Deployment, EventKind, Model
 from robosc.source import visible
 from robosc.synthesis.controlled import ControlledSystem
 from robosc.synthesis.encoding import Encoding
@@ -109,7 +109,7 @@ def explain_synthesis(
                 fitting = explainer.after(run)
             if condition is not None:
                 fitting = explainer.fitting(fitting, Symbols(encoding).holds(condition), str(state))
-            return Explanation(state=explainer.state(fitting, name))
+            return Explanation(state=explainer.state(fitting, name, run))
         if name is not None:
             return Explanation(events=(explainer.event(name, has_behaviours=True),))
         controlled = ControlledSystem(encoding, watch, problem, good.states, reachable)
@@ -160,6 +160,9 @@ class _Explainer:
             raise InternalError("a state of the controlled system is not reachable")
         return run
 
+    def _detour(self, goal: Any) -> Detour | None:
+        return self._analysis.detour(self._initial, goal, self._analysis.good, self._reachable)
+
     # Events
 
     def event(self, event: str, *, has_behaviours: bool = False) -> EventReport:
@@ -176,7 +179,7 @@ class _Explainer:
             found = self._decisive(event, found, wanted)
         stopped = None
         if is_never and wanted == self._false:
-            detour = self._analysis.detour(self._initial, self._analysis.wanted(event), self._analysis.good)
+            detour = self._detour(self._analysis.wanted(event))
             stopped = None if detour is None else self._reporter.stopped(detour, self._analysis.good)
         return EventReport(
             event=event,
@@ -237,9 +240,7 @@ class _Explainer:
         if found != self._false:
             return found
         problem = f"the controlled system is never in a state that fits '{visible(text[:MAXIMUM_SHOWN])}'"
-        detour = (
-            self._analysis.detour(self._initial, condition, self._analysis.good) if states == self._reachable else None
-        )
+        detour = self._detour(condition) if states == self._reachable else None
         if detour is not None:
             stopped = self._reporter.stopped(detour, self._analysis.good)
             event = stopped.events[stopped.stopped_at]
@@ -249,12 +250,21 @@ class _Explainer:
             )
         raise RequestError(problem)
 
-    def state(self, states: Any, event: str | None) -> StateReport:
-        """What can happen in one of some states; where an event is asked for, rather where it cannot."""
+    def state(self, states: Any, event: str | None, after: tuple[str, ...] | None = None) -> StateReport:
+        """What can happen in one of some states; where an event is asked for, rather where it cannot.
+
+        Args:
+            states: The states.
+            event: The event, or None for all.
+            after: The run that led there, if one was asked for; else a shortest one is told.
+        """
         chosen = states
         if event is not None and states & ~self._possible[event] != self._false:
             chosen = states & ~self._possible[event]
         run = self._run_to(chosen)
+        if after is not None:
+            # Only the state after it is told, so the states on its way need not be found.
+            run = Run(after, (run.states[-1],), is_shortest=len(after) == len(run.events) and run.is_shortest)
         here = self._analysis.predicate(run.states[-1])
         names = [item.name for item in self._system.events] if event is None else [event]
         return StateReport(
@@ -283,7 +293,7 @@ class _Explainer:
                 goal = self._encoding.in_location(component.name, location.name)
                 if goal & self._reachable != self._false:
                     continue
-                detour = self._analysis.detour(self._initial, goal, self._analysis.good)
+                detour = self._detour(goal)
                 yield Remark(
                     "unreachable-state",
                     f"{component.name} never gets to '{location.name}'"
@@ -294,9 +304,14 @@ class _Explainer:
 
     def left_to_the_environment(self) -> Iterator[Remark]:
         """States from which no controllable event can move on, by the states of components and communications."""
+        # An action's cancel is the executor's own in the layer, too, where the caller may cancel as well; and a step
+        # that changes nothing is none.
+        own = [event.is_controllable or event.name.endswith(f".{EventKind.CANCEL}") for event in self._system.events]
         controllable, uncontrollable = (
             self._encoding.any_of(
-                self._possible[event.name] for event in self._system.events if event.is_controllable is kind
+                self._possible[event.name] & self._analysis.moving(event.name)
+                for event, is_own in zip(self._system.events, own, strict=True)
+                if is_own is kind
             )
             for kind in (True, False)
         )

@@ -147,7 +147,7 @@ def _event(item: EventReport) -> Iterator[str]:
     for reason in item.reasons:
         yield from _indented(_reason(reason))
     if item.stopped is not None:
-        yield from _indented(_stopped(item.stopped, "the shortest way that the behaviours would have to it is"))
+        yield from _indented(_stopped(item.stopped, "the behaviours would have the way"))
 
 
 def _state_report(item: StateReport) -> Iterator[str]:
@@ -172,7 +172,7 @@ def _remark(item: Remark) -> Iterator[str]:
     if item.way is not None:
         yield f"  {_state(item.way.state)}"
     if item.stopped is not None:
-        yield from _indented(_stopped(item.stopped, "the shortest way that the behaviours would have there is"))
+        yield from _indented(_stopped(item.stopped, "the behaviours would have the way"))
 
 
 def _indented(lines: Iterator[str]) -> Iterator[str]:

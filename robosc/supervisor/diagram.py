@@ -2,6 +2,7 @@
 
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
+from graphlib import CycleError, TopologicalSorter
 from typing import overload
 
 from robosc.automata.structure import System
@@ -87,3 +88,23 @@ def validate(diagram: DecisionDiagram, domains: Domains) -> None:
             raise ValueError(f"node {number} has a child that does not stand before it")
     if diagram.root >= len(diagram.nodes) + 2:
         raise ValueError("the root is no node")
+    _require_order(diagram)
+
+
+def _require_order(diagram: DecisionDiagram) -> None:
+    """Check that there is an order of places in which every path tests them, each at most once.
+
+    So a path is no longer than there are places, whoever wrote the diagram.
+
+    Raises:
+        ValueError: There is none.
+    """
+    places = [(node.automaton, node.variable) for node in diagram.nodes]
+    sorter = TopologicalSorter[Subject]()
+    for place, node in zip(places, diagram.nodes, strict=True):
+        sorter.add(place, *(places[child - 2] for child in node.children if child > 1))
+    try:
+        sorter.prepare()
+    except CycleError as error:
+        name = ".".join(part for part in error.args[1][0] if part is not None)
+        raise ValueError(f"'{name}' is tested before and after something else, or twice, on one path") from None

@@ -18,10 +18,11 @@ from robosc.expressions import Value
 from robosc.model import check
 from robosc.model.layers import layer_findings
 from robosc.model.structure import CommunicationKind, Deployment, Model
+from robosc.properties import check_controller
 from robosc.source import Bundle
 from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.differences import model_differences
-from robosc.supervisor.structure import Certificate, Supervisor
+from robosc.supervisor.structure import Certificate, ControllerProperties, Supervisor
 from robosc.verification import Judgement, Limits, Outcome, Verification, judge
 
 PROPERTIES = ("safe", "controllable", "nonblocking", "maximally_permissive")
@@ -96,6 +97,11 @@ class Recheck:
         found["certificate"] = Outcome.FAILED if "certificate" in faulty else Outcome.PASSED
         return found | {name: getattr(self.judgement.verification, name) for name in PROPERTIES}
 
+    @property
+    def has_passed(self) -> bool:
+        """Whether it is safe, controllable and nonblocking for certain, and nothing is wrong with it."""
+        return not self.faults and self.judgement is not None and self.judgement.is_complete
+
     def unchecked(self) -> tuple[str, ...]:
         """What was not checked."""
         return tuple(name for name, outcome in self.outcomes().items() if outcome is Outcome.NOT_CHECKED)
@@ -141,17 +147,36 @@ def recheck(
     if faults:
         return Recheck((), tuple(faults), notes, None)
     system = to_automata(checked.model, supervisor.deployment)
-    judgement = judge(
-        system,
-        state_predicates(system, supervisor.added),
-        limits,
-        expected_states=int(supervisor.certificate.states),
-        engine=engine,
-        should_stop=should_stop,
-        on_progress=on_progress,
-    )
+
+    def judged(expected_states: int) -> Judgement:
+        return judge(
+            system,
+            state_predicates(system, supervisor.added),
+            limits,
+            expected_states=expected_states,
+            engine=engine,
+            should_stop=should_stop,
+            on_progress=on_progress,
+        )
+
+    # What the file says of its size decides only what is tried first: a false figure must not prevent the search.
+    told = int(supervisor.certificate.states)
+    judgement = judged(told)
+    if told > limits.states and not judgement.is_complete:
+        judgement = judged(0)
     found = judgement.verification
     faults += [Fault("certificate", text) for text in _false_claims(supervisor.certificate, found)]
+    claimed = supervisor.certificate.controller
+    if claimed is not None:
+        properties = check_controller(
+            checked.model,
+            supervisor.deployment,
+            supervisor.added,
+            is_nonblocking=found.nonblocking is Outcome.PASSED,
+            states=found.states or told,
+            should_stop=should_stop,
+        ).certified()
+        faults += [Fault("certificate", text) for text in _false_properties(claimed, properties)]
     faults += [
         Fault(
             item.property.replace(" ", "_"),
@@ -190,6 +215,15 @@ def _false_claims(certificate: Certificate, found: Verification) -> list[str]:
         if getattr(certificate, name) == "passed" and getattr(found, name) is Outcome.FAILED:
             claims.append(f"it says '{name.replace('_', ' ')}: passed', which is false")
     return claims
+
+
+def _false_properties(told: ControllerProperties, found: ControllerProperties) -> list[str]:
+    """What a certificate says of the controller and is not so."""
+    return [
+        f"it says '{name.replace('_', ' ')} of the controller: passed', which is false"
+        for name in ("finite_response", "confluence", "nonblocking")
+        if getattr(told, name) == "passed" and getattr(found, name) == "failed"
+    ]
 
 
 def _beliefs(certificate: Certificate, found: Verification) -> list[str]:

@@ -80,6 +80,8 @@ class FixedPoint:
     def good_states(self, problem: Problem, known: Any) -> GoodStates:
         """The states from which a supervisor can solve a problem; `known` ones are told beforehand to be such."""
         good, rounds = problem.safe, 0
+        if self.initial == self._encoding.manager.false:
+            return GoodStates(good, rounds, "there is no initial state")
         if self._is_lost(good):
             return GoodStates(good, rounds, "the initial state is against a state invariant")
         for steps in problem.steps:

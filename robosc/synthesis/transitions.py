@@ -245,6 +245,14 @@ class Steps:
         other.condition = condition & self._transition.watched
         return other
 
+    def moving(self) -> Any:
+        """Where the event can lead to another state than the one it happens in."""
+        manager = self._manager
+        found = manager.false
+        for name, function in self._transition.functions.items():
+            found = found | manager.ite(manager.var(name), ~function, function)
+        return self._without_hidden(self._in_range & found)
+
     def some(self, predicate: Any) -> Any:
         """Where the event can lead into a predicate."""
         return self._without_hidden(self._in_range & self._after(predicate))

@@ -44,6 +44,12 @@ class Judgement:
     verification: Verification
     method: str
 
+    @property
+    def is_complete(self) -> bool:
+        """Whether all was checked but permissiveness."""
+        found = self.verification
+        return Outcome.NOT_CHECKED not in (found.safe, found.controllable, found.nonblocking)
+
 
 def judge(
     system: System,
@@ -62,7 +68,7 @@ def judge(
         added: For each event to which the supervisor adds a condition, that condition.
         limits: How far to go.
         expected_states: States that the controlled system is said to have: where these are too many, the search one
-            by one is not even begun. Nothing else depends on it.
+            by one is not even begun.
         engine: Engine of the symbolic search: see `verify_symbolically`.
         should_stop: Asked now and then; once true, the work ends.
         on_progress: Told now and then where the work is, in one short line.

@@ -255,7 +255,11 @@ class Variables:
             digits = self.places[node.place]
             branches = [made[child] for child in node.children]
             self.work.spend(len(branches))
-            made.append(self._by_ranges(digits.names, node.starts, branches))
+            found = self._by_ranges(digits.names, node.starts, branches)
+            # In another order of variables a small diagram can become a large one; an honest one hardly does.
+            if found.dag_size > 4 * len(made) * len(digits.names):
+                self.work.count(found)
+            made.append(found)
         return made[decision.root]
 
     def _by_ranges(self, names: Sequence[str], starts: Sequence[int], branches: Sequence[Any]) -> Any:

@@ -75,12 +75,77 @@ def test_json(capsys: pytest.CaptureFixture[str], right: str, wrong: str) -> Non
 
 def test_what_is_not_checked_is_said_and_counts_where_it_is_to(capsys: pytest.CaptureFixture[str], right: str) -> None:
     capsys.readouterr()
-    assert main(["verify", right, NAVIGATION, "--limit", "0"]) == 0
+    assert main(["verify", right, NAVIGATION, "--limit", "0"]) == 1
     out = capsys.readouterr().out
+    assert out.startswith(f"{right}: not checked: safe, controllable, nonblocking, maximally permissive\n")
     assert "  safe                  not checked" in out
     assert "note: the certificate says 'passed' for what was not checked here: safe, controllable" in out
     assert main(["verify", right, NAVIGATION, "--limit", "0", "--strict"]) == 1
-    assert "failed: not checked: safe, controllable, nonblocking, maximally permissive" in capsys.readouterr().out
+    assert "not checked: safe, controllable, nonblocking, maximally permissive" in capsys.readouterr().out
+    assert _json(capsys, right, NAVIGATION, "--limit", "0")[1]["status"] == "not checked"
+
+
+def test_a_supervisor_without_its_model_is_wrong_use(capsys: pytest.CaptureFixture[str], right: str) -> None:
+    assert main(["verify", right]) == 2
+    assert main(["verify", right, "--property", "AG true"]) == 2
+    assert capsys.readouterr().err.count("verify needs its model, too") == 2
+
+
+WIDE = """robot Wide {
+    component A {
+        incoming message up with identifier: "/up", type: none
+        incoming message down with identifier: "/down", type: none
+        outgoing message got with identifier: "/got", type: none
+        behaviour {
+            variable n: integer(0..1000) = 5
+            variable m: integer(0..1000) = 9
+            initial marked state a { on request to up goto b on response from got }
+            state b { on request to down goto a on response from got goto c }
+            state c { on request to down goto a }
+        }
+    }
+    requirement never A.c and A.n < A.m
+    requirement up needs A.n < A.m
+}
+"""
+
+
+def test_a_false_figure_does_not_prevent_the_search(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """The symbolic verifier gives up on comparing two wide integers, and the file says it is too large to search."""
+    model, right, bad = (tmp_path / name for name in ("wide.rscd", "right.rsup", "bad.rsup"))
+    model.write_text(WIDE, encoding="utf-8")
+    assert main(["synth", str(model), "-o", str(right)]) == 0
+    document = json.loads(right.read_bytes())
+    supervisor = document["supervisor"]
+    assert supervisor["added"]
+    supervisor["added"] = []
+    supervisor["certificate"] |= {"states": "9" * 9, "transitions": None}
+    bad.write_text(json.dumps(document), encoding="utf-8")
+    status, told = _json(capsys, str(bad), str(model))
+    assert (status, told["status"], told["checks"]["safe"]) == (1, "failed", "failed")
+
+
+LIVELOCK = """robot Live {
+    component C { behaviour {
+        initial marked state a { transition goto b }
+        state b { transition goto a }
+    } }
+}
+"""
+
+
+def test_a_false_claim_about_the_controller_is_found(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    model, right, bad = (tmp_path / name for name in ("live.rscd", "right.rsup", "bad.rsup"))
+    model.write_text(LIVELOCK, encoding="utf-8")
+    assert main(["synth", "--allow-livelock", str(model), "-o", str(right)]) == 0
+    assert main(["verify", str(right), str(model)]) == 0
+    document = json.loads(right.read_bytes())
+    assert document["supervisor"]["certificate"]["controller"]["finite_response"] == "failed"
+    document["supervisor"]["certificate"]["controller"]["finite_response"] = "passed"
+    bad.write_text(json.dumps(document), encoding="utf-8")
+    status, told = _json(capsys, str(bad), str(model))
+    assert (status, told["checks"]["certificate"]) == (1, "failed")
+    assert told["faults"][0]["message"] == "it says 'finite response of the controller: passed', which is false"
 
 
 def test_another_model_and_another_deployment_fail(capsys: pytest.CaptureFixture[str], right: str) -> None:

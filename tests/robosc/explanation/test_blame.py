@@ -2,7 +2,7 @@
 
 import os
 from collections import Counter, deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from itertools import chain, combinations, pairwise
 
@@ -129,6 +129,23 @@ class Search:
                 return True
         return False
 
+    def inside(self, start: State) -> set[State]:
+        """What is reached by what may be allowed: no bad states, and no controllable events that may lead into them."""
+        found, frontier = {start}, [start]
+        while frontier:
+            state = frontier.pop()
+            for event in self.system.events:
+                targets = self.semantics.targets(state, event.name)
+                if event.is_controllable and (
+                    not self.semantics.condition(state, event.name) or any(map(self.bad, targets))
+                ):
+                    continue
+                for target in targets:
+                    if target not in found and not self.bad(target):
+                        found.add(target)
+                        frontier.append(target)
+        return found
+
     def _reached(self, states: list[State]) -> set[State]:
         found = set(states)
         while states:
@@ -206,32 +223,46 @@ def _check_what_is_broken(system: System, search: Search, trouble: Trouble, last
     assert Semantics(without(system, free)).bad(last) == bool(trouble.leaving)
 
 
+def _distance(
+    start: set[State], steps: Callable[[State], Iterable[State]], is_goal: Callable[[State], bool]
+) -> int | None:
+    queue, distances = deque(start), dict.fromkeys(start, 0)
+    while queue:
+        state = queue.popleft()
+        if is_goal(state):
+            return distances[state]
+        for target in steps(state):
+            if target not in distances:
+                distances[target] = distances[state] + 1
+                queue.append(target)
+    return None
+
+
 def _check_detour(system: System, search: Search, trouble: Trouble, last: State, met: Counter[str]) -> None:
     """The plants alone would have this way, and up to the event named all of it is allowed."""
     free = Semantics(without(system, [item for item in obstacles_of(system) if item.kind is not ObstacleKind.MARKING]))
-    queue, distances = deque([last]), {last: 0}
-    found = None
-    while queue and found is None:
-        state = queue.popleft()
-        if free.is_marked(state):
-            found = distances[state]
-        for each in system.events:
-            for target in free.targets(state, each.name):
-                if target not in distances:
-                    distances[target] = distances[state] + 1
-                    queue.append(target)
+    inside = search.inside(last)
+
+    def freely(state: State) -> Iterator[State]:
+        return (target for each in system.events for target in free.targets(state, each.name))
+
+    # Under the requirements if that is a way at all, else by the plants alone.
+    found = _distance(inside, lambda state: (target for _, target in search.steps(state)), free.is_marked)
+    if found is None:
+        found = _distance(inside, freely, free.is_marked)
     assert (trouble.detour is None) == (found is None)
     if trouble.detour is None:
         met["no way"] += 1
         return
-    assert len(trouble.detour.events) == found
+    # From wherever what is allowed leads to, no way of the plants alone is shorter.
+    assert len(trouble.detour.events) - trouble.detour.stopped_at == found
     states = {last}
     for event in trouble.detour.events[: trouble.detour.stopped_at]:
         states = {target for state in states for name, target in search.steps(state) if name == event}
         states = {state for state in states if not search.bad(state)}
     here, event = trouble.detour.state, trouble.detour.events[trouble.detour.stopped_at]
     assert here in states
-    assert not search.bad(here)
+    assert here in inside
     semantics = search.semantics
     kinds = {item.kind for item in trouble.detour.hindrances}
     met.update(map(str, kinds))

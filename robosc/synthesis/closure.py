@@ -1,11 +1,11 @@
 """The states that some steps lead to from given ones, found with the steps in an order that keeps diagrams small.
 
-Steps wait in a list of work, those first that touch the lowest variables only; once a step has added states, every
-step that shares a variable with it waits again. So what lies low in the diagrams is closed before anything above it
-moves: the idea of saturation (G. Ciardo, G. Luettgen and R. Siminiceanu, "Saturation: an efficient iteration strategy
-for symbolic state-space generation", TACAS 2001, LNCS 2031, pp. 328-342), here with whole predicates instead of
-nodes. Sweeps over all events instead let every part of a system move a little at a time, and what they find in
-between depends on all of the parts together: on dining philosophers that is exponential where this is not.
+Steps wait in a list of work, those first that touch the closest variables, of equally close ones the lowest; once a
+step has added states, every step that shares a variable with it waits again. So what is local is closed before anything
+that ties it to the rest moves: the idea of saturation (G. Ciardo, G. Luettgen and R. Siminiceanu, "Saturation: an
+efficient iteration strategy for symbolic state-space generation", TACAS 2001, LNCS 2031, pp. 328-342), here with whole
+predicates instead of nodes. Sweeps over all events instead let every part of a system move a little at a time, and what
+they find in between depends on all of the parts together: on dining philosophers that is exponential where this is not.
 """
 
 import heapq
@@ -34,15 +34,19 @@ class Closure:
     """Closes sets of states under some steps.
 
     Args:
-        steps: The steps; equally low ones are taken in this order.
+        steps: The steps; of equally close and low ones the first is taken first.
         order: Every current-state variable, topmost first.
         watch: Who waits.
     """
 
     def __init__(self, steps: Sequence[Step], order: Sequence[str], watch: Watch) -> None:
         level = {name: place for place, name in enumerate(order)}
-        highest = [min((level[name] for name in step.names), default=len(order)) for step in steps]
-        self._steps = [steps[number] for number in sorted(range(len(steps)), key=lambda number: -highest[number])]
+
+        def distance_and_height(step: Step) -> tuple[int, int]:
+            levels = [level[name] for name in step.names]
+            return (max(levels) - min(levels), -min(levels)) if levels else (0, 0)
+
+        self._steps = sorted(steps, key=distance_and_height)
         self._watch = watch
         users: defaultdict[str, set[int]] = defaultdict(set)
         for number, step in enumerate(self._steps):

@@ -7,12 +7,12 @@ application of multi-level logic synthesis", EDAC 1991, pp. 50-54), judged by th
 """
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import permutations
 
 from robosc.automata.state import Subject, subjects
 from robosc.automata.structure import System
-from robosc.expressions import Expression, PathStep, Received, StateTest, VariableRead, leaves
+from robosc.expressions import Binary, Expression, PathStep, Received, StateTest, Unary, VariableRead, leaves
 
 _WINDOW = 4
 """Neighbours that are permuted together: 24 ways."""
@@ -30,7 +30,7 @@ def subject_order(system: System) -> tuple[Subject, ...]:
 
 
 def hyperedges(system: System) -> tuple[frozenset[Subject], ...]:
-    """For each event and each condition, the subjects it touches; each set once, in first order."""
+    """For each event, each condition and each part of one, the subjects it touches; each set once, in first order."""
     found: dict[frozenset[Subject], None] = {}
     for event in system.events:
         touched = set[Subject]()
@@ -43,11 +43,25 @@ def hyperedges(system: System) -> tuple[frozenset[Subject], ...]:
                         touched.add(Subject(automaton.name, update.variable))
                         touched |= _read(update.expression)
         found[frozenset(touched)] = None
-    for condition in system.conditions:
-        found[frozenset(_read(condition.condition))] = None
-    for invariant in system.invariants:
-        found[frozenset(_read(invariant))] = None
+    for condition in (*(item.condition for item in system.conditions), *system.invariants):
+        found[frozenset(_read(condition))] = None
+        # What is compared belongs closer together than what a long condition merely lists.
+        for part in _parts(condition):
+            found[frozenset(_read(part))] = None
     return tuple(edge for edge in found if len(edge) > 1)
+
+
+def _parts(condition: Expression) -> Iterator[Expression]:
+    """What logical operators join, and they themselves do not."""
+    stack = [condition]
+    while stack:
+        match stack.pop():
+            case Binary(operator="and" | "or" | "implies", left=left, right=right):
+                stack += [right, left]
+            case Unary(operator="not" | "holds", operand=operand):
+                stack.append(operand)
+            case part:
+                yield part
 
 
 def _read(expression: Expression) -> set[Subject]:

@@ -86,9 +86,10 @@ def explain_synthesis(
     run = None if after is None else asked_run(system, model, after)
     options = engine_options(engine)
     manager = make_manager(resolve_engine(options.name))
-    watch = BoundedWatch(Watch(should_stop, on_progress, node_check(manager, options.maximum_nodes)))
+    asked = Watch(should_stop, on_progress, node_check(manager, options.maximum_nodes))
+    watch = BoundedWatch(asked)
     with limited(manager, options.maximum_nodes):
-        encoding = Encoding(system, manager)
+        encoding = Encoding(system, manager, asked.check_stop)
         obstacles = obstacles_of(system, questions_about(model, system, deployment).restrictions)
         problems = Problems(encoding, watch)
         terms = Terms(model, places, system, obstacles)

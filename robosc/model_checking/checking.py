@@ -65,7 +65,7 @@ def verify_properties(
     manager = make_manager(resolve_engine(options.name))
     watch = Watch(should_stop, on_progress, node_check(manager, options.maximum_nodes))
     with limited(manager, options.maximum_nodes):
-        encoding = Encoding(system, manager)
+        encoding = Encoding(system, manager, watch.check_stop)
         structure = KripkeStructure(system, encoding, added, watch, is_reordering=options.is_reordering)
         return tuple(_Checker(structure).verdict(item) for item in properties)
 

@@ -8,7 +8,7 @@ apart, a relation that copies several data would have to remember all of them at
 """
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -55,9 +55,10 @@ class Encoding:
         subjects: Bits of each place of a state.
         state_names: Every current-state variable, in the manager's order.
         order: Every variable, in the order in which they were declared.
+        pause: Called again and again while expressions become predicates: it may end the work with an error.
     """
 
-    def __init__(self, system: System, manager: Manager) -> None:
+    def __init__(self, system: System, manager: Manager, pause: Callable[[], None] = lambda: None) -> None:
         self.system = system
         self.manager = manager
         self.subjects: dict[Subject, Bits] = {}
@@ -65,6 +66,7 @@ class Encoding:
             self.subjects[subject] = self._bits(f"s{number}", subject_domain(system, subject), self._type(subject))
         self.state_names = tuple(name for bits in self.subjects.values() for name in bits.names)
         self.inputs = tuple((item, self._input(number, item)) for number, item in enumerate(system.inputs))
+        self.pause = pause
         self.order: list[str] = []
         self._choices = 0
         self._valid_states: Any = None

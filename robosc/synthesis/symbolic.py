@@ -80,7 +80,7 @@ class Symbols:
     def __init__(self, encoding: Encoding, inputs: Inputs | None = None) -> None:
         self._encoding = encoding
         self._manager = encoding.manager
-        self._arithmetic = Arithmetic(encoding.manager)
+        self._arithmetic = Arithmetic(encoding.manager, encoding.pause)
         self._inputs = inputs or {}
 
     def holds(self, expression: Expression) -> Any:
@@ -300,6 +300,7 @@ class Symbols:
             split = [(value, where & ~bit) for value, where in cases]
             split += [(value + weight, where & bit) for value, where in cases]
             cases = [case for case in split if case[1] != self._manager.false]
+            self._encoding.pause()
             if len(cases) > MAXIMUM_PARTITION:
                 raise self._too_large()
         return Partition(tuple(cases))
@@ -350,6 +351,7 @@ class Symbols:
         """Cases with equal values put together; impossible and unknown ones left out."""
         found: dict[tuple[str, Value], Any] = {}
         for value, predicate in cases:
+            self._encoding.pause()
             if value is not None and predicate != self._manager.false:
                 # 1 and 1.0 are the same key but not the same arithmetic: whole numbers overflow.
                 key = (type(value).__name__, value)

@@ -75,7 +75,7 @@ class _Synthesis:
         self._watch = watch
         self._manager = manager
         self._is_reordering = is_reordering
-        self._encoding = Encoding(system, self._manager)
+        self._encoding = Encoding(system, self._manager, watch.check_stop)
         self._problem = Problem(self._steps(), safe_states(self._encoding, system.invariants))
 
     def _steps(self) -> tuple[Steps, ...]:

@@ -4,7 +4,7 @@ Ripple-carry addition, shift-and-add multiplication, comparison by the sign of a
 around: the width of a result always suffices for its bounds.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,10 +32,16 @@ def width_for(low: int, high: int) -> int:
 
 
 class Arithmetic:
-    """Operations on vectors of one manager."""
+    """Operations on vectors of one manager.
 
-    def __init__(self, manager: Manager) -> None:
+    Args:
+        manager: The manager.
+        pause: Called before each bit of a sum, which is where diagrams grow: it may end the work with an error.
+    """
+
+    def __init__(self, manager: Manager, pause: Callable[[], None]) -> None:
         self._manager = manager
+        self._pause = pause
 
     def constant(self, value: int) -> Vector:
         """A number."""
@@ -139,6 +145,7 @@ class Arithmetic:
     def _sum(self, a: Sequence[Any], b: Sequence[Any], carry: Any) -> tuple[Any, ...]:
         result = []
         for first, second in zip(a, b, strict=True):
+            self._pause()
             differ = self._manager.ite(first, ~second, second)
             result.append(self._manager.ite(differ, ~carry, carry))
             carry = self._manager.ite(differ, carry, first)

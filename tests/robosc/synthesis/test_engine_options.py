@@ -2,16 +2,20 @@
 
 import gc
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robosc.errors import NodeLimitError
+from robosc.automata import DiscreteVariable, EventCondition, System
+from robosc.errors import NodeLimitError, SynthesisCancelled
+from robosc.expressions import Binary, Constant, IntegerType, VariableRead
 from robosc.synthesis import EngineOptions, UnknownEngineError, register, synthesize
 from robosc.synthesis.engines import _FACTORIES, Manager, limited, make_manager, reordering
 from support.families import FAMILIES
 from support.random_systems import wide_system
+from support.systems import automaton, edge, system
 
 
 @pytest.fixture(scope="module", params=["cudd", "autoref"])
@@ -22,21 +26,19 @@ def engine(request: pytest.FixtureRequest) -> str:
 
 
 def test_a_synthesis_beyond_its_nodes_is_given_up(engine: str) -> None:
-    system = FAMILIES["dining philosophers"](8)
+    made = FAMILIES["dining philosophers"](8)
     for maximum in (1, 50, 300):
         with pytest.raises(NodeLimitError, match=f"more than the {maximum} nodes"):
-            synthesize(system, engine=EngineOptions(engine, maximum_nodes=maximum))
+            synthesize(made, engine=EngineOptions(engine, maximum_nodes=maximum))
     # Nothing is left behind that another synthesis would stumble over.
     gc.collect()
-    assert synthesize(system, engine=EngineOptions(engine, maximum_nodes=1_000_000)) == synthesize(
-        system, engine=engine
-    )
+    assert synthesize(made, engine=EngineOptions(engine, maximum_nodes=1_000_000)) == synthesize(made, engine=engine)
 
 
 def test_the_limit_is_one_of_nodes_in_use(engine: str) -> None:
     """What is thrown away on the way does not count."""
-    system = FAMILIES["counter"](200)
-    assert synthesize(system, engine=EngineOptions(engine, maximum_nodes=5_000)).added
+    made = FAMILIES["counter"](200)
+    assert synthesize(made, engine=EngineOptions(engine, maximum_nodes=5_000)).added
 
 
 def test_a_single_operation_of_cudd_cannot_fill_the_memory() -> None:
@@ -57,6 +59,30 @@ def _far_apart(manager: Manager, width: int) -> None:
         found = found & manager.ite(first, second, ~second)
 
 
+def _product() -> System:
+    """A condition on the product of two wide integers, far too large for decision diagrams."""
+    wide = IntegerType(0, 100_000)
+    n, m = VariableRead("A", "n"), VariableRead("A", "m")
+    variables = [DiscreteVariable(name, wide, (5,)) for name in ("n", "m")]
+    arcs = [edge("a -go-> a", n=Constant(7)), edge("a -u_seen-> a", m=Constant(3))]
+    made = system(automaton("A", arcs, variables=variables))
+    return replace(made, conditions=(EventCondition("go", Binary("<", n, Binary("*", m, n))),))
+
+
+def test_an_expression_is_broken_off_in_the_middle(engine: str) -> None:
+    asked = 0
+
+    def should_stop() -> bool:
+        nonlocal asked
+        asked += 1
+        return asked > 200
+
+    with pytest.raises(SynthesisCancelled):
+        synthesize(_product(), engine=engine, should_stop=should_stop)
+    with pytest.raises(NodeLimitError):
+        synthesize(_product(), engine=EngineOptions(engine, maximum_nodes=20_000))
+
+
 def test_other_errors_pass_the_limit(engine: str) -> None:
     manager = make_manager(engine)
     with pytest.raises(ValueError, match="something else"), limited(manager, 1_000):
@@ -66,8 +92,8 @@ def test_other_errors_pass_the_limit(engine: str) -> None:
 @given(st.integers(0, 2**32 - 1))
 @settings(deadline=None, max_examples=20)
 def test_reordering_changes_nothing(engine: str, seed: int) -> None:
-    system = wide_system(seed)
-    plain, reordered = (synthesize(system, engine=EngineOptions(engine, is_reordering=flag)) for flag in (False, True))
+    made = wide_system(seed)
+    plain, reordered = (synthesize(made, engine=EngineOptions(engine, is_reordering=flag)) for flag in (False, True))
     assert (plain.status, plain.added, plain.initial) == (reordered.status, reordered.added, reordered.initial)
     assert plain.statistics.states == reordered.statistics.states
 
@@ -110,7 +136,7 @@ def fixed_engine() -> Iterator[str]:
 
 
 def test_an_engine_without_orders_says_so(fixed_engine: str) -> None:
-    system = FAMILIES["dining philosophers"](3)
-    assert synthesize(system, engine=fixed_engine).added
+    made = FAMILIES["dining philosophers"](3)
+    assert synthesize(made, engine=fixed_engine).added
     with pytest.raises(UnknownEngineError, match="cannot change the order"):
-        synthesize(system, engine=EngineOptions(fixed_engine, is_reordering=True))
+        synthesize(made, engine=EngineOptions(fixed_engine, is_reordering=True))

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from robosc.automata.compile import State, subjects_read
+from robosc.automata.compile import NO_DATA, State, compile_expression, subjects_read
 from robosc.automata.plants import communication_plant_name
 from robosc.automata.state import Subject, subject_type, subjects
 from robosc.automata.structure import System
@@ -150,8 +150,11 @@ class Terms:
                 return f"it would take {subject}, which is {now}, out of its range", self.part(item.range)
             case HindranceKind.REQUIREMENT if item.condition is not None:
                 part = self.condition_part(item.condition)
-                values = self.values_read(self._system.conditions[item.condition].condition, state)
-                return f"'{part.text}' forbids it" + (f": {values}" if values else ""), part
+                condition = self._system.conditions[item.condition].condition
+                values = self.values_read(condition, state)
+                is_unknown = compile_expression(condition, self._subjects)(state, NO_DATA) is None
+                why = ", for its value is unknown" if is_unknown else ""
+                return f"'{part.text}' forbids it{why}" + (f": {values}" if values else ""), part
             case _:
                 return "synthesis forbids it, because of what can follow", None
 

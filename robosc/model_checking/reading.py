@@ -225,6 +225,13 @@ class _PropertyParser(ExpressionParser):
         """`enabled(event)`; the kinds of events are reserved words."""
         self.place = index + 2
         name = self.name()
+        if self.texts[self.place] == ")":
+            # The bracket itself is in order.
+            message = f"'{name.text}' alone is no event: its kind is missing"
+            self.report(
+                "syntax-error", message, self.at(self.place), f"Write 'enabled({name.text}.request)', for instance."
+            )
+            raise self.told()
         self.take(".")
         kind = self.place
         if self.kinds[kind] not in (_NAME, _WORD):

@@ -346,6 +346,23 @@ def test_a_silent_step_that_changes_nothing_is_no_way_on() -> None:
     assert [item.kind for item in explained(text).remarks] == ["only-uncontrollable"]
 
 
+def test_an_unknown_requirement_is_told_to_be_unknown() -> None:
+    text = robot(
+        """component N { outgoing message p with type: integer(0..60) incoming message go with type: none
+           behaviour { variable n: integer(0..60) on response from p do n := value
+                       initial marked state idle { on request to go goto idle } } }""",
+        "requirement go needs N.n * 100000000 > 0",
+    )
+    for state, why in (
+        ("N.n = 30", "forbids it, for its value is unknown: N.n is 30"),
+        ("N.n = 0", "forbids it: N.n is 0"),
+    ):
+        report = explained(text, event="go", state=state).state
+        assert report is not None
+        (reason,) = report.events[0].reasons
+        assert reason.message.endswith(why)
+
+
 def test_what_is_told_is_what_stands_in_every_way() -> None:
     """The first event of the shortest way is possible later; what stops every way is the last."""
     text = robot(

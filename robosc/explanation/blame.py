@@ -14,19 +14,10 @@ from robosc.explanation.structure import Blamed, EmptyExplanation
 from robosc.explanation.terms import Terms
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model
-from robosc.synthesis.encoding import Encoding
-from robosc.synthesis.engines import (
-    EngineOptions,
-    engine_options,
-    limited,
-    make_manager,
-    node_check,
-    reordering,
-    resolve_engine,
-)
+from robosc.synthesis.engines import EngineOptions
 from robosc.synthesis.findings import questions_about
 from robosc.synthesis.result import Progress
-from robosc.synthesis.watch import Watch
+from robosc.synthesis.workspace import Workspace, workspace
 
 EFFORT = 100
 """Steps that the search for what is to blame may take, as a multiple of those of one synthesis."""
@@ -144,34 +135,27 @@ def explain_empty(
     Raises:
         SynthesisCancelled: `should_stop` became true.
     """
-    options = engine_options(engine)
-    manager = make_manager(resolve_engine(options.name))
-    asked = Watch(should_stop, on_progress, node_check(manager, options.maximum_nodes))
-    watch = BoundedWatch(asked)
-    with limited(manager, options.maximum_nodes):
-        encoding = Encoding(system, manager, asked.check_stop)
+    with workspace(system, engine, should_stop, on_progress) as place:
+        watch = BoundedWatch(place.watch)
         obstacles = obstacles_of(system, questions_about(model, system, deployment).restrictions)
-        problems = Problems(encoding, watch)
-        terms = Terms(model, places, system, obstacles)
-        return explain_lost(encoding, watch, problems, obstacles, terms, is_reordering=options.is_reordering)
+        problems = Problems(place.encoding, watch)
+        return explain_lost(place, watch, problems, obstacles, Terms(model, places, system, obstacles))
 
 
 def explain_lost(
-    encoding: Encoding,
+    place: Workspace,
     watch: BoundedWatch,
     problems: Problems,
     obstacles: Sequence[Obstacle],
     terms: Terms,
-    *,
-    is_reordering: bool,
 ) -> EmptyExplanation:
     """Why a problem has no supervisor, in the words of its model."""
-    false = encoding.manager.false
+    encoding, false = place.encoding, place.encoding.manager.false
     fixed_point, problem = problems.without(())
     fixed_point.good_states(problem, false)
     # What one synthesis takes, encoding and all, tells how large the problem is.
     watch.limit = max(LEAST_EFFORT, EFFORT * watch.steps)
-    with reordering(encoding.manager, encoding.order, is_wanted=is_reordering):
+    with place.reordering():
         blame = find_blame(problems, obstacles, false, watch)
     watch.limit = None
     analysis = Analysis(encoding, watch, problems, obstacles, false)

@@ -24,21 +24,14 @@ from robosc.model.structure import Deployment, EventKind, Model
 from robosc.source import visible
 from robosc.synthesis.controlled import ControlledSystem
 from robosc.synthesis.encoding import Encoding
-from robosc.synthesis.engines import (
-    EngineOptions,
-    engine_options,
-    limited,
-    make_manager,
-    node_check,
-    reordering,
-    resolve_engine,
-)
+from robosc.synthesis.engines import EngineOptions
 from robosc.synthesis.findings import findings, questions_about
 from robosc.synthesis.nodes import count_models
 from robosc.synthesis.result import Progress
 from robosc.synthesis.runs import Run, decoded
 from robosc.synthesis.symbolic import Symbols
 from robosc.synthesis.watch import Watch
+from robosc.synthesis.workspace import workspace
 
 MAXIMUM_STATES = 5
 """States of one kind that warnings show: all of them could be too many to read."""
@@ -84,22 +77,17 @@ def explain_synthesis(
     name = None if event is None else asked_event(system, model, event)
     condition = None if state is None else asked_state(system, model, state)
     run = None if after is None else asked_run(system, model, after)
-    options = engine_options(engine)
-    manager = make_manager(resolve_engine(options.name))
-    asked = Watch(should_stop, on_progress, node_check(manager, options.maximum_nodes))
-    watch = BoundedWatch(asked)
-    with limited(manager, options.maximum_nodes):
-        encoding = Encoding(system, manager, asked.check_stop)
+    with workspace(system, engine, should_stop, on_progress) as place:
+        encoding, watch = place.encoding, BoundedWatch(place.watch)
         obstacles = obstacles_of(system, questions_about(model, system, deployment).restrictions)
         problems = Problems(encoding, watch)
         terms = Terms(model, places, system, obstacles)
         fixed_point, problem = problems.without(())
-        with reordering(manager, encoding.order, is_wanted=options.is_reordering):
-            good = fixed_point.good_states(problem, manager.false)
-            reachable = manager.false if good.reason else fixed_point.reachable_states(problem, good.states)
+        with place.reordering():
+            good = fixed_point.good_states(problem, encoding.manager.false)
+            reachable = None if good.reason else fixed_point.reachable_states(problem, good.states)
         if good.reason:
-            lost = explain_lost(encoding, watch, problems, obstacles, terms, is_reordering=options.is_reordering)
-            return Explanation(empty=lost)
+            return Explanation(empty=explain_lost(place, watch, problems, obstacles, terms))
         analysis = Analysis(encoding, watch, problems, obstacles, good.states)
         explainer = _Explainer(
             encoding, watch, system, analysis, Reporter(analysis, terms), reachable, fixed_point.initial

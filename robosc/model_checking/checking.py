@@ -27,12 +27,10 @@ from robosc.model_checking.formulas import (
 from robosc.model_checking.outcome import Verdict
 from robosc.model_checking.structure import KripkeStructure
 from robosc.supervisor.structure import AddedCondition
-from robosc.synthesis import EngineOptions, Progress, resolve_engine
+from robosc.synthesis import EngineOptions, Progress
 from robosc.synthesis.closure import Step
-from robosc.synthesis.encoding import Encoding
-from robosc.synthesis.engines import engine_options, limited, make_manager, node_check
 from robosc.synthesis.symbolic import Symbols
-from robosc.synthesis.watch import Watch
+from robosc.synthesis.workspace import workspace
 
 
 def verify_properties(
@@ -61,12 +59,8 @@ def verify_properties(
         UnknownEngineError: There is no such engine.
         UnsupportedModelError: A condition computes with too many doubles.
     """
-    options = engine_options(engine)
-    manager = make_manager(resolve_engine(options.name))
-    watch = Watch(should_stop, on_progress, node_check(manager, options.maximum_nodes))
-    with limited(manager, options.maximum_nodes):
-        encoding = Encoding(system, manager, watch.check_stop)
-        structure = KripkeStructure(system, encoding, added, watch, is_reordering=options.is_reordering)
+    with workspace(system, engine, should_stop, on_progress) as place:
+        structure = KripkeStructure(system, place, added)
         return tuple(_Checker(structure).verdict(item) for item in properties)
 
 

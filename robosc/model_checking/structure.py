@@ -14,11 +14,10 @@ from robosc.expressions import Value
 from robosc.supervisor.structure import AddedCondition, DecisionDiagram
 from robosc.synthesis.closure import Closure, Step
 from robosc.synthesis.encoding import Bits, Encoding
-from robosc.synthesis.engines import reordering
 from robosc.synthesis.fixed_point import initial_states
 from robosc.synthesis.nodes import cofactors, is_constant
 from robosc.synthesis.transitions import Steps, transition_of
-from robosc.synthesis.watch import Watch
+from robosc.synthesis.workspace import Workspace
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,10 +42,8 @@ class KripkeStructure:
 
     Args:
         system: Plants and event conditions.
-        encoding: Its variables.
+        place: Where it is encoded.
         added: What the supervisor adds.
-        watch: Who waits.
-        is_reordering: Whether the engine may change its order while the states are found.
 
     Attributes:
         manager: The manager of all predicates.
@@ -55,15 +52,8 @@ class KripkeStructure:
         moves: Every way on, in the system's order of events; last the one of states without events.
     """
 
-    def __init__(
-        self,
-        system: System,
-        encoding: Encoding,
-        added: Sequence[AddedCondition],
-        watch: Watch,
-        *,
-        is_reordering: bool = False,
-    ) -> None:
+    def __init__(self, system: System, place: Workspace, added: Sequence[AddedCondition]) -> None:
+        encoding, watch = place.encoding, place.watch
         self.encoding = encoding
         self.manager = encoding.manager
         self.watch = watch
@@ -79,7 +69,7 @@ class KripkeStructure:
             steps.append((found, allowed))
             watch.tell("encoding", len(steps), found.plant)
         closure = self.closure([_onwards(found, allowed) for found, allowed in steps])
-        with reordering(encoding.manager, encoding.order, is_wanted=is_reordering):
+        with place.reordering():
             self.states = closure.of(self.initial, "reachability")
         moves = [self._move(found, self.states & allowed) for found, allowed in steps]
         self._enabled = {str(move.event): move.sources(self.manager.true) for move in moves}

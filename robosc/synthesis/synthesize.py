@@ -6,24 +6,14 @@ from typing import Any
 from robosc.automata.structure import System
 from robosc.supervisor.structure import AddedCondition, DecisionDiagram
 from robosc.synthesis.controlled import ControlledSystem
-from robosc.synthesis.encoding import Encoding
-from robosc.synthesis.engines import (
-    EngineOptions,
-    Manager,
-    engine_options,
-    limited,
-    make_manager,
-    node_check,
-    reordering,
-    resolve_engine,
-)
+from robosc.synthesis.engines import EngineOptions
 from robosc.synthesis.fixed_point import FixedPoint, Problem, safe_states
 from robosc.synthesis.nodes import count_models
 from robosc.synthesis.questions import Questions
 from robosc.synthesis.result import Progress, Statistics, SynthesisResult, SynthesisStatus
 from robosc.synthesis.simplify import Simplifier
 from robosc.synthesis.transitions import Steps, transition_of
-from robosc.synthesis.watch import Watch
+from robosc.synthesis.workspace import Workspace, workspace
 
 _NOTHING = Questions()
 
@@ -59,23 +49,18 @@ def synthesize(
         UnknownEngineError: There is no such engine.
         UnsupportedModelError: An expression computes with too many doubles, or a condition would be too large.
     """
-    options = engine_options(engine)
-    name = resolve_engine(options.name)
-    manager = make_manager(name)
-    watch = Watch(should_stop, on_progress, node_check(manager, options.maximum_nodes))
-    with limited(manager, options.maximum_nodes):
-        return _Synthesis(system, name, manager, watch, is_reordering=options.is_reordering).result(questions)
+    with workspace(system, engine, should_stop, on_progress) as place:
+        return _Synthesis(system, place).result(questions)
 
 
 class _Synthesis:
     """One synthesis: its manager is its own."""
 
-    def __init__(self, system: System, engine: str, manager: Manager, watch: Watch, *, is_reordering: bool) -> None:
-        self._engine = engine
-        self._watch = watch
-        self._manager = manager
-        self._is_reordering = is_reordering
-        self._encoding = Encoding(system, self._manager, watch.check_stop)
+    def __init__(self, system: System, place: Workspace) -> None:
+        self._place = place
+        self._watch = place.watch
+        self._encoding = place.encoding
+        self._manager = place.encoding.manager
         self._problem = Problem(self._steps(), safe_states(self._encoding, system.invariants))
 
     def _steps(self) -> tuple[Steps, ...]:
@@ -89,7 +74,7 @@ class _Synthesis:
     def result(self, questions: Questions) -> SynthesisResult:
         """The supervisor, or why there is none."""
         fixed_point = FixedPoint(self._encoding, self._watch)
-        with reordering(self._manager, self._encoding.order, is_wanted=self._is_reordering):
+        with self._place.reordering():
             good = fixed_point.good_states(self._problem, self._manager.false)
             reachable = None if good.reason else fixed_point.reachable_states(self._problem, good.states)
         if good.reason:
@@ -115,7 +100,7 @@ class _Synthesis:
         )
 
     def _statistics(self, rounds: int, states: int) -> Statistics:
-        return Statistics(self._engine, len(self._encoding.state_names), rounds, self._watch.peak_nodes, states)
+        return Statistics(self._place.engine, len(self._encoding.state_names), rounds, self._watch.peak_nodes, states)
 
     def _added(self, simplifier: Simplifier, steps: Steps, good: Any, reachable: Any) -> DecisionDiagram | None:
         """The condition to add to an event, simplified where it does not matter; None if there is nothing to add."""

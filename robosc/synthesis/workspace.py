@@ -1,0 +1,68 @@
+"""What all work on predicates begins with: an engine, a system encoded in it, and who waits for the result."""
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+
+from robosc.automata.structure import System
+from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.engines import (
+    EngineOptions,
+    engine_options,
+    limited,
+    make_manager,
+    node_check,
+    reordering,
+    resolve_engine,
+)
+from robosc.synthesis.result import Progress
+from robosc.synthesis.watch import Watch
+
+
+@dataclass(frozen=True, slots=True)
+class Workspace:
+    """An encoded system.
+
+    Attributes:
+        engine: Name of the engine that was resolved.
+        encoding: The variables.
+        watch: Who waits; it also counts nodes where they are limited.
+        is_reordering: Whether the engine may change its order.
+    """
+
+    engine: str
+    encoding: Encoding
+    watch: Watch
+    is_reordering: bool
+
+    def reordering(self) -> AbstractContextManager[None]:
+        """Let the engine change its order meanwhile, if it may."""
+        return reordering(self.encoding.manager, self.encoding.order, is_wanted=self.is_reordering)
+
+
+@contextmanager
+def workspace(
+    system: System,
+    engine: str | EngineOptions,
+    should_stop: Callable[[], bool],
+    on_progress: Callable[[Progress], None],
+) -> Iterator[Workspace]:
+    """A workspace of its own for a system.
+
+    Args:
+        system: The system.
+        engine: Name of the engine for decision diagrams, or more about it.
+        should_stop: Asked again and again; once true, the work ends.
+        on_progress: Told where the work is.
+
+    Raises:
+        NodeLimitError: Diagrams became larger than the options allow.
+        SynthesisCancelled: `should_stop` became true.
+        UnknownEngineError: There is no such engine.
+    """
+    options = engine_options(engine)
+    name = resolve_engine(options.name)
+    manager = make_manager(name)
+    watch = Watch(should_stop, on_progress, node_check(manager, options.maximum_nodes))
+    with limited(manager, options.maximum_nodes):
+        yield Workspace(name, Encoding(system, manager, watch.check_stop), watch, options.is_reordering)

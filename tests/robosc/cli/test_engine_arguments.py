@@ -1,6 +1,7 @@
 """`--engine`, `--reorder` and `--max-nodes` of the commands that synthesize."""
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -41,3 +42,12 @@ def test_a_limit_is_a_number_from_one_on(capsys: pytest.CaptureFixture[str], num
 def test_without_synthesis_there_is_nothing_to_limit(capsys: pytest.CaptureFixture[str], option: list[str]) -> None:
     assert main(["check", NAVIGATION, *option]) == 2
     assert "they need --synthesize" in capsys.readouterr().err
+
+
+def test_the_model_itself_is_not_written_to(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = tmp_path / "robot.rscd"
+    text = Path(NAVIGATION).read_bytes()
+    model.write_bytes(text)
+    assert main(["synth", str(model), "-o", str(tmp_path / "." / "robot.rscd")]) == 2
+    assert "is the model itself" in capsys.readouterr().err
+    assert model.read_bytes() == text

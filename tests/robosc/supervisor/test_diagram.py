@@ -70,3 +70,17 @@ def node(variable: str | None, starts: tuple[int, ...], children: tuple[int, ...
 def test_broken_diagrams_are_refused(nodes: list[DecisionNode], root: int, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         validate(DecisionDiagram(tuple(nodes), root), DOMAINS)
+
+
+def test_a_place_is_tested_once_and_in_one_order() -> None:
+    """A file could otherwise make a path that is as long as the file, for every state."""
+    domains = diagram_domains(SYSTEM)
+    flag = DecisionNode("A", "flag", (0, 1), (0, 1))
+    again = DecisionDiagram((flag, DecisionNode("A", "flag", (0, 1), (2, 1))), 3)
+    with pytest.raises(ValueError, match=r"'A\.flag' is tested before and after something else, or twice"):
+        validate(again, domains)
+    small = DecisionNode("A", "small", (0, 1), (2, 1))
+    validate(DecisionDiagram((flag, small), 3), domains)
+    crossed = (flag, small, DecisionNode("A", "small", (0, 1), (0, 1)), DecisionNode("A", "flag", (0, 1), (4, 0)))
+    with pytest.raises(ValueError, match="is tested before and after something else"):
+        validate(DecisionDiagram((*crossed, DecisionNode("A", None, (0, 1), (3, 5))), 6), domains)

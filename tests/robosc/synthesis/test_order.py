@@ -1,17 +1,20 @@
 """The static variable order."""
 
+from dataclasses import replace
 from itertools import permutations
 from random import Random
 
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robosc.automata import System, to_automata
+from robosc.automata import DiscreteVariable, System, to_automata
 from robosc.automata.state import subjects
+from robosc.expressions import Binary, BooleanType, Unary, VariableRead, conjunction
 from robosc.model.structure import Deployment
 from robosc.synthesis.order import force, hyperedges, slide, span, subject_order
 from support.models import example_model
 from support.random_systems import systems
+from support.systems import automaton, system
 
 
 @given(st.integers(1, 12), st.integers(0, 2**32 - 1))
@@ -60,3 +63,13 @@ def test_what_an_event_touches_is_one_hyperedge() -> None:
     edges = {frozenset(map(str, edge)) for edge in hyperedges(system)}
     assert {"LidarSensor", "LidarSensor.ahead"} in edges
     assert {"LineDetector", "LidarSensor", "EmergencyStop"} in edges
+
+
+def test_what_a_long_condition_compares_stands_together() -> None:
+    flags = [DiscreteVariable("x", BooleanType(), (False,))]
+    automata = [automaton(f"{row}{number}", ["a -go-> a"], variables=flags) for row in "AB" for number in range(4)]
+    pairs = [Binary("=", VariableRead(f"A{number}", "x"), VariableRead(f"B{number}", "x")) for number in range(4)]
+    made = replace(system(*automata), invariants=(Unary("not", conjunction(*pairs)),))
+    found = {frozenset(map(str, edge)) for edge in hyperedges(made)}
+    assert {frozenset({f"A{number}.x", f"B{number}.x"}) for number in range(4)} <= found
+    assert frozenset(f"{row}{number}.x" for row in "AB" for number in range(4)) in found

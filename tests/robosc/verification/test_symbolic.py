@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robosc.automata import DiscreteVariable, InputVariable, Semantics, System
+from robosc.automata import DiscreteVariable, InputVariable, Semantics, System, decision
 from robosc.automata.compile import State
-from robosc.automata.decision import Decision
+from robosc.automata.decision import Decision, index_in
+from robosc.automata.state import Subject, subject_domain, subjects
 from robosc.errors import SynthesisCancelled
 from robosc.expressions import Binary, BooleanType, Call, Conditional, IntegerType, StateTest, Unary, VariableRead
 from robosc.supervisor.conditions import state_predicates
@@ -257,3 +258,23 @@ def test_the_order_keeps_neighbours_together() -> None:
     assert max(abs(place[node] - place[other]) for node, ties in enumerate(ring) for other in ties) == 2
     made = FAMILIES["dining philosophers"](6)
     assert sorted(place_order(made)) == list(range(12))
+
+
+def test_a_condition_in_another_order_is_counted_while_it_is_made() -> None:
+    """Ninety nodes of a file can be a thousand million in the verifier's order."""
+    count = 26
+    flags = [DiscreteVariable("x", BooleanType(), (False,))]
+    automata = [automaton(f"C{number}", [f"a -u_turn{number}-> a"], variables=flags) for number in range(count)]
+    made = system(*automata, automaton("G", ["a -go-> a"]))
+    order = subjects(made)
+    nodes: list[decision.Test] = []
+    previous = 1
+    for number in range(count // 2):
+        first, second = (order.index(Subject(f"C{place}", "x")) for place in (number, number + count // 2))
+        base = len(nodes) + 2
+        nodes += [decision.Test(second, (0, 1), (previous, 0)), decision.Test(second, (0, 1), (0, previous))]
+        nodes += [decision.Test(first, (0, 1), (base, base + 1))]
+        previous = base + 2
+    indices = tuple(index_in(subject_domain(made, subject)) for subject in order)
+    found = verify_symbolically(made, {"go": Decision(tuple(nodes), previous, indices)}, limit=5_000, engine="autoref")
+    assert found.states is None

@@ -260,9 +260,10 @@ def test_the_order_keeps_neighbours_together() -> None:
     assert sorted(place_order(made)) == list(range(12))
 
 
+@pytest.mark.timeout(60)
 def test_a_condition_in_another_order_is_counted_while_it_is_made() -> None:
     """Ninety nodes of a file can be a thousand million in the verifier's order."""
-    count = 26
+    count = 60
     flags = [DiscreteVariable("x", BooleanType(), (False,))]
     automata = [automaton(f"C{number}", [f"a -u_turn{number}-> a"], variables=flags) for number in range(count)]
     made = system(*automata, automaton("G", ["a -go-> a"]))

@@ -18,7 +18,6 @@ from robosc.errors import InternalError
 from robosc.explanation.obstacles import Obstacle, ObstacleKind
 from robosc.explanation.problems import Problems
 from robosc.model.structure import is_tau
-from robosc.synthesis.closure import Closure, Step
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.fixed_point import allowed, marked_states
 from robosc.synthesis.runs import Run, ShortestRuns
@@ -298,7 +297,7 @@ class Analysis:
             inside: What can be reached by what is allowed, if that is known.
         """
         if inside is None:
-            inside = self._reachable_inside(start, good)
+            inside = self._fixed_point.states_from(self._problem, start, good)
         # Under the requirements first: what synthesis keeps from happening is told before what is forbidden anyhow.
         steps = self._steps
         possible = {name: item.plant & self._restricted(item) for name, item in steps.items()}
@@ -325,16 +324,6 @@ class Analysis:
 
     def _way(self, steps: Mapping[str, Steps], possible: Mapping[str, Any], start: Any, goal: Any) -> Run | None:
         return ShortestRuns(self._encoding, self._watch, tuple(steps.values()), possible, start).run_to(goal)
-
-    def _reachable_inside(self, start: Any, good: Any) -> Any:
-        """What is reached from some states by what is allowed, without leaving good ones."""
-
-        def onwards(steps: Steps) -> Step:
-            possible = self.possible(steps.event.name, good)
-            return Step(lambda states: steps.image(states & possible) & good, steps.names)
-
-        closure = Closure([onwards(steps) for steps in self._problem.steps], self._encoding.state_names, self._watch)
-        return closure.of(start, "reachability")
 
     def predicate(self, state: State) -> Any:
         """Where the state is this one."""

@@ -28,7 +28,7 @@ from robosc.model_checking.outcome import Verdict
 from robosc.model_checking.structure import KripkeStructure
 from robosc.supervisor.structure import AddedCondition
 from robosc.synthesis import EngineOptions, Progress
-from robosc.synthesis.closure import Step
+from robosc.synthesis.step import never_enough
 from robosc.synthesis.symbolic import Symbols
 from robosc.synthesis.workspace import workspace
 
@@ -134,18 +134,14 @@ class _Checker:
                 late, never = self._not(second), self._not(first | second)
                 return self._not(self._until(late, never) | self._forever(late))
 
-    def _leading_to(self, states: Any, is_enough: Callable[[Any], bool] = lambda found: False) -> Any:
+    def _leading_to(self, states: Any, is_enough: Callable[[Any], bool] = never_enough) -> Any:
         return self._until(self._structure.states, states, is_enough)
 
-    def _until(self, through: Any, goal: Any, is_enough: Callable[[Any], bool] = lambda found: False) -> Any:
+    def _until(self, through: Any, goal: Any, is_enough: Callable[[Any], bool] = never_enough) -> Any:
         """The least fixed point of `goal or (through and EX ...)`."""
         if goal == self._manager.false:
             return goal
-        steps = [
-            Step(lambda states, move=move: through & move.sources(states), move.names)  # type: ignore[misc]
-            for move in self._structure.moves
-        ]
-        return self._structure.closure(steps).of(goal, "states that lead there", is_enough)
+        return self._structure.leading_to(goal, through, is_enough)
 
     def _forever(self, states: Any) -> Any:
         """The greatest fixed point of `states and EX ...`."""

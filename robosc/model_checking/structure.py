@@ -6,16 +6,18 @@ where every state needs one: its runs stay there for ever (so does spin, which l
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import starmap
 from typing import Any
 
 from robosc.automata.state import subjects
 from robosc.automata.structure import System
 from robosc.expressions import Value
 from robosc.supervisor.structure import AddedCondition, DecisionDiagram
-from robosc.synthesis.closure import Closure, Step
+from robosc.synthesis.closure import closure_under
 from robosc.synthesis.encoding import Bits, Encoding
 from robosc.synthesis.fixed_point import initial_states
-from robosc.synthesis.nodes import cofactors, is_constant
+from robosc.synthesis.nodes import cofactors, is_constant, support
+from robosc.synthesis.step import Step, never_enough
 from robosc.synthesis.transitions import Steps, transition_of
 from robosc.synthesis.workspace import Workspace
 
@@ -28,13 +30,11 @@ class Move:
         event: The event, or None where nothing happens any more.
         image: The states that it leads to from a set of states.
         sources: The states of the structure from which it can lead into a set of states.
-        names: The current-state variables that it reads or changes.
     """
 
     event: str | None
     image: Callable[[Any], Any]
     sources: Callable[[Any], Any]
-    names: frozenset[str]
 
 
 class KripkeStructure:
@@ -68,26 +68,42 @@ class KripkeStructure:
                 allowed = allowed & diagram_predicate(encoding, conditions[event.name])
             steps.append((found, allowed))
             watch.tell("encoding", len(steps), found.plant)
-        closure = self.closure([_onwards(found, allowed) for found, allowed in steps])
         with place.reordering():
+            closure = closure_under(encoding, starmap(self._onwards, steps), self.manager.true, watch)
             self.states = closure.of(self.initial, "reachability")
+        self._backwards = tuple(starmap(self._towards, steps))
         moves = [self._move(found, self.states & allowed) for found, allowed in steps]
         self._enabled = {str(move.event): move.sources(self.manager.true) for move in moves}
         # No closure over the structure itself: the cycle could let the manager go before its predicates.
         ends = self.states & ~encoding.any_of(self._enabled.values())
-        end = Move(None, lambda states: states & ends, lambda states: states & ends, frozenset())
+        end = Move(None, lambda states: states & ends, lambda states: states & ends)
         self.moves = (*moves, end)
 
-    def closure(self, steps: Sequence[Step]) -> Closure:
-        """What closes sets of states under some steps."""
-        return Closure(steps, self.encoding.state_names, self.watch)
+    def _onwards(self, steps: Steps, allowed: Any) -> Step:
+        return Step(lambda states: steps.image(states & allowed), self._names(steps, allowed))
+
+    def _towards(self, steps: Steps, allowed: Any) -> Step:
+        return Step(lambda states: allowed & steps.some(states), self._names(steps, allowed))
+
+    def _names(self, steps: Steps, allowed: Any) -> frozenset[str]:
+        return steps.names | support(self.manager, allowed)
+
+    def leading_to(self, goal: Any, through: Any, is_enough: Callable[[Any], bool] = never_enough) -> Any:
+        """A goal, and the states from which runs through some states lead to it.
+
+        Args:
+            goal: Where the runs end.
+            through: Where they may be before.
+            is_enough: Asked about what has been found again and again; once true, the rest is not found.
+        """
+        closure = closure_under(self.encoding, self._backwards, goal | (through & self.states), self.watch)
+        return closure.of(goal, "states that lead there", is_enough)
 
     def _move(self, steps: Steps, allowed: Any) -> Move:
         return Move(
             steps.event.name,
             lambda states: steps.image(states & allowed),
             lambda states: allowed & steps.some(states),
-            steps.names,
         )
 
     def enabled(self, event: str) -> Any:
@@ -130,10 +146,6 @@ class KripkeStructure:
             values[node.var] = low == self.manager.false
             node = high if values[node.var] else low
         return values
-
-
-def _onwards(steps: Steps, allowed: Any) -> Step:
-    return Step(lambda states: steps.image(states & allowed), steps.names)
 
 
 def _value(bits: Bits, assignment: Mapping[str, bool]) -> Value:

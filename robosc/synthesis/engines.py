@@ -194,6 +194,12 @@ def node_limit_error(maximum_nodes: int) -> NodeLimitError:
     return NodeLimitError(f"the decision diagrams need more than the {maximum_nodes} nodes that they may have")
 
 
+def is_reordering(manager: Manager) -> bool:
+    """Whether an engine may change its order by itself now."""
+    configure = getattr(manager, "configure", None)
+    return bool(configure and configure().get("reordering"))
+
+
 @contextmanager
 def reordering(manager: Manager, order: Sequence[str], *, is_wanted: bool = True) -> Iterator[None]:
     """Let an engine change the order of variables meanwhile, if that is wanted; afterwards it is the given one again.

@@ -11,8 +11,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from robosc.expressions import Expression
-from robosc.synthesis.closure import Closure, Step
+from robosc.synthesis.chaining import Chaining
+from robosc.synthesis.closure import closure_under
 from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.nodes import support
+from robosc.synthesis.saturation import Saturation
+from robosc.synthesis.step import Step
 from robosc.synthesis.symbolic import Symbols
 from robosc.synthesis.transitions import Steps
 from robosc.synthesis.watch import Watch
@@ -113,32 +117,48 @@ class FixedPoint:
 
     def _nonblocking(self, problem: Problem, good: Any, known: Any) -> Any:
         """The states of `good` that reach a marked state through transitions that stay in `good`."""
-        closure = self._closure(self._towards(steps, allowed(steps, good)) for steps in self._each(problem))
+        closure = self._closure((self._towards(steps, good) for steps in self._each(problem)), good)
         return closure.of((good & self._marked) | known, "coreachability")
 
-    @staticmethod
-    def _towards(steps: Steps, source: Any) -> Step:
-        return Step(lambda states: source & steps.some(states), steps.names)
+    def _towards(self, steps: Steps, good: Any) -> Step:
+        source, names = self._source(steps, good)
+        return Step(lambda states: source & steps.some(states), names)
 
     def _controllable(self, problem: Problem, good: Any) -> Any:
         """The states of `good` that no run of uncontrollable events leaves."""
         closure = self._closure(
-            Step(steps.some, steps.names) for steps in self._each(problem) if not steps.event.is_controllable
+            (Step(steps.some, steps.names) for steps in self._each(problem) if not steps.event.is_controllable),
+            self._encoding.manager.true,
         )
         # Once the initial state is among them there is nothing left to find out.
         return ~closure.of(~good, "controllability", lambda states: self._is_lost(~states))
 
     def reachable_states(self, problem: Problem, good: Any) -> Any:
         """Every state of the controlled system; it begins in those initial states that are good."""
-        closure = self._closure(self._onwards(steps, allowed(steps, good)) for steps in self._each(problem))
-        return closure.of(self.initial & good, "reachability")
+        return self.states_from(problem, self.initial & good, good)
 
-    @staticmethod
-    def _onwards(steps: Steps, source: Any) -> Step:
-        return Step(lambda states: steps.image(states & source), steps.names)
+    def states_from(self, problem: Problem, start: Any, good: Any) -> Any:
+        """Some states, and what can be reached from the good ones of them by what is allowed without leaving them."""
+        closure = self._closure((self._onwards(steps, good) for steps in self._each(problem)), good)
+        return start | closure.of(start & good, "reachability")
 
-    def _closure(self, steps: Iterable[Step]) -> Closure:
-        return Closure(tuple(steps), self._encoding.state_names, self._watch)
+    def _onwards(self, steps: Steps, good: Any) -> Step:
+        source, names = self._source(steps, good)
+        return Step(lambda states: steps.image(states & source), names)
+
+    def _source(self, steps: Steps, good: Any) -> tuple[Any, frozenset[str]]:
+        """Where an event may happen as far as neither its source nor its target tells, and what decides that."""
+        if not steps.event.is_controllable:
+            return self._encoding.manager.true, steps.names
+        source = steps.plant & steps.condition
+        if steps.is_deterministic:
+            # Its one target is good wherever one of its targets is.
+            return source, steps.names
+        source = source & steps.only(good)
+        return source, steps.names | support(self._encoding.manager, source)
+
+    def _closure(self, steps: Iterable[Step], within: Any) -> Chaining | Saturation:
+        return closure_under(self._encoding, steps, within, self._watch)
 
     def _each(self, problem: Problem) -> Iterator[Steps]:
         for steps in problem.steps:

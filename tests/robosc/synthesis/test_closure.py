@@ -1,20 +1,128 @@
-"""The work list finds what going round and round over all steps finds, whatever the steps read and change."""
+"""Chaining and saturation find what going round and round over all steps finds, whatever the steps read and change."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import product
 from random import Random
 from typing import Any
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robosc.errors import SynthesisCancelled
 from robosc.synthesis import Progress
-from robosc.synthesis.closure import Closure, Step
+from robosc.synthesis.chaining import Chaining
+from robosc.synthesis.engines import Manager, make_manager
+from robosc.synthesis.saturation import Saturation
+from robosc.synthesis.step import Step
 from robosc.synthesis.watch import Watch
 
-ORDER = ("a", "b", "c", "d")
+ORDER = ("a", "b", "c", "d", "e")
+LEVELS = {name: level for level, name in enumerate(ORDER)}
 State = tuple[bool, ...]
+Move = Callable[[State], set[State]]
+
+
+def silent() -> Watch:
+    return Watch(lambda: False, lambda progress: None)
+
+
+def random_moves(dice: Random) -> tuple[frozenset[str], Move]:
+    """Where one event leads to, nondeterministically, and the variables that it reads or changes."""
+    names = dice.sample(ORDER, dice.randint(1, 3))
+    places = [ORDER.index(name) for name in names]
+    table = {
+        values: [tuple(dice.random() < 0.5 for _ in names) for _ in range(dice.randint(1, 2))]
+        for values in product((False, True), repeat=len(names))
+        if dice.random() < 0.6
+    }
+
+    def move(state: State) -> set[State]:
+        targets = table.get(tuple(state[place] for place in places), [])
+        changes = [dict(zip(places, values, strict=True)) for values in targets]
+        return {tuple(changed.get(place, value) for place, value in enumerate(state)) for changed in changes}
+
+    return frozenset(names), move
+
+
+class Sets:
+    """Sets of states as predicates and back, a state at a time."""
+
+    def __init__(self, manager: Manager) -> None:
+        self.manager = manager
+        manager.declare(*ORDER)
+
+    def predicate(self, states: set[State]) -> Any:
+        found = self.manager.false
+        for state in states:
+            one = self.manager.true
+            for name, value in zip(ORDER, state, strict=True):
+                one = one & (self.manager.var(name) if value else ~self.manager.var(name))
+            found = found | one
+        return found
+
+    def states(self, predicate: Any) -> set[State]:
+        return {
+            state
+            for state in product((False, True), repeat=len(ORDER))
+            if self.manager.let(dict(zip(ORDER, state, strict=True)), predicate) == self.manager.true
+        }
+
+    def step(self, names: frozenset[str], move: Move) -> Step:
+        """The step by substitution of what is above: it is asked about parts of diagrams, too."""
+
+        def add(predicate: Any) -> Any:
+            # Of a part every variable above is free, and so it is in what comes of it.
+            return self.predicate({target for state in self.states(predicate) for target in move(state)})
+
+        return Step(add, names)
+
+
+def swept(moves: Sequence[Move], begin: set[State], within: set[State]) -> set[State]:
+    """The slow and obvious way."""
+    while True:
+        grown = begin | {target for move in moves for state in begin for target in move(state) if target in within}
+        if grown == begin:
+            return begin
+        begin = grown
+
+
+@pytest.mark.parametrize("engine", ["cudd", "autoref"])
+@settings(max_examples=80, deadline=None)
+@given(seed=st.integers(0, 2**32))
+def test_both_find_what_sweeps_find(engine: str, seed: int) -> None:
+    dice = Random(seed)
+    moves = [random_moves(dice) for _ in range(dice.randint(0, 6))]
+    everything = list(product((False, True), repeat=len(ORDER)))
+    share = dice.choice((0.5, 0.8, 1.0))
+    within = {state for state in everything if dice.random() < share} or set(everything)
+    begin = set(dice.sample(sorted(within), min(len(within), dice.randint(1, 3))))
+    sets = Sets(make_manager(engine))
+    steps = [sets.step(names, move) for names, move in moves]
+    expected = swept([move for _, move in moves], begin, within)
+    limits = sets.predicate(within)
+    chained = Chaining(LEVELS, steps, limits, silent()).of(sets.predicate(begin), "test")
+    saturated = Saturation(sets.manager, LEVELS, steps, limits, silent()).of(sets.predicate(begin), "test")
+    assert sets.states(chained) == expected
+    assert saturated == chained
+
+
+def test_saturation_stays_below_what_a_step_is_about() -> None:
+    sets = Sets(make_manager("autoref"))
+    seen: list[Any] = []
+
+    def add(predicate: Any) -> Any:
+        seen.append(predicate)
+        return sets.manager.let({"d": ~sets.manager.var("d")}, predicate)
+
+    begin = sets.predicate({(True, False, True, False, True), (False, False, True, True, True)})
+    steps = [Step(add, frozenset({"d"})), Step(lambda states: states, frozenset({"a"}))]
+    found = Saturation(sets.manager, LEVELS, steps, sets.manager.true, silent()).of(begin, "test")
+    assert sets.states(found) == {(a, False, True, d, True) for a in (False, True) for d in (False, True)}
+    # Neither `a` nor `b` nor `c` is of any interest to the step.
+    assert all(not sets.manager.support(predicate) & {"a", "b", "c"} for predicate in seen)  # type: ignore[attr-defined]
+    # From each of the two parts once, and once more to see that it is closed.
+    assert len(seen) == 4
 
 
 class States(frozenset[State]):
@@ -28,51 +136,15 @@ class States(frozenset[State]):
         return States(super().__or__(other))
 
 
-def silent() -> Watch:
-    return Watch(lambda: False, lambda progress: None)
+class Everything:
+    """What all states keep to."""
+
+    def __and__(self, other: Any) -> Any:
+        return other
 
 
-def random_step(dice: Random) -> Step:
-    """A step that reads and changes some variables, and is restricted by a predicate over all of them."""
-    names = dice.sample(ORDER, dice.randint(1, 3))
-    places = [ORDER.index(name) for name in names]
-    table = {
-        values: tuple(dice.random() < 0.5 for _ in names)
-        for values in product((False, True), repeat=len(names))
-        if dice.random() < 0.7
-    }
-    allowed = {state for state in product((False, True), repeat=len(ORDER)) if dice.random() < 0.7}
-
-    def add(states: States) -> States:
-        found = set()
-        for state in states & allowed:
-            values = table.get(tuple(state[place] for place in places))
-            if values is not None:
-                changed = dict(zip(places, values, strict=True))
-                found.add(tuple(changed.get(place, value) for place, value in enumerate(state)))
-        return States(found)
-
-    return Step(add, frozenset(names))
-
-
-def swept(steps: list[Step], states: States) -> States:
-    """The slow and obvious way."""
-    while True:
-        grown = states
-        for step in steps:
-            grown = grown | step.add(grown)
-        if grown == states:
-            return states
-        states = grown
-
-
-@settings(max_examples=300, deadline=None)
-@given(st.integers(0, 2**32))
-def test_it_is_what_sweeps_find(seed: int) -> None:
-    dice = Random(seed)
-    steps = [random_step(dice) for _ in range(dice.randint(0, 8))]
-    begin = States({tuple(dice.random() < 0.5 for _ in ORDER)})
-    assert Closure(steps, ORDER, silent()).of(begin, "test") == swept(steps, begin)
+def chaining(step: Step, watch: Watch) -> Chaining:
+    return Chaining(LEVELS, [step], Everything(), watch)
 
 
 def counting(limit: int) -> tuple[Step, list[int]]:
@@ -86,30 +158,64 @@ def counting(limit: int) -> tuple[Step, list[int]]:
     return Step(add, frozenset({"a"})), asked
 
 
-def test_enough_is_enough() -> None:
+def test_enough_is_enough_for_chaining() -> None:
     step, asked = counting(1000)
     enough: Callable[[Any], bool] = lambda states: len(states) == 5  # noqa: E731
-    found = Closure([step], ORDER, silent()).of(States({(True,)}), "test", enough)
+    found = chaining(step, silent()).of(States({(True,)}), "test", enough)
     assert len(found) == 5
     assert asked == [1, 2, 3, 4]
 
 
-def test_it_stops_when_told_and_tells_where_it_is() -> None:
+def counter(sets: Sets) -> Step:
+    """Counts with all five bits upwards."""
+    return sets.step(frozenset(ORDER), lambda state: {_following(state)})
+
+
+def _following(state: State) -> State:
+    number = sum(value << place for place, value in enumerate(reversed(state))) + 1
+    return tuple(bool(number >> place & 1) for place in reversed(range(len(state))))
+
+
+@pytest.mark.parametrize("wanted", [1, 5, 32])
+def test_enough_is_enough_for_saturation(wanted: int) -> None:
+    sets = Sets(make_manager("autoref"))
+    saturation = Saturation(sets.manager, LEVELS, [counter(sets)], sets.manager.true, silent())
+    begin = sets.predicate({(False,) * 5})
+    found = saturation.of(begin, "test", lambda states: len(sets.states(states)) >= wanted)
+    assert len(sets.states(found)) == wanted
+
+
+def test_chaining_stops_when_told() -> None:
     step, asked = counting(1000)
-    told: list[Progress] = []
-    closure = Closure([step], ORDER, Watch(lambda: len(asked) >= 20, told.append))
-    try:
-        closure.of(States({(True,)}), "test")
-    except SynthesisCancelled:
-        assert len(asked) == 20
-    else:
-        raise AssertionError("it did not stop")
+    with pytest.raises(SynthesisCancelled):
+        chaining(step, Watch(lambda: len(asked) >= 20, lambda progress: None)).of(States({(True,)}), "test")
+    assert len(asked) == 20
+
+
+def test_saturation_stops_when_told() -> None:
+    sets = Sets(make_manager("autoref"))
+    asked: list[None] = []
+
+    def should_stop() -> bool:
+        asked.append(None)
+        return len(asked) == 7
+
+    watch = Watch(should_stop, lambda progress: None)
+    with pytest.raises(SynthesisCancelled):
+        Saturation(sets.manager, LEVELS, [counter(sets)], sets.manager.true, watch).of(
+            sets.predicate({(False,) * 5}), "test"
+        )
+    assert len(asked) == 7
 
 
 def test_progress_is_told_at_the_end_at_least() -> None:
     step, _ = counting(3)
     told: list[Progress] = []
-    Closure([step], ORDER, Watch(lambda: False, told.append)).of(States({(True,)}), "test")
-    assert told
+    chaining(step, Watch(lambda: False, told.append)).of(States({(True,)}), "test")
+    sets = Sets(make_manager("autoref"))
+    watch = Watch(lambda: False, told.append)
+    found = Saturation(sets.manager, LEVELS, [counter(sets)], sets.manager.true, watch).of(
+        sets.predicate({(True, True, True, True, False)}), "test"
+    )
     assert {progress.phase for progress in told} == {"test"}
-    assert told[-1].nodes == 3
+    assert [told[0].nodes, told[-1].nodes] == [3, found.dag_size]

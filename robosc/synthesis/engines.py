@@ -162,7 +162,7 @@ def limited(manager: Manager, maximum_nodes: int | None) -> Iterator[None]:
     Raises:
         NodeLimitError: An operation would have grown too far.
     """
-    if maximum_nodes is None or "cudd" not in type(manager).__module__:
+    if maximum_nodes is None or not is_compiled(manager):
         yield
         return
     is_full = False
@@ -192,6 +192,11 @@ def node_check(manager: Manager, maximum_nodes: int | None) -> Callable[[], None
 def node_limit_error(maximum_nodes: int) -> NodeLimitError:
     """What is told when diagrams have become too large."""
     return NodeLimitError(f"the decision diagrams need more than the {maximum_nodes} nodes that they may have")
+
+
+def is_compiled(manager: Manager) -> bool:
+    """Whether an engine is CUDD, beside which every node that Python looks at is expensive."""
+    return "cudd" in type(manager).__module__
 
 
 def is_reordering(manager: Manager) -> bool:

@@ -5,10 +5,10 @@ ICCAD 1990, pp. 126-129 (restrict); R. E. Bryant, "Graph-based algorithms for Bo
 IEEE Trans. Computers C-35(8), 1986, pp. 677-691 (counting).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from robosc.synthesis.engines import Manager
+from robosc.synthesis.engines import Manager, is_compiled
 
 
 def cofactors(node: Any) -> tuple[Any, Any]:
@@ -45,6 +45,35 @@ def support(manager: Manager, node: Any) -> set[str]:
             found.add(item.var)
             stack += [item.low, item.high]
     return found
+
+
+def renamed(manager: Manager, names: Mapping[str, str], node: Any) -> Any:
+    """A predicate with variables called otherwise, no two alike.
+
+    The plain engine would build anew what stands below all of them: here that is not looked at.
+    """
+    if not names or is_compiled(manager):
+        return manager.let(names, node) if names else node
+    return _Renaming(manager, names).walk(node)
+
+
+class _Renaming:
+    def __init__(self, manager: Manager, names: Mapping[str, str]) -> None:
+        self._manager = manager
+        self._new = {name: manager.var(new) for name, new in names.items()}
+        self._deepest = max(manager.var(name).level for name in names)
+        self._known: dict[int, Any] = {}
+
+    def walk(self, node: Any) -> Any:
+        if is_constant(self._manager, node) or node.level > self._deepest:
+            return node
+        found = self._known.get(int(node))
+        if found is None:
+            low, high = cofactors(node)
+            variable = self._new.get(node.var)
+            test = self._manager.var(node.var) if variable is None else variable
+            found = self._known[int(node)] = self._manager.ite(test, self.walk(high), self.walk(low))
+        return found
 
 
 def count_models(manager: Manager, node: Any, variables: Sequence[str]) -> int:

@@ -16,7 +16,7 @@ from robosc.automata.structure import Automaton, Edge, Event, Role, System
 from robosc.errors import NondeterministicEventError
 from robosc.synthesis.changes import Leads, leads_of
 from robosc.synthesis.encoding import Bits, Encoding, next_name
-from robosc.synthesis.nodes import support
+from robosc.synthesis.nodes import renamed, support
 from robosc.synthesis.symbolic import Symbols
 
 
@@ -272,7 +272,7 @@ class Steps:
             self._relation = self._without_hidden(relation)
         moved = self._exist(self._changed, states & self._relation)
         if self._composed:
-            moved = manager.let({next_name(name): name for name in self._composed}, moved)
+            moved = renamed(manager, {next_name(name): name for name in self._composed}, moved)
         # What is written as a constant needs no next-state variable: it is forgotten, and then known.
         return moved & self._arrival
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robosc.synthesis.engines import make_manager
-from robosc.synthesis.nodes import cofactors, count_models, restrict
+from robosc.synthesis.nodes import cofactors, count_models, renamed, restrict
 
 NAMES = tuple(f"x{number}" for number in range(6))
 formulas = st.recursive(
@@ -48,6 +48,21 @@ def truth(formula: Any, values: dict[str, bool]) -> bool:
 
 
 VALUATIONS = [dict(zip(NAMES, bits, strict=True)) for bits in product((False, True), repeat=len(NAMES))]
+
+
+def with_names(formula: Any, names: dict[str, str]) -> Any:
+    if isinstance(formula, str):
+        return names.get(formula, formula)
+    return (formula[0], *(with_names(part, names) for part in formula[1:]))
+
+
+@settings(max_examples=100, deadline=None)
+@given(formula=formulas, places=st.sets(st.integers(0, 2)))
+def test_renaming(manager: Any, formula: Any, places: set[int]) -> None:
+    """Each variable is called like its neighbour, which the predicate does not depend on."""
+    own = with_names(formula, {f"x{2 * place + 1}": f"x{2 * place}" for place in range(3)})
+    names = {f"x{2 * place}": f"x{2 * place + 1}" for place in places}
+    assert renamed(manager, names, build(manager, own)) == build(manager, with_names(own, names))
 
 
 @settings(max_examples=100, deadline=None)

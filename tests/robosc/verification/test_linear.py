@@ -25,9 +25,9 @@ DATUM = (-500_000, 2_000_000)
 COMPARISONS = ("=", "!=", "<", "<=", ">", ">=")
 
 
-def variables_of(made: System) -> Variables:
+def variables_of(made: System, limit: int = 200_000) -> Variables:
     """Variables whose expressions may take some work: an unlucky expression is left out."""
-    return Variables(made, "auto", Work(200_000, lambda: False, lambda message: None))
+    return Variables(made, "auto", Work(limit, lambda: False, lambda message: None))
 
 
 def wide(update: Expression, condition: Expression | None = None) -> System:
@@ -166,6 +166,21 @@ def test_updates_write_what_they_should_or_leave_the_range(seed: int) -> None:
         kept = state["x"] if expected is None else expected
         nothing = variables.manager.false
         assert written == (nothing if leaves else variables.has_value(place.after(), kept)), (update, state, datum)
+
+
+@pytest.mark.parametrize(("first", "second"), [(3, 7), (-2, 4), (5, -3)])
+def test_quotients_are_divided_again(first: int, second: int) -> None:
+    """A form with a divisor of its own keeps what is lost of it."""
+    dice = Dice(1)
+    quotient = operation(operation(read("A.y"), "+", received("d")), "div", first)
+    for again in (operation(quotient, "div", second), operation(quotient, "mod", second)):
+        condition = operation(again, ">", 1)
+        variables = variables_of(wide(received("d"), condition), 10**8)
+        truth = Expressions(variables, "u_got").truth(condition)
+        for _ in range(40):
+            state, datum = dice.values()
+            expected, held = meaning(variables, condition, state, datum), holding(variables, state, datum)
+            assert is_true(variables, truth.true, held) == (expected is True), (condition, state, datum)
 
 
 def test_a_sum_of_bits_and_a_bound_take_few_nodes() -> None:

@@ -172,10 +172,10 @@ def test_updates_write_what_they_should_or_leave_the_range(seed: int) -> None:
 def test_quotients_are_divided_again(first: int, second: int) -> None:
     """A form with a divisor of its own keeps what is lost of it."""
     dice = Dice(1)
-    quotient = operation(operation(read("A.y"), "+", received("d")), "div", first)
+    quotient = operation(operation(read("A.x"), "+", received("d")), "div", first)
     for again in (operation(quotient, "div", second), operation(quotient, "mod", second)):
         condition = operation(again, ">", 1)
-        variables = variables_of(wide(received("d"), condition), 10**8)
+        variables = variables_of(wide(received("d"), condition), 10**7)
         truth = Expressions(variables, "u_got").truth(condition)
         for _ in range(40):
             state, datum = dice.values()

@@ -81,8 +81,11 @@ class Formulas:
     def formula(self, diagram: DecisionDiagram) -> Expression | None:
         """A formula that reads better than its diagram, or None where none was found."""
         if diagram not in self._known:
-            tests = sum(line.operands for line in diagram_lines(diagram, self.domains))
-            limit = min(OPERANDS, max(SHORT, tests))
+            limit = OPERANDS
+            # Every line writes down a test at least: those of very many need not be told to be counted.
+            if len(_order(*_branches(diagram, self.domains), diagram.root)) < OPERANDS:
+                tests = sum(line.operands for line in diagram_lines(diagram, self.domains))
+                limit = min(OPERANDS, max(SHORT, tests))
             self._known[diagram] = to_expression(diagram, self.domains, limit=limit, effort=self.effort)
         return self._known[diagram]
 
@@ -106,13 +109,7 @@ def size_in_words(diagram: DecisionDiagram) -> str:
 def diagram_lines(diagram: DecisionDiagram, domains: Domains) -> tuple[Line, ...]:
     """A diagram node by node, the root first; a node that decides nothing is left out for what it leads to."""
     branches, leads_to = _branches(diagram, domains)
-    root = leads_to[diagram.root]
-    needed = {root}
-    for number in reversed(range(2, len(leads_to))):
-        if number in needed:
-            needed |= branches[number].keys()
-    # Children stand before their parents in a diagram, and after them in the text.
-    order = sorted((number for number in needed if number > 1), reverse=True)
+    order = _order(branches, leads_to, diagram.root)
     numbers = {number: place for place, number in enumerate(order, start=1)}
     return tuple(
         _line(diagram.nodes[number - 2], branches[number], numbers, numbers[number], domains) for number in order
@@ -135,6 +132,16 @@ def _branches(diagram: DecisionDiagram, domains: Domains) -> tuple[list[Branches
         found.append({child: merged(parts) for child, parts in runs.items()})
         leads_to.append(number if len(runs) > 1 else next(iter(runs)))
     return found, leads_to
+
+
+def _order(branches: list[Branches], leads_to: list[int], root: int) -> list[int]:
+    """The numbers of the nodes that the text tells, in its order."""
+    needed = {leads_to[root]}
+    for number in reversed(range(2, len(leads_to))):
+        if number in needed:
+            needed.update(branches[number])
+    # Children stand before their parents in a diagram, and after them in the text.
+    return sorted((number for number in needed if number > 1), reverse=True)
 
 
 def _line(node: DecisionNode, branches: Branches, numbers: Mapping[int, int], number: int, domains: Domains) -> Line:

@@ -4,7 +4,8 @@ A value of a finite domain is encoded by its index, most significant bit first. 
 the current state and, next to it in the order, one for the next state if forward images need it: if some event writes
 it otherwise than as one constant. Bits of
 received data stand among those of the variable that is first in the order of those they are written to: were they
-apart, a relation that copies several data would have to remember all of them at once.
+apart, a relation that copies several data would have to remember all of them at once. Bits of wide integers that are
+compared or computed with together stand among each other, those of equal weight side by side: see `blocks`.
 """
 
 from collections import defaultdict
@@ -16,9 +17,10 @@ from robosc.automata.state import Subject, initial_values, subject_domain, subje
 from robosc.automata.structure import InputVariable, System
 from robosc.expressions import IntegerType, PathStep, Type, Value, domain
 from robosc.recursion import allow_depth
+from robosc.synthesis.blocks import Datum, blocks_of
 from robosc.synthesis.changes import computed_subjects
 from robosc.synthesis.engines import Manager
-from robosc.synthesis.order import input_targets, subject_order
+from robosc.synthesis.order import block_order, input_targets
 
 _FRAMES_PER_LEVEL = 4
 """The plain engine and the walks of `nodes` and `diagrams` go down a level at a time."""
@@ -53,6 +55,7 @@ class Encoding:
         manager: The manager.
         system: The system.
         subjects: Bits of each place of a state.
+        blocks: The places, topmost first; bits of places in one block stand among each other.
         state_names: Every current-state variable, in the manager's order.
         order: Every variable, in the order in which they were declared.
         pause: Called again and again while expressions become predicates: it may end the work with an error.
@@ -62,15 +65,18 @@ class Encoding:
         self.system = system
         self.manager = manager
         self.subjects: dict[Subject, Bits] = {}
-        for number, subject in enumerate(subject_order(system)):
+        found = blocks_of(system)
+        self.blocks = block_order(system, found.places)
+        for number, subject in enumerate(subject for block in self.blocks for subject in block):
             self.subjects[subject] = self._bits(f"s{number}", subject_domain(system, subject), self._type(subject))
-        self.state_names = tuple(name for bits in self.subjects.values() for name in bits.names)
         self.inputs = tuple((item, self._input(number, item)) for number, item in enumerate(system.inputs))
         self.pause = pause
         self.order: list[str] = []
         self._choices = 0
         self._valid_states: Any = None
-        self._declare()
+        self._declare(found.data)
+        state_names = {name for bits in self.subjects.values() for name in bits.names}
+        self.state_names = tuple(name for name in self.order if name in state_names)
         # Twice the bits of a state, for the next one; choices are few.
         levels = 2 * len(self.state_names) + sum(len(_names(bits)) for _, bits in self.inputs)
         allow_depth(levels, _FRAMES_PER_LEVEL)
@@ -87,16 +93,23 @@ class Encoding:
         known = f"i{number}.known" if item.may_be_unknown else None
         return self._bits(f"i{number}", domain(item.type), item.type, known)
 
-    def _declare(self) -> None:
-        """Put all variables in order."""
+    def _declare(self, computed_with: Mapping[Datum, Subject]) -> None:
+        """Put all variables in order.
+
+        Args:
+            computed_with: For some data the first place of the block that they belong to.
+        """
         targets = input_targets(self.system)
         beside: defaultdict[Subject | None, list[Bits]] = defaultdict(list)
+        block_of = {subject: block for block in self.blocks for subject in block}
         for item, bits in self.inputs:
             written = targets.get((item.event, item.path), set())
-            beside[next((subject for subject in self.subjects if subject in written), None)].append(bits)
+            home = computed_with.get((item.event, item.path))
+            among = self.subjects if home is None else block_of[home]
+            beside[next((subject for subject in among if subject in written), home)].append(bits)
         computed = computed_subjects(self.system)
-        for subject, bits in self.subjects.items():
-            self._add(*_interleaved(bits, beside[subject], has_next=subject in computed))
+        for block in self.blocks:
+            self._add(*_interleaved([(self.subjects[item], item in computed, beside[item]) for item in block]))
         for bits in beside[None]:
             self._add(*_names(bits))
 
@@ -207,18 +220,21 @@ def _names(bits: Bits) -> tuple[str, ...]:
     return bits.names if bits.known is None else (bits.known, *bits.names)
 
 
-def _interleaved(place: Bits, inputs: Sequence[Bits], *, has_next: bool) -> list[str]:
-    """Names of a place of the state and of received data; bits of equal weight stand together."""
-    ranked = [
-        (len(bits.names) - rank, name, bits is place)
-        for bits in (place, *inputs)
-        for rank, name in enumerate(_names(bits), start=0 if bits.known is None else -1)
-    ]
-    # Stable: within one weight the state comes first.
+def _interleaved(block: Sequence[tuple[Bits, bool, Sequence[Bits]]]) -> list[str]:
+    """Names of places of the state and of received data beside them; bits of equal weight stand together.
+
+    Args:
+        block: For each place its bits, whether it has next-state variables, and the data beside it.
+    """
+    ranked: list[tuple[int, tuple[str, ...]]] = []
+    for place, has_next, inputs in block:
+        for bits in (place, *inputs):
+            for rank, name in enumerate(_names(bits), start=0 if bits.known is None else -1):
+                is_doubled = bits is place and has_next
+                ranked.append((len(bits.names) - rank, (name, next_name(name)) if is_doubled else (name,)))
+    # Stable: within one weight a place comes before its data.
     ranked.sort(key=lambda item: -item[0])
-    return [
-        each for _, name, is_state in ranked for each in ((name, next_name(name)) if is_state and has_next else (name,))
-    ]
+    return [name for _, names in ranked for name in names]
 
 
 def _implied(later: InputVariable, earlier: InputVariable) -> bool:

@@ -10,7 +10,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import permutations
 
-from robosc.automata.state import Subject, subjects
+from robosc.automata.state import Subject
 from robosc.automata.structure import System
 from robosc.expressions import Binary, Expression, PathStep, Received, StateTest, Unary, VariableRead, leaves
 
@@ -21,12 +21,17 @@ _SLIDES = 4
 """Times that the window slides at most."""
 
 
-def subject_order(system: System) -> tuple[Subject, ...]:
-    """The places of a state, so that those that an event touches together stand near each other."""
-    places = subjects(system)
-    index = {subject: place for place, subject in enumerate(places)}
-    edges = [[index[subject] for subject in edge] for edge in hyperedges(system)]
-    return tuple(places[place] for place in slide(force(len(places), edges), edges))
+def block_order(system: System, blocks: Sequence[tuple[Subject, ...]]) -> tuple[tuple[Subject, ...], ...]:
+    """The blocks of places of a state, so that those that an event touches together stand near each other.
+
+    Args:
+        system: The system.
+        blocks: Each place of its state once; the places of one block have one place in the order.
+    """
+    index = {subject: place for place, block in enumerate(blocks) for subject in block}
+    edges = [sorted({index[subject] for subject in edge}) for edge in hyperedges(system)]
+    edges = [edge for edge in edges if len(edge) > 1]
+    return tuple(blocks[place] for place in slide(force(len(blocks), edges), edges))
 
 
 def hyperedges(system: System) -> tuple[frozenset[Subject], ...]:

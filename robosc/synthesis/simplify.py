@@ -31,6 +31,10 @@ MAXIMUM_NODES = 20_000
 MAXIMUM_KEPT_NODES = 1_000
 """Nodes of it that may be left over the places that a restricted condition tests."""
 
+MAXIMUM_RANGES = 10_000
+"""Ranges of values that the diagram of such a set of states may tell apart: bits of several places may take far fewer
+nodes than their values do."""
+
 MAXIMUM_SUBJECTS = 40
 """Places that a restricted condition may test: with more, no formula would be short."""
 
@@ -116,7 +120,7 @@ class Simplifier:
         if self._is_large(positive) or self._is_large(negative):
             return
         try:
-            diagrams = [extract(self._encoding, states) for states in (positive, negative)]
+            diagrams = [extract(self._encoding, states, MAXIMUM_RANGES) for states in (positive, negative)]
             space = Space(diagrams, self._domains, self._formulas.effort.part(STEPS))
             words = Words(space, self._domains)
             sets = [space.of(diagram) for diagram in diagrams]

@@ -1,4 +1,7 @@
-"""Expressions as predicates: connectives become operations on diagrams, all else is worked out value by value."""
+"""Expressions as predicates: connectives become operations on diagrams, few values are gone through one by one.
+
+Of wide integers, which have too many, comparisons and updates become linear relations.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,6 +14,7 @@ from robosc.automata.state import Subject, subject_type
 from robosc.expressions import (
     Binary,
     BooleanType,
+    Call,
     Conditional,
     Constant,
     Expression,
@@ -20,11 +24,15 @@ from robosc.expressions import (
     Value,
     VariableRead,
 )
+from robosc.verification.symbolic.linear import Cases, Form, Linear, NotLinearError
 from robosc.verification.symbolic.variables import Digits, Variables
 from robosc.verification.symbolic.work import TooMuchWorkError
 
 MAXIMUM_VALUATIONS = 50_000
 """Combinations of values for which one expression is worked out."""
+
+FEW_VALUATIONS = 500
+"""Combinations up to which that is done even where the expression is linear."""
 
 _CONNECTIVES = ("and", "or", "implies")
 _COMPARISONS = ("=", "!=", "<", "<=", ">", ">=")
@@ -50,6 +58,7 @@ class Expressions:
         self._variables = variables
         self._event = event
         self._known: dict[Expression, Truth] = {}
+        self._linear = Linear(variables)
 
     def truth(self, expression: Expression) -> Truth:
         """Where a condition is true and where it is false."""
@@ -107,6 +116,10 @@ class Expressions:
                 return self._worked_out(expression)
 
     def _worked_out(self, expression: Expression) -> Truth:
+        if isinstance(expression, Binary) and expression.operator in _COMPARISONS:
+            left, right = self.integer(expression.left, expression), self.integer(expression.right, expression)
+            if left is not None and right is not None:
+                return self._compared(expression.operator, left, right)
         table, manager = self.table(expression), self._variables.manager
         return Truth(
             table.where(lambda value: manager.true if value is True else manager.false),
@@ -129,6 +142,102 @@ class Expressions:
         count = self._variables.work.count
         return Truth(count(true), count(false))
 
+    def _compared(self, operator: str, left: Cases, right: Cases) -> Truth:
+        variables = self._variables
+        true = false = variables.manager.false
+        for first, one in left:
+            for second, other in right:
+                both = first & second
+                if both != variables.manager.false:
+                    outcome = self._linear.compared(operator, one, other)
+                    true, false = variables.work.count(true | (both & outcome)), false | (both & ~outcome)
+        return self._counted(true, false)
+
+    # Integers
+
+    def integer(self, expression: Expression, whole: Expression) -> Cases | None:
+        """The linear forms of an integer; None where it has none, or where the whole it is in has few values."""
+        if self._valuations(whole) <= FEW_VALUATIONS:
+            return None
+        try:
+            return self._integer(expression)
+        except NotLinearError:
+            return None
+
+    def equal(self, form: Form, digits: Digits) -> Any:
+        """Where a form and some digits are the same integer."""
+        return self._linear.compared("=", form, self._linear.form(digits))
+
+    def between(self, form: Form, low: int, high: int) -> Any:
+        """Where a form is between two numbers."""
+        return self._linear.between(form, low, high)
+
+    def _valuations(self, expression: Expression) -> int:
+        """How many combinations of values what an expression reads has."""
+        places = (self._variables.place_of[subject] for subject in subjects_read(expression))
+        count = prod(self._variables.places[place].size() for place in places)
+        return count * prod(self._data(path).size() for path in paths_read(expression))
+
+    def _integer(self, expression: Expression) -> Cases:
+        spine: list[Binary] = []
+        while isinstance(expression, Binary):
+            spine.append(expression)
+            expression = expression.left
+        result = self._integer_operand(expression)
+        functions = {
+            "+": lambda one, other: [(self._variables.manager.true, one.plus(other))],
+            "-": lambda one, other: [(self._variables.manager.true, one.plus(other, -1))],
+            "*": self._linear.product,
+            "div": self._linear.quotient,
+            "mod": self._linear.remainder,
+        }
+        for item in reversed(spine):
+            if item.operator not in functions:
+                raise NotLinearError
+            result = self._linear.joined(result, self._integer(item.right), functions[item.operator])
+        return result
+
+    def _integer_operand(self, expression: Expression) -> Cases:
+        linear, true = self._linear, self._variables.manager.true
+        match expression:
+            case Constant(value=int(value)) if not isinstance(value, bool):
+                return ((true, Form((), value)),)
+            case VariableRead(component=component, variable=variable):
+                return self._read(self._variables.places[self._variables.place_of[Subject(component, variable)]])
+            case Received(path=path):
+                return self._read(self._data(path))
+            case Unary(operator="-", operand=operand):
+                return linear.collected((where, form.times(-1)) for where, form in self._integer(operand))
+            case Conditional(condition=condition, then=then, otherwise=otherwise):
+                test = self.truth(condition)
+                yes = [(test.true & where, form) for where, form in self._integer(then)]
+                return linear.collected(
+                    [*yes, *((test.false & where, form) for where, form in self._integer(otherwise))]
+                )
+            case Call(function="integer", arguments=(argument,)):
+                return self._integer(argument)
+            case Call(function="abs", arguments=(argument,)):
+                return linear.joined(
+                    self._integer(argument), ((true, Form((), 0)),), lambda one, _: linear.greater(one, one.times(-1))
+                )
+            case Call(function="min", arguments=(first, second)):
+                return linear.joined(self._integer(first), self._integer(second), linear.lesser)
+            case Call(function="max", arguments=(first, second)):
+                return linear.joined(self._integer(first), self._integer(second), linear.greater)
+            case Call(function="clamp", arguments=(value, low, high)):
+                raised = linear.joined(self._integer(value), self._integer(low), linear.greater)
+                return linear.joined(raised, self._integer(high), linear.lesser)
+        raise NotLinearError
+
+    def _read(self, digits: Digits) -> Cases:
+        if not isinstance(digits.values, range):
+            raise NotLinearError
+        manager = self._variables.manager
+        known = manager.true if digits.known is None else manager.var(digits.known)
+        return ((known, self._linear.form(digits)),)
+
+    # Tables
+
     def table(self, expression: Expression) -> "Table":
         """The value of an expression for all values of what it reads.
 
@@ -139,7 +248,7 @@ class Expressions:
         places = sorted(variables.place_of[subject] for subject in subjects_read(expression))
         paths = paths_read(expression)
         read = [*(variables.places[place] for place in places), *(self._data(path) for path in paths)]
-        count = prod(digits.size() for digits in read)
+        count = self._valuations(expression)
         if count > MAXIMUM_VALUATIONS:
             raise TooMuchWorkError(f"an expression has {count} values")
         variables.work.spend(count)

@@ -6,11 +6,15 @@ variable ordering heuristic for reduced computational effort of symbolic supervi
 IFAC-PapersOnLine 53(4), pp. 429-436.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence, Set
 
-from robosc.automata.compile import subjects_read
+from robosc.automata.compile import Path, paths_read, subjects_read
 from robosc.automata.state import Subject, subjects
 from robosc.automata.structure import System
+from robosc.expressions import Binary, Expression, Unary
+
+WIDE = 5
+"""Digits from which an integer is wide."""
 
 
 def place_order(system: System) -> tuple[int, ...]:
@@ -72,3 +76,56 @@ def _groups(system: System) -> Iterable[set[Subject]]:
     yield from touched.values()
     for invariant in system.invariants:
         yield set(subjects_read(invariant))
+
+
+def tied(
+    system: System,
+    places: Mapping[Subject, int],
+    widths: Mapping[int, int],
+    data: Mapping[tuple[str, Path], int],
+) -> tuple[Set[Hashable], ...]:
+    """The wide places and data that simple conditions and updates compute with together, those that share one joined.
+
+    Args:
+        system: The system.
+        places: The place of each subject.
+        widths: How many digits each place has.
+        data: How many digits each datum has, by event and path.
+    """
+    groups: list[set[Hashable]] = []
+    for expression, event, subject in _computed(system):
+        read = set[Hashable](places[item] for item in subjects_read(expression) if widths[places[item]] >= WIDE)
+        read |= {(event, path) for path in paths_read(expression) if data.get((event, path), 0) >= WIDE}
+        if subject is not None and widths[places[subject]] >= WIDE:
+            read.add(places[subject])
+        if len(read) > 1:
+            touched = [group for group in groups if group & read]
+            groups = [*(group for group in groups if not group & read), read.union(*touched)]
+    return tuple(groups)
+
+
+def _computed(system: System) -> Iterator[tuple[Expression, str, Subject | None]]:
+    """Every simple condition and every update, with its event and the variable that it writes."""
+    for automaton in system.automata:
+        for edge in automaton.edges:
+            for part in _simple(edge.guard):
+                yield part, edge.event, None
+            for update in edge.updates:
+                yield update.expression, edge.event, Subject(automaton.name, update.variable)
+    conditions = [*system.invariants, system.initial, system.marker, *(item.condition for item in system.conditions)]
+    for condition in conditions:
+        for part in _simple(condition):
+            yield part, "", None
+
+
+def _simple(condition: Expression) -> Iterator[Expression]:
+    """The parts of a condition that connectives join."""
+    stack = [condition]
+    while stack:
+        match stack.pop():
+            case Binary(operator="and" | "or" | "implies", left=left, right=right):
+                stack += [right, left]
+            case Unary(operator="not" | "holds", operand=operand):
+                stack.append(operand)
+            case part:
+                yield part

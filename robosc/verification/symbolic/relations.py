@@ -9,7 +9,8 @@ from robosc.automata.state import Subject, subject_type
 from robosc.automata.structure import Assignment, Automaton, Edge, Event, Role
 from robosc.expressions import BooleanType, Expression, IntegerType, Value
 from robosc.verification.symbolic.expressions import Expressions
-from robosc.verification.symbolic.variables import Variables, after, cofactors
+from robosc.verification.symbolic.linear import Cases
+from robosc.verification.symbolic.variables import Digits, Variables, after, cofactors
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,6 +183,10 @@ class Relations:
             made = (truth.true & variables.has_value(digits, True)) | (truth.false & variables.has_value(digits, False))
             return manager.false, made | (~known & kept)
 
+        whole = expressions.integer(update.expression, update.expression) if isinstance(type_, IntegerType) else None
+        if whole is not None:
+            return self._written(expressions, whole, digits, kept)
+
         def in_range(value: Value) -> bool:
             # As the meaning of systems has it, only integers can leave their range.
             return not isinstance(type_, IntegerType) or value in digits.values
@@ -194,6 +199,17 @@ class Relations:
         table = expressions.table(update.expression)
         beyond = table.where(lambda value: manager.true if value is not None and not in_range(value) else manager.false)
         return beyond, table.where(result)
+
+    def _written(self, expressions: Expressions, whole: Cases, digits: Digits, kept: Any) -> tuple[Any, Any]:
+        """Where one of the linear forms of an integer leaves a range, and what is made of its variable elsewhere."""
+        variables = self._variables
+        beyond, result, known = variables.manager.false, variables.manager.false, variables.manager.false
+        for where, form in whole:
+            inside = expressions.between(form, int(digits.values[0]), int(digits.values[-1]))
+            beyond = beyond | (where & ~inside)
+            result = variables.work.count(result | (where & inside & expressions.equal(form, digits)))
+            known = known | where
+        return beyond, result | (~known & kept)
 
 
 def _support(manager: Any, *predicates: Any) -> frozenset[str]:

@@ -1,7 +1,7 @@
 """Places of a state and received data as Boolean variables of a decision diagram."""
 
 import importlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,7 +12,7 @@ from robosc.automata.state import Subject, initial_values, subject_domain, subje
 from robosc.automata.structure import InputVariable, System
 from robosc.expressions import IntegerType, Received, Value, domain, leaves
 from robosc.recursion import allow_depth
-from robosc.verification.symbolic.order import place_order
+from robosc.verification.symbolic.order import place_order, tied
 from robosc.verification.symbolic.work import Work
 
 _FRAMES_PER_LEVEL = 6
@@ -77,6 +77,7 @@ class Variables:
         system: The system.
         places: The digits of each place of a state.
         names: Every variable of the state before an event, topmost first.
+        level: How far down each variable stands, of all there are.
     """
 
     def __init__(self, system: System, engine: str, work: Work) -> None:
@@ -92,28 +93,51 @@ class Variables:
             )
             for number, item in enumerate(system.inputs)
         }
+        self.level: dict[str, int] = {}
         self.names = self._declare(place_order(system))
         allow_depth(2 * len(self.names) + sum(len(item.names) + 1 for item in self.data.values()), _FRAMES_PER_LEVEL)
 
+    def _add(self, *names: str) -> None:
+        """Put variables below those there are."""
+        self.manager.declare(*names)
+        for name in names:
+            self.level[name] = len(self.level)
+
     def _declare(self, order: Sequence[int]) -> tuple[str, ...]:
         """Declare the variables; returns those of a state."""
-        beside = self._data_beside(order)
+        widths = {place: len(digits.names) for place, digits in enumerate(self.places)}
+        groups = tied(self.system, self.place_of, widths, {key: len(item.names) for key, item in self.data.items()})
+        beside = self._data_beside(order, groups)
+        group_of = {item: group for group in groups for item in group}
         names: list[str] = []
+        placed = set[int]()
         for place in order:
-            own = self.places[place]
-            others = beside.get(place, [])
-            self.manager.declare(*(item.known for item in others if item.known is not None))
-            # Digits of one weight stand together, so that copies stay small.
-            for rank in range(max([len(own.names), *(len(item.names) for item in others)]), 0, -1):
-                if rank <= len(own.names):
-                    name = own.names[-rank]
-                    names.append(name)
-                    self.manager.declare(name, after(name))
-                self.manager.declare(*(item.names[-rank] for item in others if rank <= len(item.names)))
+            if place not in placed:
+                members = [item for item in order if item in group_of.get(place, {place})]
+                placed.update(members)
+                names += self._declare_together(members, beside)
         return tuple(names)
 
-    def _data_beside(self, order: Sequence[int]) -> dict[int, list[Digits]]:
-        """For some places the data that stand with them: where they are written to, or anywhere."""
+    def _declare_together(self, members: Sequence[int], beside: Mapping[int, Sequence[Digits]]) -> list[str]:
+        """Declare some places and the data beside them: digits of one weight stand together, so that copies are small.
+
+        Integers that are computed with together are so, too: what has to be remembered of them is a carry.
+        """
+        names: list[str] = []
+        data = [item for place in members for item in beside.get(place, [])]
+        self._add(*(item.known for item in data if item.known is not None))
+        widths = [*(len(self.places[place].names) for place in members), *(len(item.names) for item in data)]
+        for rank in range(max(widths), 0, -1):
+            for place in members:
+                own = self.places[place]
+                if rank <= len(own.names):
+                    names.append(own.names[-rank])
+                    self._add(own.names[-rank], after(own.names[-rank]))
+                self._add(*(item.names[-rank] for item in beside.get(place, []) if rank <= len(item.names)))
+        return names
+
+    def _data_beside(self, order: Sequence[int], groups: Sequence[Set[Any]]) -> dict[int, list[Digits]]:
+        """For some places the data that stand with them: what they are computed with or written to, or anywhere."""
         level = {place: number for number, place in enumerate(order)}
         written: dict[Any, int] = {}
         for automaton in self.system.automata:
@@ -124,6 +148,11 @@ class Variables:
                         if isinstance(leaf, Received):
                             key = (edge.event, leaf.path)
                             written[key] = min(written.get(key, place), place, key=lambda item: level[item])
+        for group in groups:
+            members = [place for place in order if place in group]
+            for key in self.data:
+                if members and key in group and written.get(key) not in members:
+                    written[key] = members[0]
         found: dict[int, list[Digits]] = {}
         for key, digits in self.data.items():
             found.setdefault(written.get(key, order[-1]), []).append(digits)

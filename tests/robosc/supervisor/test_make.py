@@ -133,13 +133,15 @@ def test_progress_and_cancellation() -> None:
     [
         ("x := value.a, b := x > 7", "passed"),
         ("x := value.a, y := value.b", "passed"),
-        ("b := value.a < value.b", "not checked"),
+        ("b := value.a < value.b", "passed"),
+        ("b := value.a * value.c < 7", "not checked"),
     ],
 )
 def test_wide_integers_are_synthesized_and_searched_honestly(inputs: str, outcome: str) -> None:
     text = (
-        "robot R { interface i use T from p datatype object P { a: integer(0..10000) b: integer(0..10000) }"
-        " component S { outgoing message m with type: P links i behaviour { variable x: integer(0..10000)"
+        "robot R { interface i use T from p datatype object P { a: integer(0..10000) b: integer(0..10000)"
+        " c: integer(0..500) } component S { outgoing message m with type: P links i behaviour {"
+        " variable x: integer(0..10000)"
         " variable y: integer(0..10000) variable b: boolean"
         f" initial marked state s {{ on response from m do {inputs} }} }} }}"
         " component G { incoming message go with type: none }"

@@ -1,22 +1,24 @@
 """Predicates over bits as diagrams over values: reduced, and the same from every engine."""
 
-from itertools import pairwise
+from itertools import pairwise, product
 
 import pytest
 from hypothesis import given, settings
 
 from robosc.automata import DiscreteVariable
-from robosc.automata.state import Subject
+from robosc.automata.compile import compile_expression
+from robosc.automata.state import Subject, subject_domain, subjects
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import Expression, IntegerType, Received, leaves
 from robosc.supervisor.diagram import diagram_domains, evaluate, validate
 from robosc.supervisor.structure import DecisionDiagram
+from robosc.synthesis.blocks import Blocks
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
 from robosc.synthesis.symbolic import Symbols
 from support.random_expressions import SYSTEM, conditions
-from support.systems import automaton, system
+from support.systems import automaton, operation, read, system
 
 _without_data = conditions.filter(lambda condition: not any(isinstance(leaf, Received) for leaf in leaves(condition)))
 
@@ -47,6 +49,36 @@ def test_diagrams_are_reduced_and_independent_of_the_engine(condition: Expressio
     # Every node is part of it.
     met = {diagram.root} | {child for node in diagram.nodes for child in node.children}
     assert met >= set(range(2, len(diagram.nodes) + 2))
+
+
+@settings(max_examples=40, deadline=None)
+@given(condition=_without_data)
+def test_bits_among_each_other_give_the_same_values(condition: Expression) -> None:
+    """All integers in one block: the diagram is reduced, in an order, and true where the condition is."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("robosc.synthesis.encoding.blocks_of", lambda made: Blocks((subjects(made)[::-1],), {}))
+        diagram = diagram_of(condition, "autoref")
+    domains = diagram_domains(SYSTEM)
+    validate(diagram, domains)
+    assert len(set(diagram.nodes)) == len(diagram.nodes)
+    assert all(first != second for node in diagram.nodes for first, second in pairwise(node.children))
+    function = compile_expression(condition, {subject: place for place, subject in enumerate(subjects(SYSTEM))})
+    for state in product(*(subject_domain(SYSTEM, subject) for subject in subjects(SYSTEM))):
+        values = {(item.automaton, item.variable): value for item, value in zip(subjects(SYSTEM), state, strict=True)}
+        indices = {place: domains[place].index(value) for place, value in values.items()}
+        assert evaluate(diagram, lambda *place, at=indices: at[place]) == (function(state, {}) is True)
+
+
+def test_a_diagram_has_a_limit_in_all() -> None:
+    made = [automaton(n, ["l -e-> l"], variables=[DiscreteVariable("x", IntegerType(0, 99), (0,))]) for n in "AB"]
+    encoding = Encoding(
+        system(*made, conditions={"e": operation(read("A.x"), "<", read("B.x"))}), make_manager("autoref")
+    )
+    less = Symbols(encoding).holds(operation(read("A.x"), "<", read("B.x")))
+    # One hundred ranges of the one, and for all but its last value two of the other.
+    assert len(extract(encoding, less, 400).nodes) == 100
+    with pytest.raises(UnsupportedModelError, match=r"relates the values of '[AB]\.x' to those of other variables"):
+        extract(encoding, less, 250)
 
 
 def counter(bits: int) -> Encoding:

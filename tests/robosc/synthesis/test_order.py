@@ -11,7 +11,7 @@ from robosc.automata import DiscreteVariable, System, to_automata
 from robosc.automata.state import subjects
 from robosc.expressions import Binary, BooleanType, Unary, VariableRead, conjunction
 from robosc.model.structure import Deployment
-from robosc.synthesis.order import force, hyperedges, slide, span, subject_order
+from robosc.synthesis.order import block_order, force, hyperedges, slide, span
 from support.models import example_model
 from support.random_systems import systems
 from support.systems import automaton, system
@@ -55,7 +55,15 @@ def test_a_shuffled_chain_is_put_in_order() -> None:
 
 @given(systems())
 def test_every_place_of_a_state_is_ordered_once(system: System) -> None:
-    assert sorted(map(str, subject_order(system))) == sorted(map(str, subjects(system)))
+    order = block_order(system, [(subject,) for subject in subjects(system)])
+    assert sorted(map(str, order)) == sorted(str((subject,)) for subject in subjects(system))
+
+
+@given(systems(), st.integers(2, 4))
+def test_blocks_stay_whole(system: System, size: int) -> None:
+    places = subjects(system)
+    blocks = [places[start : start + size] for start in range(0, len(places), size)]
+    assert sorted(map(str, block_order(system, blocks))) == sorted(map(str, blocks))
 
 
 def test_what_an_event_touches_is_one_hyperedge() -> None:

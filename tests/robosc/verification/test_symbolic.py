@@ -12,12 +12,23 @@ from robosc.automata.compile import State
 from robosc.automata.decision import Decision, index_in
 from robosc.automata.state import Subject, subject_domain, subjects
 from robosc.errors import SynthesisCancelled
-from robosc.expressions import Binary, BooleanType, Call, Conditional, IntegerType, StateTest, Unary, VariableRead
+from robosc.expressions import (
+    Binary,
+    BooleanType,
+    Call,
+    Conditional,
+    Constant,
+    Expression,
+    IntegerType,
+    StateTest,
+    Unary,
+    VariableRead,
+)
 from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.structure import AddedCondition, DecisionDiagram
 from robosc.synthesis import SynthesisStatus, synthesize
 from robosc.verification import Outcome, Verification, verify
-from robosc.verification.symbolic import verify_symbolically
+from robosc.verification.symbolic import expressions, order, verify_symbolically
 from robosc.verification.symbolic.order import cuthill_mckee, place_order
 from robosc.verification.symbolic.reach import Reachability
 from robosc.verification.symbolic.work import TooMuchWorkError, Work
@@ -172,22 +183,60 @@ def test_an_unknown_event_is_refused() -> None:
         verify_symbolically(FAMILIES["token ring"](2), {"fly": Decision((), 1, ())})
 
 
-def test_wide_integers_are_copied_but_not_computed_with() -> None:
-    wide = IntegerType(0, 10_000)
-    copied = system(
-        automaton("A", [edge("l -u_got-> l", n=received())], variables=[DiscreteVariable("n", wide, (0,))]),
-        inputs=[InputVariable("u_got", (), wide)],
+def _measured(condition: Expression | None = None, update: Expression | None = None, high: int = 10**6) -> System:
+    """Two integers with a million values each, measured, and a request under a condition."""
+    wide = IntegerType(0, high)
+    first = received() if update is None else update
+    return system(
+        automaton("A", [edge("l -u_a-> l", n=first), "l -go-> m"], variables=[DiscreteVariable("n", wide, (0,))]),
+        automaton("B", [edge("l -u_b-> l", n=received())], variables=[DiscreteVariable("n", wide, (0,))]),
+        inputs=[InputVariable(f"u_{name}", (), wide) for name in "ab"],
+        conditions=None if condition is None else {"go": condition},
     )
-    assert verify_symbolically(copied, {}).states == 10_001
-    sums = system(
-        automaton(
-            "A",
-            [edge("l -u_got-> l", n=operation(read("A.n"), "+", received()))],
-            variables=[DiscreteVariable("n", wide, (0,))],
-        ),
-        inputs=[InputVariable("u_got", (), wide)],
-    )
-    assert verify_symbolically(sums, {}).safe is NOT_CHECKED
+
+
+def test_a_million_values_are_copied_compared_and_computed_with() -> None:
+    a, b = read("A.n"), read("B.n")
+    million = 10**6 + 1
+    found = verify_symbolically(_measured(operation(a, "<", b)), {})
+    # From the second location nothing is measured any more of A, but of B still.
+    assert (found.states, _three(found)) == (million**2 + (million - 1) * million, (PASSED, PASSED, PASSED))
+    sums = verify_symbolically(_measured(update=operation(a, "+", received())), {})
+    assert (sums.safe, sums.trace) == (FAILED, ("u_a",))
+    bounded = Call("min", (operation(operation(a, "+", received()), "div", 2), Constant(10**6)))
+    assert _three(verify_symbolically(_measured(update=bounded), {})) == (PASSED, PASSED, PASSED)
+    # A product of two variables has no linear form.
+    product = Call("min", (operation(a, "*", received()), Constant(10**6)))
+    assert verify_symbolically(_measured(update=product), {}).safe is NOT_CHECKED
+
+
+@settings(deadline=None, max_examples=60)
+@given(systems(), st.integers(0, 10**6))
+def test_linear_forms_agree_with_the_explicit_search(made: System, seed: int) -> None:
+    """The same with the smallest integers as with wide ones, whose values cannot be gone through."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(expressions, "FEW_VALUATIONS", 0)
+        patch.setattr(order, "WIDE", 1)
+        _agrees(made, {})
+        _agrees(made, _conditions(made, seed))
+
+
+@pytest.mark.parametrize("high", [20, 100])
+def test_relations_of_wider_integers_agree_with_the_explicit_search(high: int) -> None:
+    a, b = read("A.n"), read("B.n")
+    relations = [
+        operation(a, "<=", b),
+        operation(operation(a, "+", b), ">", high),
+        operation(operation(a, "mod", 7), "=", operation(b, "div", 3)),
+        operation(Conditional(operation(a, "<", b), operation(b, "-", a), a), "!=", Call("max", (b, Constant(5)))),
+    ]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(expressions, "FEW_VALUATIONS", 0)
+        for relation in relations:
+            made = _measured(relation, Call("min", (operation(received(), "-", 0), Constant(high))), high)
+            explicit, symbolic = verify(made, {}, permissive_limit=0), verify_symbolically(made, {})
+            assert (symbolic.states, _three(symbolic)) == (explicit.states, _three(explicit))
+            assert explicit.states is not None and explicit.states > (high + 1) ** 2
 
 
 def test_a_range_without_number_is_not_gone_through() -> None:

@@ -1,0 +1,193 @@
+"""Which wide integers have their bits among each other, and what that is good for."""
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+
+from robosc.automata import DiscreteVariable, EventCondition, InputVariable, System
+from robosc.automata.state import Subject
+from robosc.errors import UnsupportedModelError
+from robosc.expressions import BooleanType, Call, Conditional, Expression, IntegerType, Unary
+from robosc.supervisor.conditions import state_predicate, state_predicates
+from robosc.synthesis import SynthesisStatus, blocks, synthesize
+from robosc.synthesis.blocks import blocks_of
+from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.engines import make_manager
+from robosc.verification import Outcome, synthesize_explicit, verify
+from support.random_systems import MAXIMUM_STATES, systems
+from support.systems import automaton, edge, operation, read, received, system
+
+WIDE = IntegerType(0, 1000)
+NARROW = IntegerType(0, 15)
+A, B, C = (Subject(name, "n") for name in "ABC")
+
+
+def three(
+    condition: Expression | None = None,
+    *,
+    guard: Expression | None = None,
+    update: Expression | None = None,
+    type_: IntegerType = WIDE,
+) -> System:
+    """Three automata with an integer each; the first has one edge, the others are still."""
+    variables = [DiscreteVariable("n", type_, (0,))]
+    first = edge("l -go-> l", *([] if guard is None else [guard]), **({} if update is None else {"n": update}))
+    made = system(
+        automaton("A", [first, "l -other-> l"], variables=variables),
+        *(automaton(name, ["l -other-> l"], variables=variables) for name in "BC"),
+    )
+    return replace(made, conditions=() if condition is None else (EventCondition("go", condition),))
+
+
+def together(made: System) -> set[tuple[str, ...]]:
+    """The blocks of more than one place."""
+    return {tuple(map(str, block)) for block in blocks_of(made).places if len(block) > 1}
+
+
+a, b, c = (read(f"{name}.n") for name in "ABC")
+
+
+@pytest.mark.parametrize(
+    "relation",
+    [
+        operation(a, "<=", b),
+        operation(operation(a, "-", b), ">", 3),
+        operation(operation(a, "*", 3), "=", operation(b, "div", 2)),
+        Unary("not", operation(Unary("-", a), "!=", b)),
+        operation(Call("min", (a, b)), "<", 7),
+        operation(Conditional(read("A.f"), a, b), "=", 7),
+        operation(operation(operation(a, "+", 1), "mod", 7), "=", b),
+    ],
+)
+def test_what_is_compared_or_added_belongs_together(relation: Expression) -> None:
+    assert together(three(relation)) == {("A.n", "B.n")}
+    assert together(three(guard=relation)) == {("A.n", "B.n")}
+    assert together(replace(three(), invariants=(relation,))) == {("A.n", "B.n")}
+    assert together(replace(three(), marker=relation)) == {("A.n", "B.n")}
+
+
+@pytest.mark.parametrize(
+    "condition",
+    [
+        operation(operation(a, "<", 7), "and", operation(b, "<", 7)),
+        operation(operation(operation(a, "*", b), "<", 7), "and", operation(c, "<", 7)),
+        operation(operation(operation(a, "div", b), "<", 7), "or", operation(operation(c, "+", 1), "=", 2)),
+    ],
+)
+def test_what_is_compared_with_constants_or_multiplied_does_not(condition: Expression) -> None:
+    assert not together(three(condition))
+
+
+def test_one_thing_leads_to_another() -> None:
+    chain = operation(operation(a, "<", b), "or", operation(b, "=", c))
+    assert together(three(chain)) == {("A.n", "B.n", "C.n")}
+    assert together(three(operation(a, "<", c), update=operation(b, "+", 1))) == {("A.n", "B.n", "C.n")}
+    assert together(three(update=b)) == {("A.n", "B.n")}
+
+
+def test_narrow_integers_stay_as_they_are() -> None:
+    assert not together(three(operation(a, "<=", b), type_=NARROW))
+    assert together(three(operation(a, "<=", b), type_=IntegerType(0, 16))) == {("A.n", "B.n")}
+
+
+def with_data(*updates: Expression, targets: tuple[str, ...] = ("n",), condition: Expression | None = None) -> System:
+    """An event that brings a wide integer, and what is made of it; another wide integer beside it."""
+    values = [DiscreteVariable("f", BooleanType(), (False,)), DiscreteVariable("n", WIDE, (0,))]
+    return system(
+        automaton("A", [edge("l -u_got-> l", **dict(zip(targets, updates, strict=True)))], variables=values),
+        automaton("B", ["l -go-> l"], variables=[DiscreteVariable("n", WIDE, (0,))]),
+        inputs=[InputVariable("u_got", (), WIDE)],
+        conditions=None if condition is None else {"go": condition},
+    )
+
+
+def test_data_belong_to_what_they_are_compared_with_or_written_to() -> None:
+    assert blocks_of(with_data(received())).data == {("u_got", ()): A}
+    assert blocks_of(with_data(operation(received(), "<", b), targets=("f",))).data == {("u_got", ()): B}
+    # By the datum, two places belong together that no expression names together.
+    both = with_data(received(), operation(received(), "<", b), targets=("n", "f"))
+    assert together(both) == {("A.n", "B.n")}
+    assert blocks_of(with_data(operation(received(), "*", b))).data == {}
+
+
+@pytest.fixture(params=["cudd", "autoref"])
+def engine(request: pytest.FixtureRequest) -> str:
+    if request.param == "cudd":
+        pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+    return str(request.param)
+
+
+def test_bits_of_equal_weight_stand_side_by_side(engine: str) -> None:
+    made = with_data(received(), condition=operation(a, "<=", b))
+    encoding = Encoding(made, make_manager(engine))
+    places = [encoding.subjects[subject] for subject in (A, B)]
+    data = encoding.inputs_of("u_got")[()]
+    levels = {name: level for level, name in enumerate(encoding.order)}
+    first = levels[places[0].names[0]]
+    for rank in range(10):
+        # The bit of A, its next-state bit, that of the datum, that of B, which is never written.
+        bits = [places[0].names[rank], places[0].names[rank] + "'", data.names[rank], places[1].names[rank]]
+        assert [levels[name] for name in bits] == list(range(first + 4 * rank, first + 4 * rank + 4))
+    assert [levels[name] for name in encoding.state_names] == sorted(levels[name] for name in encoding.state_names)
+
+
+def test_a_wider_integer_has_its_high_bits_above(engine: str) -> None:
+    made = three(operation(a, "<=", b))
+    wider = automaton("B", ["l -other-> l"], variables=[DiscreteVariable("n", IntegerType(0, 9999), (0,))])
+    made = replace(made, automata=(made.automata[0], wider, made.automata[2]))
+    encoding = Encoding(made, make_manager(engine))
+    low, high = (encoding.subjects[subject].names for subject in (A, B))
+    names = [name for name in encoding.order if name in {*low, *high}]
+    assert names[:4] == list(high[:4])
+    assert names[4:] == [name for pair in zip(low, high[4:], strict=True) for name in pair]
+
+
+def sensors(high: int, condition: Expression, *, is_late: bool = False) -> System:
+    """Two measured integers and a request that needs a relation between them; or something needs it only after it."""
+    variables = [DiscreteVariable("n", IntegerType(0, high), (0,))]
+    inputs = [InputVariable(f"u_{name}", (), IntegerType(0, high)) for name in "ab"]
+    ends = ["l -go-> m", "m -u_end-> l"]
+    made = system(
+        automaton("A", [edge("l -u_a-> l", n=received()), *ends], variables=variables),
+        automaton("B", [edge("l -u_b-> l", n=received()), *ends], variables=variables),
+        inputs=inputs,
+    )
+    return replace(made, conditions=(EventCondition("u_end" if is_late else "go", condition),))
+
+
+@pytest.mark.parametrize("relation", [operation(a, "<=", b), operation(operation(a, "+", b), "<=", 1_500_000)])
+def test_a_million_values_are_compared_and_added(engine: str, relation: Expression) -> None:
+    """With the bits of one integer above those of the other this would take a million nodes."""
+    million = 10**6 + 1
+    result = synthesize(sensors(10**6, relation), engine=engine)
+    assert result.status is SynthesisStatus.SUPERVISOR
+    # Whatever is measured, and what is measured where the request is allowed.
+    allowed = million * (million + 1) // 2 if relation == operation(a, "<=", b) else million**2 - 500_000 * 500_001 // 2
+    assert result.statistics.states == million**2 + allowed
+    assert result.statistics.peak_nodes < 500
+
+
+def test_a_relation_that_no_list_of_values_can_tell_is_refused() -> None:
+    """What the event needs is small as a diagram over bits, but the supervisor's has a branch for each value."""
+    pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+    with pytest.raises(UnsupportedModelError, match=r"more than 100000 ranges of the values of 'A\.n'"):
+        synthesize(sensors(10**6, operation(a, "<=", b), is_late=True), engine="cudd")
+
+
+@settings(deadline=None, max_examples=60)
+@given(systems())
+def test_among_each_other_or_not_the_supervisor_is_right(made: System) -> None:
+    """Even the narrowest integers together: what comes out is the supervisor that is worked out state by state."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(blocks, "MINIMUM_BITS", 1)
+        result = synthesize(made, engine="autoref")
+    explicit = synthesize_explicit(made, limit=MAXIMUM_STATES)
+    assert explicit is not None
+    assert (result.status is SynthesisStatus.EMPTY) == explicit.is_empty
+    if not explicit.is_empty:
+        added = state_predicates(made, result.added)
+        initial = None if result.initial is None else state_predicate(made, result.initial)
+        found = verify(made, added, initial=initial)
+        assert {found.safe, found.controllable, found.nonblocking, found.maximally_permissive} == {Outcome.PASSED}
+        assert result.statistics.states == len(explicit.reachable)

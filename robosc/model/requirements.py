@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from robosc.errors import RelatedPlace
 from robosc.expressions import EnumType, NoneType, ObjectType, Type, type_text
 from robosc.language import syntax
-from robosc.model.expressions import ExpressionChecker, may_leave
+from robosc.model.expressions import ExpressionChecker
 from robosc.model.findings import Findings
 from robosc.model.structure import (
     Communication,
@@ -17,6 +17,7 @@ from robosc.model.structure import (
     Requirement,
     RequirementForm,
 )
+from robosc.model.typed import may_leave
 from robosc.model.types import Types
 from robosc.model.units import unique
 from robosc.source import Location

@@ -125,7 +125,7 @@ class Constants:
         )
         if found is None or type_ is None:
             return None
-        value = constant_value(found)
+        value = constant_value(found.expression)
         if value is None:
             self._findings.error(
                 "not-constant",

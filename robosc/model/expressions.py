@@ -1,6 +1,7 @@
 """Resolves and types expressions (language A.3 to A.5)."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import reduce
 from itertools import chain
 
@@ -35,6 +36,7 @@ from robosc.expressions import (
 )
 from robosc.language import syntax
 from robosc.model.findings import Findings
+from robosc.model.ranges import Range, Ranges, narrowed
 from robosc.model.scope import ComponentNames, Scope
 from robosc.model.typed import (
     Typed,
@@ -78,6 +80,20 @@ class ExpressionChecker:
         self._scope = scope
         self._findings = findings
         self._elements: list[tuple[str, Type]] = []
+        self._ranges: dict[Expression, Range] = {}
+
+    @contextmanager
+    def where(self, condition: Expression) -> Iterator[None]:
+        """What is resolved meanwhile has the bounds that it has where a condition, resolved here, is true."""
+        with self._within(narrowed(condition, self._ranges) or {}):
+            yield
+
+    @contextmanager
+    def _within(self, ranges: Ranges) -> Iterator[None]:
+        before = {read: self._ranges[read] for read in ranges}
+        self._ranges.update(ranges)
+        yield
+        self._ranges.update(before)
 
     def condition(self, tree: syntax.Expression) -> Expression | None:
         """A boolean expression, or None after reporting what is wrong."""
@@ -216,19 +232,29 @@ class ExpressionChecker:
 
     def _conditional(self, tree: syntax.Conditional, wanted: Type | None) -> Typed | None:
         condition = self.condition(tree.condition)
+        if_true = {} if condition is None else narrowed(condition, self._ranges)
+        if_false = {} if condition is None else narrowed(Unary("not", condition), self._ranges)
         if self._is_open(tree.then):
-            otherwise = self.infer(tree.otherwise, wanted)
-            then = self.infer(tree.then, wanted or (otherwise.type if otherwise else None))
+            with self._within(if_false or {}):
+                otherwise = self.infer(tree.otherwise, wanted)
+            with self._within(if_true or {}):
+                then = self.infer(tree.then, wanted or (otherwise.type if otherwise else None))
         else:
-            then = self.infer(tree.then, wanted)
-            otherwise = self.infer(tree.otherwise, wanted or (then.type if then else None))
+            with self._within(if_true or {}):
+                then = self.infer(tree.then, wanted)
+            with self._within(if_false or {}):
+                otherwise = self.infer(tree.otherwise, wanted or (then.type if then else None))
         if condition is None or then is None or otherwise is None:
             return None
         common = common_type(then.type, otherwise.type)
         if common is None:
             self._mismatch(tree.otherwise, otherwise.type, f"'then' has {_article(type_text(then.type))}")
             return None
-        return Typed(Conditional(condition, as_type(then, common), as_type(otherwise, common)), common)
+        result = Conditional(condition, as_type(then, common), as_type(otherwise, common))
+        if isinstance(common, IntegerType) and (if_true is None) is not (if_false is None):
+            # One side is never taken: the other one has all the values.
+            return Typed(result, otherwise.type if if_true is None else then.type)
+        return Typed(result, common)
 
     # Functions and arrays
 
@@ -335,7 +361,7 @@ class ExpressionChecker:
         found = self.infer(tree)
         if found is None:
             return None
-        value = constant_value(found)
+        value = constant_value(found.expression)
         if isinstance(found.type, IntegerType) and type(value) is int and value >= 0:
             return value
         self._findings.error(
@@ -424,7 +450,7 @@ class ExpressionChecker:
         if rest:
             self._no_parts(rest[0], "a variable")
             return None
-        return None if found is None else Typed(VariableRead(component.name, name.text), found)
+        return None if found is None else self._read(VariableRead(component.name, name.text), found)
 
     def _no_parts(self, step: _Step, what: str) -> None:
         self._findings.error("type-mismatch", f"{what} has no parts", step.location, "Remove what follows the name.")
@@ -475,7 +501,15 @@ class ExpressionChecker:
                 "no-value-here", "there is no data: the type is none", tree.location, "Give the communication a type."
             )
             return None
-        return Typed(Received(path), found)
+        return self._read(Received(path), found)
+
+    def _read(self, read: Expression, type_: Type) -> Typed:
+        """What is read, with the bounds that it has here."""
+        if isinstance(type_, IntegerType):
+            declared = bounds_of(type_)
+            here = self._ranges.setdefault(read, declared)
+            type_ = type_ if here == declared else IntegerType(*here)
+        return Typed(read, type_)
 
     def _walk(self, whole: Type, steps: Sequence[_Step]) -> tuple[tuple[PathStep, ...], Type] | None:
         """Property by property, element by element: the path and the type at its end."""

@@ -131,11 +131,11 @@ def applied(name: str, arguments: tuple[Typed, ...]) -> Typed:
     return Typed(call, bounded_integer(*call_bounds(name, bounds)))
 
 
-def constant_value(typed: Typed) -> Value | None:
+def constant_value(expression: Expression) -> Value | None:
     """The value of an expression of constants; None for any other one, and for one that is unknown."""
-    if not all(isinstance(leaf, Constant | EnumValue) for leaf in leaves(typed.expression)):
+    if not all(isinstance(leaf, Constant | EnumValue) for leaf in leaves(expression)):
         return None
-    return evaluate(typed.expression, _not_constant, _not_constant)  # type: ignore[no-any-return]
+    return evaluate(expression, _not_constant, _not_constant)  # type: ignore[no-any-return]
 
 
 def _not_constant(*names: str) -> str:

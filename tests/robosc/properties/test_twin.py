@@ -9,7 +9,7 @@ import pytest
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.model.structure import Deployment
 from robosc.properties import Properties, check_controller
-from robosc.properties.controller import Controller
+from robosc.properties.controller import Controller, Node
 from robosc.properties.orders import Orders
 from robosc.properties.search import search
 from robosc.properties.structure import always_end, never_conflict, stays_nonblocking
@@ -122,6 +122,56 @@ def test_traces_tell_the_truth() -> None:
             assert _replayed(supervisor, found.blocking.trace)[1], seed
     assert all(count >= 10 for count in kinds.values()), kinds
     assert len(kinds) == 3
+
+
+def _shortest_blocking(controller: Controller) -> int | None:
+    """Fewest events to a stable state, or into a cycle, from which no marked one is reached: by relaxation."""
+    distances: dict[Node, int] = {}
+    good: set[Node] = set()
+    sure: dict[Node, set[Node]] = {}
+    cycles: list[int] = []
+
+    def enter(before: Node | None, events: int, is_sure: bool, node: Node) -> bool:
+        run = controller.run(node)
+        length = (0 if before is None else distances[before]) + events + len(run.events)
+        if before is not None and is_sure and run.is_marked:
+            good.add(before)
+        if run.end is None:
+            cycles.extend([length] * (not run.is_marked))
+            return False
+        if controller.is_marked(run.end):
+            good.add(run.end)
+        if before is not None and is_sure:
+            sure.setdefault(before, set()).add(run.end)
+        is_nearer = length < distances.get(run.end, length + 1)
+        if is_nearer:
+            distances[run.end] = length
+        return is_nearer
+
+    enter(None, 0, True, controller.start)
+    while True:
+        changes = [
+            enter(state, len(events), is_sure, node)
+            for state in list(distances)
+            for events, is_sure, node in controller.moves(state)
+        ]
+        if not any(changes):
+            break
+    while more := {state for state, targets in sure.items() if state not in good and targets & good}:
+        good |= more
+    return min([*cycles, *(length for state, length in distances.items() if state not in good)], default=None)
+
+
+def test_the_way_to_where_no_task_is_completed_is_a_shortest_one() -> None:
+    lengths: Counter[int | None] = Counter()
+    for seed in range(150):
+        supervisor = random_robot(seed)
+        controller = Controller(supervisor.model, Deployment.CONTROLLER, ())
+        found = search(controller, limit=LIMIT, orders=None)
+        length = _shortest_blocking(controller)
+        assert (None if found.blocking is None else len(found.blocking.trace)) == length, seed
+        lengths[length] += 1
+    assert sum(count for length, count in lengths.items() if length) > 10, lengths
 
 
 def test_what_is_proved_by_structure_is_true(record_property: Callable[[str, object], None]) -> None:

@@ -15,7 +15,7 @@ from robosc.properties.search import search
 from robosc.properties.structure import always_end, never_conflict, stays_nonblocking
 from robosc.supervisor.structure import Supervisor
 from support.controller_twin import twin_of
-from support.random_controllers import random_controller, random_robot
+from support.random_controllers import ONE_FIELD, random_controller, random_robot
 from support.random_supervisors import random_supervisor
 
 LIMIT = 2_000
@@ -60,6 +60,31 @@ def test_the_executor_shows_what_the_automaton_has(record_property: Callable[[st
         record_property(name, count)
     assert shares["compared"] > 20
     assert min(shares["livelock"], shares["conflict"], shares["blocking"]) >= 2
+
+
+def test_enums_of_one_field_agree(record_property: Callable[[str, object], None]) -> None:
+    """What one message cannot bring is neither visited nor reported; all that it can bring is."""
+    met: Counter[str] = Counter()
+    for seed in range(180):
+        supervisor = random_controller(seed, enums=ONE_FIELD[seed % 2])
+        topics = Counter(item.identifier for item in supervisor.model.communications) if supervisor else Counter()
+        if supervisor is None or 2 not in topics.values():
+            continue
+        twin = twin_of(supervisor, TWIN_LIMIT)
+        if twin is None:
+            continue
+        controller = Controller(supervisor.model, Deployment.CONTROLLER, supervisor.added)
+        found = search(controller, limit=LIMIT, orders=Orders(controller, LIMIT))
+        assert found.states == len(twin.states), seed
+        shown = (twin.has_livelock, twin.has_conflict, twin.is_blocking)
+        assert (found.livelock is not None, found.conflict is not None, found.blocking is not None) == shown, seed
+        controller._choices.clear()
+        apart = search(controller, limit=LIMIT, orders=Orders(controller, LIMIT))
+        met["compared"] += 1
+        met["fewer states"] += found.states < apart.states
+    for name, count in sorted(met.items()):
+        record_property(name, count)
+    assert met["compared"] > 10 and met["fewer states"] >= 3, met
 
 
 def _after(system: InterpretedSystem, states: list[dict[Any, Any]], event: str) -> list[dict[Any, Any]]:

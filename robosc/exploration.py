@@ -4,7 +4,7 @@ Everything allowed is in it, not only what an executor would choose. It works on
 added conditions alone, so it says nothing that synthesis could have hidden.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from robosc.automata.compile import State
@@ -15,6 +15,7 @@ from robosc.automata.state import Subject, subjects
 from robosc.automata.structure import System
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import Value
+from robosc.expressions.text import automaton_text
 from robosc.model.structure import CommunicationKind, Model
 
 DEFAULT_LIMIT = 100_000
@@ -45,12 +46,14 @@ class Graph:
     Attributes:
         name: The robot's name.
         initial: Number of the initial state.
+        columns: What a table calls the parts of a state: its components, variables and communications.
         states: States, breadth-first from the initial one; a state's number is its place.
         transitions: State, event, state: sorted by the first, then by event and by the values of the second.
     """
 
     name: str
     initial: int
+    columns: tuple[str, ...]
     states: tuple[GraphState, ...]
     transitions: tuple[tuple[int, str, int], ...]
 
@@ -85,6 +88,7 @@ def explore(
     return Graph(
         name=model.name,
         initial=0,
+        columns=tuple(_columns(system, model)),
         states=_states(system, model, graph),
         transitions=tuple(
             (number, event, target)
@@ -119,6 +123,15 @@ def _states(system: System, model: Model, graph: ControlledGraph) -> tuple[Graph
     )
 
 
+def _columns(system: System, model: Model) -> Iterator[str]:
+    components = [item.name for item in model.components]
+    yield from (item.name for item in model.components if item.behaviour)
+    yield from (str(subject) for subject in subjects(system) if subject.variable is not None)
+    for item in model.communications:
+        if item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION):
+            yield automaton_text(communication_plant_name(item), components)
+
+
 def graph_json(graph: Graph) -> dict[str, object]:
     """The graph as JSON values: `initial`, `states`, `transitions`."""
     return {
@@ -138,8 +151,8 @@ def graph_json(graph: Graph) -> dict[str, object]:
 
 def graph_text(graph: Graph) -> str:
     """The graph as a table: a line for each state, below it a line for each event with where it leads."""
-    header = ["", *(name for name, _ in _columns(graph.states[graph.initial]))]
-    rows = [[str(number), *(text for _, text in _columns(state))] for number, state in enumerate(graph.states)]
+    header = ["", *graph.columns]
+    rows = [[str(number), *_values(state)] for number, state in enumerate(graph.states)]
     widths = [max(len(row[column]) for row in (header, *rows)) for column in range(len(header))]
     leaving = _leaving(graph)
 
@@ -160,7 +173,9 @@ def graph_dot(graph: Graph) -> str:
     lines = [f"digraph {_quoted(graph.name)} {{", "  node [shape=box];", '  start [shape=point, label=""];']
     lines.append(f"  start -> {graph.initial};")
     for number, state in enumerate(graph.states):
-        label = "\n".join([str(number), *(f"{name} = {text}" for name, text in _columns(state))])
+        label = "\n".join(
+            [str(number), *(f"{name} = {text}" for name, text in zip(graph.columns, _values(state), strict=True))]
+        )
         lines.append(f"  {number} [label={_quoted(label)}];")
     arrows: dict[tuple[int, int], list[str]] = {}
     for source, event, target in graph.transitions:
@@ -171,10 +186,10 @@ def graph_dot(graph: Graph) -> str:
     return "\n".join([*lines, "}"]) + "\n"
 
 
-def _columns(state: GraphState) -> list[tuple[str, str]]:
-    """What a reader wants to see of a state: name and value of each part."""
-    values = [(name, str(value).lower() if isinstance(value, bool) else str(value)) for name, value in state.variables]
-    return [*state.components, *values, *state.communications]
+def _values(state: GraphState) -> list[str]:
+    """What a reader wants to see of a state: the value of each column."""
+    values = (*state.components, *state.variables, *state.communications)
+    return [str(value).lower() if isinstance(value, bool) else str(value) for _, value in values]
 
 
 def _leaving(graph: Graph) -> list[dict[str, list[int]]]:

@@ -11,6 +11,7 @@ os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 
 from robosc import __version__
 from robosc.cli.arguments import (
+    Parser,
     add_deployment_argument,
     add_engine_argument,
     add_livelock_argument,
@@ -19,8 +20,8 @@ from robosc.cli.arguments import (
 )
 from robosc.cli.check import report_check
 from robosc.cli.generate import add_generate_arguments, report_generated
-from robosc.cli.main import guarded
-from robosc.cli.output import ExitCode, ProgressLine, require_other_file
+from robosc.cli.main import guarded, parse
+from robosc.cli.output import CommandError, ExitCode, ProgressLine, require_other_file
 from robosc.cli.synth import add_output_argument, report_synthesis
 from robosc.errors import InvalidSupervisorError, LanguageError, UnsupportedModelError
 from robosc.model.structure import Deployment
@@ -39,9 +40,9 @@ exit status:
 _ADDRESS = re.compile(r"(\[[0-9A-Fa-f:.%]+\]|[A-Za-z0-9._-]+):([0-9]{1,5})\Z")
 
 
-def make_parser() -> argparse.ArgumentParser:
+def make_parser() -> Parser:
     """The parser of the whole command line."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="robosc-client",
         description="Check models, synthesize supervisors and generate packages on a RoboSC server.",
         epilog=_EPILOG,
@@ -71,17 +72,16 @@ def make_parser() -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns its exit status."""
-    arguments = make_parser().parse_args(argv)
+    arguments = parse(make_parser(), argv)
 
     def run() -> int:
         try:
             with Client(arguments.server) as client:
                 return int(arguments.run(arguments, client))
         except ClientError as error:
-            sys.stderr.write(f"robosc-client: {error}\n")
-            return ExitCode.SERVICE
+            raise CommandError(str(error), ExitCode.SERVICE) from error
 
-    return guarded("robosc-client", run)
+    return guarded("robosc-client", run, as_json=arguments.json)
 
 
 def _add_common_arguments(parser: argparse.ArgumentParser) -> None:

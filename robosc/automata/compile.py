@@ -37,6 +37,9 @@ Path = tuple[PathStep, ...]
 Data = Mapping[Path, Value | None]
 """Received data of one occurrence of an event: a value for each path, None where it is unknown."""
 
+Carried = tuple[tuple[Path, Value | None], ...]
+"""The same as pairs, which can be looked up."""
+
 Function = Callable[[State, Data], Value | None]
 """An expression's value in a state, with received data; None where it is unknown."""
 

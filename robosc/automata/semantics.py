@@ -16,7 +16,16 @@ from itertools import product
 from math import prod
 from operator import itemgetter
 
-from robosc.automata.compile import NO_DATA, Function, State, compile_expression, paths_read, subjects_read
+from robosc.automata.compile import (
+    NO_DATA,
+    Carried,
+    Data,
+    Function,
+    State,
+    compile_expression,
+    paths_read,
+    subjects_read,
+)
 from robosc.automata.inputs import connected_inputs, valuations
 from robosc.automata.state import Subject, initial_values, subject_type, subjects
 from robosc.automata.structure import Assignment, Automaton, Edge, Event, InputVariable, Role, System
@@ -93,6 +102,7 @@ class _Rule:
         observers: The same for each requirement automaton.
         conditions: Its event conditions.
         outcomes: What was worked out already, by the values of `reads`.
+        carried: The same for certain data.
     """
 
     event: Event
@@ -101,6 +111,7 @@ class _Rule:
     observers: tuple[_Participant, ...]
     conditions: tuple[Function, ...]
     outcomes: dict[object, _Outcome] = field(default_factory=dict)
+    carried: dict[object, _Writes | None] = field(default_factory=dict)
 
     def outcome(self, state: State) -> _Outcome:
         key = self.reads(state)
@@ -126,6 +137,28 @@ class _Rule:
             leaves_range = leaves_range or leaves
             writes.update(dict.fromkeys(results))
         return _Outcome(True, leaves_range, meets_condition, tuple(writes))
+
+    def writes_with(self, state: State, data: Carried) -> _Writes | None:
+        """What the first arcs change with some data; None where there are none, or where that leaves a range."""
+        key = (self.reads(state), data)
+        if key not in self.carried:
+            self.carried[key] = self._work_out_with(state, dict(data))
+        return self.carried[key]
+
+    def _work_out_with(self, state: State, data: Data) -> _Writes | None:
+        choices = [self._taken(participant, state) for participant in self.participants]
+        if not choices or not all(choices):
+            return None
+        writes: list[tuple[int, Value]] = []
+        for arc, *_ in choices:
+            writes.append((arc.place, arc.target))
+            for update in arc.updates:
+                value = update.function(state, data)
+                if value is not None and not update.stays_in_range(value):
+                    return None
+                if value is not None:
+                    writes.append((update.place, value))
+        return tuple(writes)
 
     def _taken(self, participant: _Participant, state: State) -> list[_Arc]:
         """The arcs that an automaton may take."""
@@ -256,6 +289,25 @@ class Semantics:
                 target[place] = value
             results.add(tuple(target))
         return frozenset(results)
+
+    def target_with(self, state: State, event: str, data: Carried) -> State | None:
+        """The state that an event with certain data leads to where each automaton takes its first edge.
+
+        Args:
+            state: The state before it.
+            event: The event.
+            data: The value of each path that is read, None where it is unknown.
+
+        Returns:
+            The state, or None if the plant does not enable the event or a variable would leave its range.
+        """
+        writes = self._rules[event].writes_with(state, data)
+        if writes is None:
+            return None
+        target = list(state)
+        for place, value in writes:
+            target[place] = value
+        return tuple(target)
 
     def bad(self, state: State) -> bool:
         """Whether a state is against an invariant, or an uncontrollable event of it against a condition or range."""

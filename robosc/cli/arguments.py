@@ -2,9 +2,9 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
-from robosc.cli.output import UsageError
+from robosc.cli.output import ExitCode, UsageError
 from robosc.model.structure import Deployment
 from robosc.source import Bundle
 
@@ -15,6 +15,33 @@ MAXIMUM_LIMIT = 10**9
 
 SYNTHESIS_STATES = 200_000
 """States up to which the result of a synthesis is verified one by one: some seconds."""
+
+
+class WrongArguments(SystemExit):
+    """Arguments that are wrong, which has been told on standard error.
+
+    Attributes:
+        message: What is wrong.
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(int(ExitCode.USAGE))
+        self.message = message
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that says what is wrong in its exception, too; so do those of its commands."""
+
+    def error(self, message: str) -> NoReturn:
+        """Tell what is wrong.
+
+        Raises:
+            WrongArguments: Always.
+        """
+        try:
+            super().error(message)
+        except SystemExit as exit_:
+            raise WrongArguments(message) from exit_
 
 
 def add_model_arguments(parser: argparse.ArgumentParser) -> None:

@@ -11,8 +11,17 @@ from collections.abc import Callable, Sequence
 from robosc._version import __version__
 from robosc.cli import check, doc, explain, explain_synthesis, explore, generate, new, synth, verify
 from robosc.cli import format as format_
-from robosc.cli.output import ExitCode, UsageError, prepare_streams, print_diagnostics
-from robosc.errors import LanguageError, RoboscError
+from robosc.cli.arguments import Parser, WrongArguments
+from robosc.cli.output import (
+    CommandError,
+    ExitCode,
+    counts_text,
+    diagnostics_json,
+    prepare_streams,
+    print_diagnostics,
+    print_json,
+)
+from robosc.errors import Diagnostic, LanguageError, RoboscError
 from robosc.source import visible
 
 _EPILOG = """\
@@ -23,9 +32,9 @@ exit status:
 """
 
 
-def make_parser() -> argparse.ArgumentParser:
+def make_parser() -> Parser:
     """The parser of the whole command line."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="robosc",
         description="Supervisory controllers for robots, correct by construction.",
         epilog=_EPILOG,
@@ -39,44 +48,92 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; returns its exit status."""
-    arguments = make_parser().parse_args(argv)
-    return guarded("robosc", lambda: int(arguments.run(arguments)))
+    """Run one command; returns its exit status.
+
+    Raises:
+        SystemExit: The arguments are no command's, or ask for help.
+    """
+    arguments = parse(make_parser(), argv)
+    return guarded("robosc", lambda: int(arguments.run(arguments)), as_json=getattr(arguments, "json", False))
 
 
-def guarded(program: str, run: Callable[[], int]) -> int:
-    """Run a command and turn every error into one clear message and an exit status."""
+def parse(parser: Parser, argv: Sequence[str] | None) -> argparse.Namespace:
+    """The arguments; where `--json` is one of those that are wrong, that is told on standard output, too.
+
+    Raises:
+        SystemExit: They are wrong, or ask for help.
+    """
+    try:
+        return parser.parse_args(argv)
+    except WrongArguments as error:
+        if _asks_for_json(sys.argv[1:] if argv is None else argv):
+            prepare_streams()
+            _print_error(ExitCode.USAGE, error.message)
+        raise
+
+
+def _asks_for_json(argv: Sequence[str]) -> bool:
+    options = argv[: argv.index("--")] if "--" in argv else argv
+    return any(len(item) > 2 and "--json".startswith(item) for item in options)
+
+
+def guarded(program: str, run: Callable[[], int], *, as_json: bool = False) -> int:
+    """Run a command and turn every error into one clear message and an exit status.
+
+    Args:
+        program: What the message begins with.
+        run: The command.
+        as_json: Whether standard output gets a JSON document, which then tells the error.
+    """
     prepare_streams()
+    diagnostics: Sequence[Diagnostic] = ()
     try:
         status = run()
         sys.stdout.flush()
         return status
     except LanguageError as error:
-        print_diagnostics(error.diagnostics, None)
-        return ExitCode.FAILED
-    except UsageError as error:
-        _complain(program, error)
-        return ExitCode.USAGE
+        diagnostics = error.diagnostics
+        print_diagnostics(diagnostics, None)
+        status, message = ExitCode.FAILED, f"the model has errors: {counts_text(diagnostics)}"
+    except CommandError as error:
+        status, message = error.status, _complain(program, error)
     except RoboscError as error:
-        _complain(program, error)
         # An engine or target that nobody has, or a folder that cannot be written, is no fault of the model.
-        return ExitCode.USAGE if isinstance(error, LookupError | OSError) else ExitCode.FAILED
+        status = ExitCode.USAGE if isinstance(error, LookupError | OSError) else ExitCode.FAILED
+        message = _complain(program, error)
     except KeyboardInterrupt:
-        sys.stderr.write(f"{program}: interrupted\n")
-        return ExitCode.INTERRUPTED
+        status, message = ExitCode.INTERRUPTED, _complain(program, "interrupted")
     except BrokenPipeError:
         # The reader (head, less) left: that is no fault, but the interpreter must not flush into it at exit.
         sys.stdout = None
         return ExitCode.OK
     except OSError as error:
         place = error.filename or "the results"
-        _complain(program, f"cannot write {place}: {error.strerror or error}")
+        status, message = ExitCode.USAGE, _complain(program, f"cannot write {place}: {error.strerror or error}")
+        if not error.filename:
+            # Standard output itself: neither we nor the interpreter at exit can write any more to it.
+            sys.stdout = None
+            return status
+    if as_json:
+        _print_error(status, message, diagnostics)
+    return status
+
+
+def _complain(program: str, problem: object) -> str:
+    """Tell what is wrong on standard error; returns that."""
+    message = visible(str(problem))
+    sys.stderr.write(f"{program}: {message}\n")
+    return message
+
+
+def _print_error(status: int, message: str, diagnostics: Sequence[Diagnostic] = ()) -> None:
+    found = diagnostics_json(diagnostics) if diagnostics else {}
+    try:
+        print_json({"error": {"status": int(status), "message": message, **found}})
+        sys.stdout.flush()
+    except OSError:
+        # It was told on standard error.
         sys.stdout = None
-        return ExitCode.USAGE
-
-
-def _complain(program: str, problem: object) -> None:
-    sys.stderr.write(f"{program}: {visible(str(problem))}\n")
 
 
 if __name__ == "__main__":

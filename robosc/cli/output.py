@@ -1,7 +1,8 @@
 """What the commands print, and the exit codes: shared by `robosc` and `robosc-client`.
 
 Results go to standard output, findings and progress to standard error; with `--json` one JSON document
-goes to standard output and holds the findings too.
+goes to standard output and holds the findings too. Where a command cannot do what it was asked, that document is
+`{"error": ...}`, and the message goes to standard error all the same.
 """
 
 import codecs
@@ -33,8 +34,23 @@ class ExitCode(IntEnum):
     INTERRUPTED = 130
 
 
-class UsageError(Exception):
+class CommandError(Exception):
+    """What ends a command with a message.
+
+    Attributes:
+        status: Its exit status.
+    """
+
+    def __init__(self, message: str, status: ExitCode) -> None:
+        super().__init__(message)
+        self.status = status
+
+
+class UsageError(CommandError):
     """Wrong use of a command that the argument parser cannot see, such as a folder that cannot be written."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message, ExitCode.USAGE)
 
 
 def prepare_streams() -> None:

@@ -105,7 +105,7 @@ def verify(arguments: argparse.Namespace, supervisor: "Supervisor") -> int:
         )
     else:
         for verdict in (item for item in verdicts if not (arguments.quiet and item.holds)):
-            sys.stdout.write(verdict_text(verdict, system))
+            sys.stdout.write(verdict_text(verdict, system, supervisor.model))
     return ExitCode.OK if holds else ExitCode.FAILED
 
 

@@ -7,7 +7,7 @@ requirements allow. One of both there always is: were no trouble within reach, w
 nonblocking and closed under uncontrollable events, so the state were good.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -15,11 +15,11 @@ from typing import Any
 from robosc.automata.compile import State
 from robosc.automata.state import subjects
 from robosc.errors import InternalError
-from robosc.explanation.obstacles import Obstacle, ObstacleKind
+from robosc.explanation.obstacles import Obstacle, ObstacleKind, without_marks
 from robosc.explanation.problems import Problems
 from robosc.model.structure import is_tau
 from robosc.synthesis.encoding import Encoding
-from robosc.synthesis.fixed_point import allowed, marked_states
+from robosc.synthesis.fixed_point import allowed
 from robosc.synthesis.runs import Run, ShortestRuns
 from robosc.synthesis.symbolic import Symbols
 from robosc.synthesis.transitions import Steps
@@ -115,6 +115,8 @@ class Analysis:
         problems: The problem and what is left of it without obstacles.
         obstacles: All of them.
         good: The states that a supervisor may be in.
+        dropped: Obstacles that the problem is thought to be without. Runs leave no range nevertheless, unless there
+            is no other way.
     """
 
     def __init__(
@@ -124,14 +126,20 @@ class Analysis:
         problems: Problems,
         obstacles: Sequence[Obstacle],
         good: Any,
+        dropped: Iterable[Obstacle] = (),
     ) -> None:
+        dropped = tuple(dropped)
         self._encoding = encoding
         self._manager = encoding.manager
         self._watch = watch
         self._problems = problems
+        self._dropped_conditions = {place for item in dropped for place in item.conditions}
+        self._dropped_invariants = {place for item in dropped for place in item.invariants}
+        self._dropped_ranges = tuple(item for item in dropped if item.range is not None)
+        self._automata = without_marks(encoding.system, dropped).automata
         self._ranges = tuple(item for item in obstacles if item.kind is ObstacleKind.RANGE)
         self._symbols = Symbols(encoding)
-        self._fixed_point, self._problem = problems.without(())
+        self._fixed_point, self._problem = problems.without(dropped)
         self._steps = {steps.event.name: steps for steps in self._problem.steps}
         safe = self._problem.safe
         for steps in self._problem.steps:
@@ -141,7 +149,7 @@ class Analysis:
         self._troubled = ~self._fixed_point.nonblocking_states(self._problem, safe)
         self.good = good
         """The states that a supervisor may be in."""
-        free = tuple(item for item in obstacles if item.kind is not ObstacleKind.MARKING)
+        free = (*dropped, *(item for item in obstacles if item.kind is not ObstacleKind.MARKING))
         _, self._free = problems.without(free)
         self._participants: dict[str, tuple[tuple[str, Any], ...]] = {}
 
@@ -200,7 +208,7 @@ class Analysis:
             ]
             found += [
                 Hindrance(HindranceKind.REQUIREMENT, event, wanted & ~self._problems.condition(place), condition=place)
-                for place in self._problems.conditions_on(event)
+                for place in self._conditions_on(event)
             ]
             lost = states & steps.plant & steps.condition & ~steps.only(good)
             found.append(Hindrance(HindranceKind.SUPERVISOR, event, lost))
@@ -210,32 +218,49 @@ class Analysis:
         """Where an event leaves each of the ranges that it can leave."""
         mine = self._problems.written_by(event, self._ranges)
         for item in mine:
+            if item in self._dropped_ranges:
+                continue
             others = self._problems.steps(event, [other for other in mine if other != item])
             if others.event.is_controllable:
                 yield item, self.wanted(event) & ~others.plant
             else:
                 yield item, others.under(self._manager.true).bad
 
+    def _conditions_on(self, event: str) -> tuple[int, ...]:
+        return tuple(item for item in self._problems.conditions_on(event) if item not in self._dropped_conditions)
+
     # Runs
 
     def runs(self, start: Any, possible: Mapping[str, Any]) -> ShortestRuns:
         """Shortest runs from some states through events where they are possible."""
-        steps = [steps for steps in self._problem.steps if steps.event.name in possible]
-        return ShortestRuns(self._encoding, self._watch, steps, possible, start)
+        return self._runs(self._steps, start, possible)
+
+    def _runs(self, steps: Mapping[str, Steps], start: Any, possible: Mapping[str, Any]) -> ShortestRuns:
+        chosen = [item for name, item in steps.items() if name in possible]
+        return ShortestRuns(self._encoding, self._watch, chosen, possible, start)
 
     def trouble_after(self, start: Any) -> Trouble:
         """How one of some states that must be avoided runs into trouble."""
-        uncontrollable = {
-            name: self._manager.true for name, steps in self._steps.items() if not steps.event.is_controllable
-        }
-        run = self.runs(start, uncontrollable).run_to(self._troubled)
-        is_forced = run is not None
-        if run is None:
-            anything = {name: steps.plant & self._restricted(steps) for name, steps in self._steps.items()}
-            run = self.runs(start, anything).run_to(self._troubled)
-        if run is None:
-            raise InternalError("a state that must be avoided does not run into trouble")
-        return self._named(run, is_forced)
+        for steps, is_forced in self._ways_on():
+            possible = {
+                name: item.plant & self._restricted(item)
+                for name, item in steps.items()
+                if not (is_forced and item.event.is_controllable)
+            }
+            run = self._runs(steps, start, possible).run_to(self._troubled)
+            if run is not None:
+                return self._named(run, is_forced)
+        raise InternalError("a state that must be avoided does not run into trouble")
+
+    def _ways_on(self) -> Iterator[tuple[Mapping[str, Steps], bool]]:
+        """Events by which trouble is looked for, and whether by uncontrollable ones alone; the better ones first."""
+        if self._dropped_ranges:
+            # Updates that stop at the end of a range are no steps that the robot takes.
+            real = {name: self._problems.steps(name).under(steps.condition) for name, steps in self._steps.items()}
+            yield real, True
+            yield real, False
+        yield self._steps, True
+        yield self._steps, False
 
     def _restricted(self, steps: Steps) -> Any:
         return steps.condition if steps.event.is_controllable else self._manager.true
@@ -246,7 +271,7 @@ class Analysis:
         invariants = tuple(
             place
             for place in range(len(self._encoding.system.invariants))
-            if self._problems.invariant(place) & state == false
+            if place not in self._dropped_invariants and self._problems.invariant(place) & state == false
         )
         harmful = [steps for steps in self._problem.steps if steps.bad & state != false]
         leaving = tuple(
@@ -259,25 +284,24 @@ class Analysis:
             (steps.event.name, place)
             for steps in harmful
             if steps.plant & state != false
-            for place in self._problems.conditions_on(steps.event.name)
+            for place in self._conditions_on(steps.event.name)
             if self._problems.condition(place) & state == false
         )
         is_blocking = self.safe & state != false
-        marked = marked_states(self._encoding)
         return Trouble(
             run,
             is_forced,
             invariants,
             leaving,
             forbidden,
-            self.detour(state, marked, self.safe) if is_blocking else None,
+            self.detour(state, self._fixed_point.marked, self.safe) if is_blocking else None,
             self._unmarked(state) if is_blocking else (),
         )
 
     def _unmarked(self, state: Any) -> tuple[str, ...]:
         return tuple(
             item.name
-            for item in self._encoding.system.automata
+            for item in self._automata
             if not any(
                 self._encoding.in_location(item.name, location) & state != self._manager.false
                 for location in item.marked

@@ -158,7 +158,10 @@ def explain_lost(
     with place.reordering():
         blame = find_blame(problems, obstacles, false, watch)
     watch.limit = None
-    analysis = Analysis(encoding, watch, problems, obstacles, false)
+    # The trouble is that of what is blamed alone: so both tell one story.
+    blamed = set(blame.conflict)
+    dropped = (item for place, item in enumerate(obstacles) if place not in blamed)
+    analysis = Analysis(encoding, watch, problems, obstacles, false, dropped)
     trouble = Reporter(analysis, terms).trouble(analysis.trouble_after(fixed_point.initial))
     sufficing, removal = blame.sufficing, blame.removal or ()
     return EmptyExplanation(

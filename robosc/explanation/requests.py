@@ -33,7 +33,7 @@ MAXIMUM_SHOWN = 100
 """Characters of what was asked that an error repeats."""
 
 _ATOM = re.compile(
-    r"(?P<not>!\s*|not\s+)?(?P<owner>\w+)\.(?P<name>\w+)(?:\s*(?P<operator>!=|<=|>=|=|<|>)\s*(?P<value>-?\w+))?"
+    r"(?P<not>!\s*|not\s+)?(?:(?P<kind>service|action)\s+)?(?P<owner>\w+)\.(?P<name>\w+)(?:\s*(?P<operator>!=|<=|>=|=|<|>)\s*(?P<value>-?\w+))?"
 )
 
 _OPERATORS: dict[str, BinaryOperator] = {"=": "=", "!=": "!=", "<": "<", "<=": "<=", ">": ">", ">=": ">="}
@@ -71,6 +71,8 @@ def asked_run(system: System, model: Model, text: str) -> tuple[str, ...]:
 def asked_state(system: System, model: Model, text: str) -> Expression:
     """The condition that `Door.open, Lift.n = 2, !Lamp.on, calibrate.waiting` stands for.
 
+    Of a service or action that is called like a component, `service calibrate.waiting` is the location.
+
     Raises:
         RequestError: It is none, or names something that is not there.
     """
@@ -86,7 +88,15 @@ def _atom(system: System, model: Model, text: str) -> Expression:
         raise RequestError(f"{_shown(text)} is no condition such as Door.closed, Lift.n = 2 or !Lamp.on")
     owner, name = found["owner"], found["name"]
     plants = {item.name: communication_plant_name(item) for item in model.communications}
-    automaton = plants.get(owner, owner)
+    if found["kind"]:
+        # The word tells a service or action from a component of the same name.
+        automaton = f"{found['kind']} {owner}"
+        plants = {name: plant for name, plant in plants.items() if plant.startswith(f"{found['kind']} ")}
+        if automaton not in plants.values():
+            raise _unknown(found["kind"], owner, list(plants))
+    else:
+        components = [item.name for item in model.components]
+        automaton = owner if owner in components else plants.get(owner, owner)
     known = subjects(system)
     if Subject(automaton) not in known:
         raise _unknown("component or communication", owner, [*(item.automaton for item in known), *plants])

@@ -34,7 +34,8 @@ class StateValues:
     Attributes:
         components: State of every component with a behaviour.
         variables: Value of every synthesis variable, by `Component.variable`.
-        communications: Location of every service and action.
+        communications: Location of every service and action; of one that is called like a component, by
+            `service name` or `action name`.
     """
 
     components: dict[str, str]

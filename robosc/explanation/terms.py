@@ -11,7 +11,7 @@ from robosc.explanation.obstacles import Obstacle, ObstacleKind
 from robosc.explanation.structure import Part, StateValues
 from robosc.explanation.words import value_text
 from robosc.expressions import TRUE, Expression, Value, type_text
-from robosc.expressions.text import expression_text
+from robosc.expressions.text import automaton_text, expression_text
 from robosc.model.places import Places
 from robosc.model.structure import CommunicationKind, Model, RequirementForm
 from robosc.source import Location
@@ -35,6 +35,7 @@ class Terms:
 
     def __init__(self, model: Model, places: Places, system: System, obstacles: Sequence[Obstacle]) -> None:
         self._model = model
+        self._components = frozenset(item.name for item in model.components)
         self._places = places
         self._system = system
         self._obstacles = tuple(obstacles)
@@ -56,7 +57,7 @@ class Terms:
             },
             variables={str(subject): value for subject, value in values.items() if subject.variable is not None},
             communications={
-                item.name: str(values[Subject(name)])
+                self.automaton(name): str(values[Subject(name)])
                 for name, item in self._plants.items()
                 if item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
             },
@@ -75,7 +76,10 @@ class Terms:
 
     def automaton(self, name: str) -> str:
         """What an automaton is called in the model."""
-        return self._plants[name].name if name in self._plants else name
+        return automaton_text(name, self._components)
+
+    def _text(self, expression: Expression) -> str:
+        return expression_text(expression, self._components)
 
     # Parts
 
@@ -92,7 +96,7 @@ class Terms:
             (place,) = item.invariants
             invariant = self._model.invariants[place]
             word = "never" if invariant.is_never else "always"
-            return f"requirement {word} {expression_text(invariant.expression)}", self._places.invariants[place]
+            return f"requirement {word} {self._text(invariant.expression)}", self._places.invariants[place]
         if item.conditions:
             (place,) = item.conditions
             event = self._system.conditions[place].event
@@ -108,15 +112,15 @@ class Terms:
         item = self._model.requirements[number]
         names = item.communications
         shown = names[0] if len(names) == 1 else f"{{{', '.join(names)}}}"
-        expression = expression_text(item.expression)
+        expression = self._text(item.expression)
         if item.form is RequirementForm.NEEDS:
             return f"requirement {shown} needs {expression}"
         return f"requirement {expression} disables {shown}"
 
     def _marking(self, automaton: str) -> tuple[str, Location]:
         if automaton in self._plants:
-            name = self._plants[automaton].name
-            return f"that {name} gets back to idle", self._places.communications[name]
+            location = self._places.communications[self._plants[automaton].name]
+            return f"that {self.automaton(automaton)} gets back to idle", location
         marked = sorted(self._system.automaton(automaton).marked)
         shown = ", ".join(marked[:MAXIMUM_NAMES]) + (", ..." if len(marked) > MAXIMUM_NAMES else "")
         return f"that {automaton} gets to a marked state ({shown or 'none'})", self._places.components[automaton]
@@ -164,7 +168,7 @@ class Terms:
         where = f"{self.automaton(name)} is {location}"
         if not edges:
             return f"{where}, where it has no transition on {event}"
-        guards = [_cut(expression_text(edge.guard)) for edge in edges if edge.guard != TRUE]
+        guards = [_cut(self._text(edge.guard)) for edge in edges if edge.guard != TRUE]
         return f"{where}, where {' and '.join(guards[:MAXIMUM_NAMES])} is not true"
 
 

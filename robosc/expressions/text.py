@@ -1,5 +1,7 @@
 """Expressions in the language's own words and syntax, with as few parentheses as A.3 allows."""
 
+from collections.abc import Collection
+
 from robosc.expressions.tree import (
     ArrayPart,
     Binary,
@@ -39,75 +41,98 @@ _IMPLIES = 0
 _CONDITIONAL = -1
 
 
-def expression_text(expression: Expression) -> str:
+def automaton_text(name: str, components: Collection[str]) -> str:
+    """What an automaton is called in a text; `location` behind it and a dot is what the language of properties reads.
+
+    A component has its name, and so has a service or action (whose automaton is called `service calibrate`), unless a
+    component has that name: then the bare name would mean the component.
+
+    Args:
+        name: The automaton's name.
+        components: Names of all components.
+    """
+    bare = name.rpartition(" ")[2]
+    return name if bare in components else bare
+
+
+def expression_text(expression: Expression, components: Collection[str] = ()) -> str:
     """The expression as a user would write it.
 
     The operator `holds` has no syntax, since an author never needs it; it is printed as `holds(...)`.
-    A communication's location is printed as `name.location`. The elements that quantifiers look at are called
+    A communication's location is printed as `automaton_text` says. The elements that quantifiers look at are called
     `x1` (of the outermost), `x2` and so on.
+
+    Args:
+        expression: The expression.
+        components: Names of all components; needed only where it may read locations of services and actions, which no
+            text of the language names.
     """
-    return _print(expression, 0)[0]
+    return _Printer(components).print(expression, 0)[0]
 
 
-def _print(expression: Expression, depth: int) -> tuple[str, int]:
-    """The text and how tightly its outermost operator binds, inside `depth` quantifiers."""
-    match expression:
-        case Constant(value=bool(value)):
-            return ("true" if value else "false"), _OPERAND
-        case Constant(value=str(value)):
-            return _quoted(value), _OPERAND
-        case Constant(value=int(value) | float(value)):
-            text = _number(value)
-            return text, (_NEGATIVE if text.startswith("-") else _OPERAND)
-        case EnumValue(value=value):
-            return value, _OPERAND
-        case VariableRead(component=component, variable=variable):
-            return f"{component}.{variable}", _OPERAND
-        case StateTest(component=component, state=state):
-            return f"{component.rpartition(' ')[2]}.{state}", _OPERAND
-        case Received(path=path):
-            return f"value{_steps(path)}", _OPERAND
-        case Element(level=level, path=path):
-            return f"x{depth - level}{_steps(path)}", _OPERAND
-        case Call(function=function, arguments=arguments):
-            return f"{function}({', '.join(_print(item, depth)[0] for item in arguments)})", _OPERAND
-        case Reduction(function=function, part=part):
-            return f"{function}({_part(part, depth)})", _OPERAND
-        case Quantifier(word=word, part=part, condition=condition):
-            inside = _print(condition, depth + 1)[0]
-            return f"{word}(x{depth + 1} in {_part(part, depth)}: {inside})", _OPERAND
-        case Conditional(condition=condition, then=then, otherwise=otherwise):
-            parts = (_print(item, depth)[0] for item in (condition, then, otherwise))
-            return "if {} then {} else {}".format(*parts), _CONDITIONAL
-        case Unary(operator="holds", operand=operand):
-            return f"holds({_print(operand, depth)[0]})", _OPERAND
-        case Unary(operator="not", operand=operand):
-            return f"!{_within(operand, _NOT, depth)}", _NOT
-        case Unary(operand=operand):
-            return f"-{_within(operand, _NEGATIVE, depth)}", _NEGATIVE
-        case Binary(operator="implies", left=left, right=right):
-            # Its operands are literals, negations or parentheses, and it stands alone.
-            return f"{_within(left, _NOT, depth)} => {_within(right, _NOT, depth)}", _IMPLIES
-        case Binary(operator=operator, left=left, right=right):
-            level = _LEVELS[operator]
-            return f"{_within(left, level, depth)} {operator} {_within(right, level + 1, depth)}", level
-    raise TypeError(f"no expression: {expression!r}")
+class _Printer:
+    """Prints the expressions of one robot."""
+
+    def __init__(self, components: Collection[str]) -> None:
+        self._components = components
+
+    def print(self, expression: Expression, depth: int) -> tuple[str, int]:
+        """The text and how tightly its outermost operator binds, inside `depth` quantifiers."""
+        match expression:
+            case Constant(value=bool(value)):
+                return ("true" if value else "false"), _OPERAND
+            case Constant(value=str(value)):
+                return _quoted(value), _OPERAND
+            case Constant(value=int(value) | float(value)):
+                text = _number(value)
+                return text, (_NEGATIVE if text.startswith("-") else _OPERAND)
+            case EnumValue(value=value):
+                return value, _OPERAND
+            case VariableRead(component=component, variable=variable):
+                return f"{component}.{variable}", _OPERAND
+            case StateTest(component=component, state=state):
+                return f"{automaton_text(component, self._components)}.{state}", _OPERAND
+            case Received(path=path):
+                return f"value{_steps(path)}", _OPERAND
+            case Element(level=level, path=path):
+                return f"x{depth - level}{_steps(path)}", _OPERAND
+            case Call(function=function, arguments=arguments):
+                return f"{function}({', '.join(self.print(item, depth)[0] for item in arguments)})", _OPERAND
+            case Reduction(function=function, part=part):
+                return f"{function}({self._part(part, depth)})", _OPERAND
+            case Quantifier(word=word, part=part, condition=condition):
+                inside = self.print(condition, depth + 1)[0]
+                return f"{word}(x{depth + 1} in {self._part(part, depth)}: {inside})", _OPERAND
+            case Conditional(condition=condition, then=then, otherwise=otherwise):
+                parts = (self.print(item, depth)[0] for item in (condition, then, otherwise))
+                return "if {} then {} else {}".format(*parts), _CONDITIONAL
+            case Unary(operator="holds", operand=operand):
+                return f"holds({self.print(operand, depth)[0]})", _OPERAND
+            case Unary(operator="not", operand=operand):
+                return f"!{self._within(operand, _NOT, depth)}", _NOT
+            case Unary(operand=operand):
+                return f"-{self._within(operand, _NEGATIVE, depth)}", _NEGATIVE
+            case Binary(operator="implies", left=left, right=right):
+                # Its operands are literals, negations or parentheses, and it stands alone.
+                return f"{self._within(left, _NOT, depth)} => {self._within(right, _NOT, depth)}", _IMPLIES
+            case Binary(operator=operator, left=left, right=right):
+                level = _LEVELS[operator]
+                return f"{self._within(left, level, depth)} {operator} {self._within(right, level + 1, depth)}", level
+        raise TypeError(f"no expression: {expression!r}")
+
+    def _part(self, part: ArrayPart, depth: int) -> str:
+        """An array or a slice of it."""
+        text = self.print(part.array, depth)[0]
+        return text if part.low is None else f"{text}[{part.low}..{part.high}]"
+
+    def _within(self, expression: Expression, level: int, depth: int) -> str:
+        """An operand, in parentheses where it binds less tightly than its place asks."""
+        text, binds = self.print(expression, depth)
+        return text if binds >= level else f"({text})"
 
 
 def _steps(path: tuple[PathStep, ...]) -> str:
     return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
-
-
-def _part(part: ArrayPart, depth: int) -> str:
-    """An array or a slice of it."""
-    text = _print(part.array, depth)[0]
-    return text if part.low is None else f"{text}[{part.low}..{part.high}]"
-
-
-def _within(expression: Expression, level: int, depth: int) -> str:
-    """An operand, in parentheses where it binds less tightly than its place asks."""
-    text, binds = _print(expression, depth)
-    return text if binds >= level else f"({text})"
 
 
 def _number(value: float) -> str:

@@ -20,7 +20,7 @@ from robosc.expressions import (
     type_text,
 )
 from robosc.language import syntax
-from robosc.model.expressions import ExpressionChecker, may_leave
+from robosc.model.expressions import ExpressionChecker
 from robosc.model.findings import Findings
 from robosc.model.scope import ComponentNames, Scope
 from robosc.model.structure import (
@@ -34,6 +34,7 @@ from robosc.model.structure import (
     Variable,
     is_tau,
 )
+from robosc.model.typed import may_leave
 from robosc.model.types import Types
 from robosc.model.units import Part, unique
 from robosc.source import Location

@@ -18,9 +18,10 @@ from robosc.expressions import (
     type_text,
 )
 from robosc.language import syntax
-from robosc.model.expressions import ExpressionChecker, Typed, constant_value, may_leave
+from robosc.model.expressions import ExpressionChecker
 from robosc.model.findings import Findings
 from robosc.model.scope import Scopes
+from robosc.model.typed import Typed, constant_value, may_leave
 from robosc.model.types import Types
 from robosc.model.units import Unit
 
@@ -124,7 +125,7 @@ class Constants:
         )
         if found is None or type_ is None:
             return None
-        value = constant_value(found)
+        value = constant_value(found.expression)
         if value is None:
             self._findings.error(
                 "not-constant",

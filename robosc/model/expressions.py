@@ -1,20 +1,18 @@
 """Resolves and types expressions (language A.3 to A.5)."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import reduce
 from itertools import chain
 
-from robosc.errors import InternalError, RelatedPlace
+from robosc.errors import RelatedPlace
 from robosc.expressions import (
     ARGUMENTS,
     MAXIMUM_INTEGER,
-    MINIMUM_INTEGER,
     ArrayPart,
     ArrayType,
     Binary,
     BooleanType,
-    Call,
     Conditional,
     Constant,
     DoubleType,
@@ -30,20 +28,29 @@ from robosc.expressions import (
     Received,
     Reduction,
     StateTest,
-    StringType,
     Type,
     Unary,
-    Value,
     VariableRead,
     is_numeric,
-    leaves,
     type_text,
 )
-from robosc.expressions.bounds import call_bounds
-from robosc.expressions.evaluate import evaluate
 from robosc.language import syntax
 from robosc.model.findings import Findings
+from robosc.model.ranges import Range, Ranges, narrowed
 from robosc.model.scope import ComponentNames, Scope
+from robosc.model.typed import (
+    Typed,
+    applied,
+    arithmetic,
+    as_type,
+    bounded_integer,
+    bounds_of,
+    common_type,
+    constant_value,
+    fits,
+    literal_type,
+    same_kind,
+)
 
 _BOOLEAN = BooleanType()
 _LOGIC = {"or": "or", "and": "and", "=>": "implies"}
@@ -61,19 +68,6 @@ _USES = {
 _Step = syntax.Name | syntax.Index | syntax.Slice
 
 
-@dataclass(frozen=True, slots=True)
-class Typed:
-    """A resolved expression, its type, and for a bounded integer the values it can have.
-
-    Attributes:
-        expression: The expression.
-        type: Its type; an integer's bounds are those its value can have.
-    """
-
-    expression: Expression
-    type: Type
-
-
 class ExpressionChecker:
     """Resolves the expressions of one scope.
 
@@ -86,6 +80,20 @@ class ExpressionChecker:
         self._scope = scope
         self._findings = findings
         self._elements: list[tuple[str, Type]] = []
+        self._ranges: dict[Expression, Range] = {}
+
+    @contextmanager
+    def where(self, condition: Expression) -> Iterator[None]:
+        """What is resolved meanwhile has the bounds that it has where a condition, resolved here, is true."""
+        with self._within(narrowed(condition, self._ranges) or {}):
+            yield
+
+    @contextmanager
+    def _within(self, ranges: Ranges) -> Iterator[None]:
+        before = {read: self._ranges[read] for read in ranges}
+        self._ranges.update(ranges)
+        yield
+        self._ranges.update(before)
 
     def condition(self, tree: syntax.Expression) -> Expression | None:
         """A boolean expression, or None after reporting what is wrong."""
@@ -108,7 +116,7 @@ class ExpressionChecker:
         """An expression and its type; `wanted` decides between enums that share a value."""
         match tree:
             case syntax.Literal(value=value):
-                return Typed(Constant(value), _literal_type(value))
+                return Typed(Constant(value), literal_type(value))
             case syntax.Access():
                 return self._access(tree, wanted)
             case syntax.Unary():
@@ -160,8 +168,8 @@ class ExpressionChecker:
             self._mismatch(tree.operand, operand.type, "'-' takes a number")
             return None
         if isinstance(operand.type, IntegerType):
-            low, high = _bounds(operand.type)
-            return Typed(Unary("-", operand.expression), _integer(-high, -low))
+            low, high = bounds_of(operand.type)
+            return Typed(Unary("-", operand.expression), bounded_integer(-high, -low))
         return Typed(Unary("-", operand.expression), operand.type)
 
     def _binary(self, tree: syntax.Binary) -> Typed | None:
@@ -182,7 +190,7 @@ class ExpressionChecker:
         if tree.operator in _ORDER:
             return Typed(result, _BOOLEAN)
         if tree.operator != "/" and isinstance(left.type, IntegerType) and isinstance(right.type, IntegerType):
-            return Typed(result, _arithmetic(tree.operator, left.type, right.type))
+            return Typed(result, arithmetic(tree.operator, left.type, right.type))
         return Typed(result, DoubleType())
 
     def _equality(self, tree: syntax.Binary) -> Typed | None:
@@ -197,7 +205,7 @@ class ExpressionChecker:
             return None
         both_numbers = is_numeric(left.type) and is_numeric(right.type)
         comparable = not isinstance(left.type, ObjectType | ArrayType | NoneType)
-        if not comparable or not (both_numbers or _same_kind(left.type, right.type)):
+        if not comparable or not (both_numbers or same_kind(left.type, right.type)):
             self._findings.error(
                 "type-mismatch",
                 f"'{tree.operator}' compares {_article(type_text(left.type))} with {_article(type_text(right.type))}",
@@ -224,19 +232,29 @@ class ExpressionChecker:
 
     def _conditional(self, tree: syntax.Conditional, wanted: Type | None) -> Typed | None:
         condition = self.condition(tree.condition)
+        if_true = {} if condition is None else narrowed(condition, self._ranges)
+        if_false = {} if condition is None else narrowed(Unary("not", condition), self._ranges)
         if self._is_open(tree.then):
-            otherwise = self.infer(tree.otherwise, wanted)
-            then = self.infer(tree.then, wanted or (otherwise.type if otherwise else None))
+            with self._within(if_false or {}):
+                otherwise = self.infer(tree.otherwise, wanted)
+            with self._within(if_true or {}):
+                then = self.infer(tree.then, wanted or (otherwise.type if otherwise else None))
         else:
-            then = self.infer(tree.then, wanted)
-            otherwise = self.infer(tree.otherwise, wanted or (then.type if then else None))
+            with self._within(if_true or {}):
+                then = self.infer(tree.then, wanted)
+            with self._within(if_false or {}):
+                otherwise = self.infer(tree.otherwise, wanted or (then.type if then else None))
         if condition is None or then is None or otherwise is None:
             return None
-        common = _common_type(then.type, otherwise.type)
+        common = common_type(then.type, otherwise.type)
         if common is None:
             self._mismatch(tree.otherwise, otherwise.type, f"'then' has {_article(type_text(then.type))}")
             return None
-        return Typed(Conditional(condition, _as_type(then, common), _as_type(otherwise, common)), common)
+        result = Conditional(condition, as_type(then, common), as_type(otherwise, common))
+        if isinstance(common, IntegerType) and (if_true is None) is not (if_false is None):
+            # One side is never taken: the other one has all the values.
+            return Typed(result, otherwise.type if if_true is None else then.type)
+        return Typed(result, common)
 
     # Functions and arrays
 
@@ -267,8 +285,8 @@ class ExpressionChecker:
         if len(arguments) < count:
             return None
         if name in ("min", "max"):
-            return reduce(lambda left, right: _applied(name, (left, right)), arguments)
-        return _applied(name, tuple(arguments))
+            return reduce(lambda left, right: applied(name, (left, right)), arguments)
+        return applied(name, tuple(arguments))
 
     def _wrong_count(self, tree: syntax.Call, wanted: int) -> None:
         name = tree.function.text
@@ -343,7 +361,7 @@ class ExpressionChecker:
         found = self.infer(tree)
         if found is None:
             return None
-        value = constant_value(found)
+        value = constant_value(found.expression)
         if isinstance(found.type, IntegerType) and type(value) is int and value >= 0:
             return value
         self._findings.error(
@@ -432,7 +450,7 @@ class ExpressionChecker:
         if rest:
             self._no_parts(rest[0], "a variable")
             return None
-        return None if found is None else Typed(VariableRead(component.name, name.text), found)
+        return None if found is None else self._read(VariableRead(component.name, name.text), found)
 
     def _no_parts(self, step: _Step, what: str) -> None:
         self._findings.error("type-mismatch", f"{what} has no parts", step.location, "Remove what follows the name.")
@@ -483,7 +501,15 @@ class ExpressionChecker:
                 "no-value-here", "there is no data: the type is none", tree.location, "Give the communication a type."
             )
             return None
-        return Typed(Received(path), found)
+        return self._read(Received(path), found)
+
+    def _read(self, read: Expression, type_: Type) -> Typed:
+        """What is read, with the bounds that it has here."""
+        if isinstance(type_, IntegerType):
+            declared = bounds_of(type_)
+            here = self._ranges.setdefault(read, declared)
+            type_ = type_ if here == declared else IntegerType(*here)
+        return Typed(read, type_)
 
     def _walk(self, whole: Type, steps: Sequence[_Step]) -> tuple[tuple[PathStep, ...], Type] | None:
         """Property by property, element by element: the path and the type at its end."""
@@ -528,111 +554,11 @@ class ExpressionChecker:
         return found
 
 
-def fits(found: Type, wanted: Type) -> bool:
-    """Whether a value of one type can stand where another is wanted (ranges are judged elsewhere)."""
-    return _same_kind(found, wanted) or (isinstance(found, IntegerType) and isinstance(wanted, DoubleType))
-
-
-def may_leave(found: Type, wanted: Type) -> bool:
-    """Whether an integer can lie outside the range that is wanted."""
-    if not isinstance(found, IntegerType) or not isinstance(wanted, IntegerType) or not wanted.is_bounded:
-        return False
-    (low, high), (least, most) = _bounds(found), _bounds(wanted)
-    return low < least or high > most
-
-
-def _same_kind(first: Type, second: Type) -> bool:
-    if isinstance(first, IntegerType) and isinstance(second, IntegerType):
-        return True
-    return first == second
-
-
 def _plain_text(type_: Type) -> str:
     """A type in words; of a single number it is enough that it is an integer."""
     if isinstance(type_, IntegerType) and type_.low == type_.high:
         return "integer"
     return type_text(type_)
-
-
-def _literal_type(value: bool | int | float | str) -> Type:
-    match value:
-        case bool():
-            return _BOOLEAN
-        case int():
-            return IntegerType(value, value)
-        case float():
-            return DoubleType()
-        case _:
-            return StringType()
-
-
-def _bounds(type_: IntegerType) -> tuple[int, int]:
-    low = MINIMUM_INTEGER if type_.low is None else type_.low
-    high = MAXIMUM_INTEGER if type_.high is None else type_.high
-    return low, high
-
-
-def _integer(low: int, high: int) -> IntegerType:
-    """An integer of these bounds; results beyond 32 bits are unknown, so they need no place."""
-    return IntegerType(max(low, MINIMUM_INTEGER), min(high, MAXIMUM_INTEGER))
-
-
-def _arithmetic(operator: str, left: IntegerType, right: IntegerType) -> IntegerType:
-    """Bounds of a sum, difference or product (interval arithmetic)."""
-    (a, b), (c, d) = _bounds(left), _bounds(right)
-    match operator:
-        case "+":
-            return _integer(a + c, b + d)
-        case "-":
-            return _integer(a - d, b - c)
-        case _:
-            corners = (a * c, a * d, b * c, b * d)
-            return _integer(min(corners), max(corners))
-
-
-def _common_type(first: Type, second: Type) -> Type | None:
-    """The type of a value that is one of two, or None where they do not go together."""
-    if isinstance(first, IntegerType) and isinstance(second, IntegerType):
-        (a, b), (c, d) = _bounds(first), _bounds(second)
-        return IntegerType(min(a, c), max(b, d))
-    if is_numeric(first) and is_numeric(second):
-        return DoubleType()
-    return first if first == second and not isinstance(first, ObjectType | ArrayType | NoneType) else None
-
-
-def _as_type(typed: Typed, common: Type) -> Expression:
-    """An expression of a common type: an integer beside doubles becomes one, or it would overflow like an integer."""
-    if isinstance(typed.type, IntegerType) and isinstance(common, DoubleType):
-        return Call("double", (typed.expression,))
-    return typed.expression
-
-
-def _applied(name: str, arguments: tuple[Typed, ...]) -> Typed:
-    """A function of numbers, with the bounds that an integer result can have (interval arithmetic)."""
-    types = [item.type for item in arguments]
-    common = types[0] if all(isinstance(type_, IntegerType) for type_ in types) else DoubleType()
-    parts = tuple(item.expression if len(types) == 1 else _as_type(item, common) for item in arguments)
-    call = Call(name, parts)  # type: ignore[arg-type]  # one of `ARGUMENTS`
-    if name == "double":
-        return Typed(call, DoubleType())
-    if name == "integer":
-        (type_,) = types
-        return Typed(call, type_ if isinstance(type_, IntegerType) else IntegerType(MINIMUM_INTEGER, MAXIMUM_INTEGER))
-    if not all(isinstance(type_, IntegerType) for type_ in types):
-        return Typed(call, DoubleType())
-    bounds = [_bounds(type_) for type_ in types if isinstance(type_, IntegerType)]
-    return Typed(call, _integer(*call_bounds(name, bounds)))
-
-
-def constant_value(typed: Typed) -> Value | None:
-    """The value of an expression of constants; None for any other one, and for one that is unknown."""
-    if not all(isinstance(leaf, Constant | EnumValue) for leaf in leaves(typed.expression)):
-        return None
-    return evaluate(typed.expression, _not_constant, _not_constant)  # type: ignore[no-any-return]
-
-
-def _not_constant(*names: str) -> str:
-    raise InternalError(f"{names} was taken for a constant")
 
 
 def _article(text: str) -> str:

@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Mapping
 
 from robosc.errors import RelatedPlace
-from robosc.expressions import EnumType, NoneType, ObjectType, Type, type_text
+from robosc.expressions import TRUE, EnumType, NoneType, ObjectType, Type, type_text
 from robosc.language import syntax
-from robosc.model.expressions import ExpressionChecker, may_leave
+from robosc.model.expressions import ExpressionChecker
 from robosc.model.findings import Findings
 from robosc.model.structure import (
     Communication,
@@ -17,6 +17,7 @@ from robosc.model.structure import (
     Requirement,
     RequirementForm,
 )
+from robosc.model.typed import may_leave
 from robosc.model.types import Types
 from robosc.model.units import unique
 from robosc.source import Location
@@ -97,7 +98,8 @@ class ProvideBuilder:
             )
             return None
         self._because = RelatedPlace(f"'{name.text}' is declared here", self._places[name.text])
-        value = self._value(tree.value, communication.request, name)
+        with self._checker.where(TRUE if condition is None else condition):
+            value = self._value(tree.value, communication.request, name)
         if value is None or (tree.condition is not None and condition is None):
             return None
         return Provide(name.text, value, condition)

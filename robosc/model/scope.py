@@ -12,7 +12,7 @@ from robosc.source import Location
 
 if TYPE_CHECKING:
     from robosc.model.constants import Constants
-    from robosc.model.expressions import Typed
+    from robosc.model.typed import Typed
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ temporal logic specifications", ACM TOPLAS 8(2), 1986, pp. 244-263, sec. 2. Atom
 where they are true (not where they are false or unknown), and whether an event can happen.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal
 
@@ -105,28 +106,33 @@ class Property:
     formula: Formula
 
 
-def formula_text(formula: Formula) -> str:
-    """A formula in the language of properties, with parentheses around whatever is no single operand."""
+def formula_text(formula: Formula, components: Collection[str]) -> str:
+    """A formula in the language of properties, with parentheses around whatever is no single operand.
+
+    Args:
+        formula: The formula.
+        components: Names of all components.
+    """
     match formula:
         case Condition(expression=expression):
-            return expression_text(expression)
+            return expression_text(expression, components)
         case Enabled(event=event):
             return f"enabled({event})"
         case Not(operand=operand):
-            return f"!{_operand(operand)}"
+            return f"!{_operand(operand, components)}"
         case Joined(operator=operator, left=left, right=right):
-            return f"{_operand(left)} {operator} {_operand(right)}"
+            return f"{_operand(left, components)} {operator} {_operand(right, components)}"
         case Next(quantifier=quantifier, operand=operand):
-            return f"{quantifier}X {_operand(operand)}"
+            return f"{quantifier}X {_operand(operand, components)}"
         case Finally(quantifier=quantifier, operand=operand):
-            return f"{quantifier}F {_operand(operand)}"
+            return f"{quantifier}F {_operand(operand, components)}"
         case Globally(quantifier=quantifier, operand=operand):
-            return f"{quantifier}G {_operand(operand)}"
+            return f"{quantifier}G {_operand(operand, components)}"
         case Until(quantifier=quantifier, left=left, right=right):
-            return f"{quantifier}[{formula_text(left)} U {formula_text(right)}]"
+            return f"{quantifier}[{formula_text(left, components)} U {formula_text(right, components)}]"
 
 
-def _operand(formula: Formula) -> str:
-    text = formula_text(formula)
+def _operand(formula: Formula, components: Collection[str]) -> str:
+    text = formula_text(formula, components)
     is_single = isinstance(formula, Enabled | Not | Temporal) or (isinstance(formula, Condition) and " " not in text)
     return text if is_single else f"({text})"

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from robosc.automata.state import Subject, subject_domain, subjects
 from robosc.automata.structure import System
 from robosc.expressions import Value
+from robosc.expressions.text import automaton_text
 from robosc.model.structure import Model
 from robosc.model_checking.formulas import formula_text
 from robosc.model_checking.outcome import Run, State, Verdict
@@ -15,22 +16,26 @@ _WIDTH, _NARROWEST = 110, 40
 """Columns of a line, and of what changes at least."""
 
 
-def verdict_text(verdict: Verdict, system: System) -> str:
+def verdict_text(verdict: Verdict, system: System, model: Model) -> str:
     """A verdict as lines; the run event by event, each with what it changes."""
     claim = verdict.property
     name = f"{claim.name}: " if claim.name else ""
     lines = [f"{'holds' if verdict.holds else 'FAILS'}  {name}{claim.text}"]
     if verdict.run is not None:
-        lines += [f"       {line}".rstrip() for line in _run_lines(verdict.run, system)]
+        lines += [f"       {line}".rstrip() for line in _run_lines(verdict.run, system, _components(model))]
     return "\n".join(lines) + "\n"
 
 
-def _run_lines(run: Run, system: System) -> Iterator[str]:
+def _components(model: Model) -> frozenset[str]:
+    return frozenset(component.name for component in model.components)
+
+
+def _run_lines(run: Run, system: System, components: frozenset[str]) -> Iterator[str]:
     yield f"{run.kind}:"
     width = max(len(event or _NOTHING) for event in ("initially", *run.events))
     before: dict[str, str] = {}
     for number, state in enumerate(run.states):
-        shown = {str(subject): _value_text(value) for subject, value in _shown(system, state)}
+        shown = {_name(subject, components): _value_text(value) for subject, value in _shown(system, state)}
         changes = ", ".join(f"{name} = {value}" for name, value in shown.items() if before.get(name) != value)
         before = shown
         event = run.events[number - 1] or _NOTHING if number else "initially"
@@ -42,7 +47,7 @@ def _run_lines(run: Run, system: System) -> Iterator[str]:
         yield f"      and so on for ever from {run.loop}"
     for item in run.left:
         holds = "holds" if item.holds else "does not hold"
-        yield f"      in {item.place}, '{formula_text(item.formula)}' {holds}, which this run does not show"
+        yield f"      in {item.place}, '{formula_text(item.formula, components)}' {holds}, which this run does not show"
 
 
 def _shown(system: System, state: State) -> Iterator[tuple[Subject, Value]]:
@@ -50,6 +55,10 @@ def _shown(system: System, state: State) -> Iterator[tuple[Subject, Value]]:
     for subject, value in zip(subjects(system), state, strict=True):
         if subject.variable is not None or len(subject_domain(system, subject)) > 1:
             yield subject, value
+
+
+def _name(subject: Subject, components: frozenset[str]) -> str:
+    return str(subject) if subject.variable is not None else automaton_text(subject.automaton, components)
 
 
 def _value_text(value: Value) -> str:
@@ -73,7 +82,8 @@ def _run_json(run: Run, system: System, model: Model) -> dict[str, object]:
         "events": list(run.events),
         "loop": run.loop,
         "left": [
-            {"state": item.place, "property": formula_text(item.formula), "holds": item.holds} for item in run.left
+            {"state": item.place, "property": formula_text(item.formula, _components(model)), "holds": item.holds}
+            for item in run.left
         ],
     }
 

@@ -8,7 +8,8 @@ may send a message or answer, and any enabled request may be issued.
 - One step of the environment is one middleware message, a *batch* (3.1): the events that stand for it, in source
   order, with no silent step between them. Under the setting `on_unknown: keep` an event whose enum is unknown does
   not happen, so any part of a batch may happen as well; a *whole* batch can happen under every setting.
-- Received data takes every value that matters. Code-only variables do not matter: nothing that decides about events
+- Received data takes every value that matters; events of one message carry what the same fields can bring
+  (`robosc.properties.messages`). Code-only variables do not matter: nothing that decides about events
   reads one (language A.6). They only decide what is sent; a request whose data is unknown counts as possible.
 - That an action cannot be requested again until its cancelled goal is known to have ended (3.2) is left out: the end
   can become known in any state and changes nothing else, so every state is reached, and left, as if it were known.
@@ -18,6 +19,7 @@ may send a message or answer, and any enabled request may be issued.
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import product
 
 import msgspec
 
@@ -35,6 +37,7 @@ from robosc.model.structure import (
     Model,
     Transition,
 )
+from robosc.properties.messages import Choice, choices_together
 from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.structure import AddedCondition
 
@@ -157,6 +160,13 @@ class Controller:
         moving = {edge.event for item in self.system.automata for edge in item.edges if edge.source != edge.target}
         self.silent: tuple[str, ...] = (*resets, *(event for event in model.taus if event in moving))
         self.batches = tuple(_batches(model, deployment))
+        messages = {item.event(EventKind.RESPONSE): item for item in model.communications}
+        together = (
+            (batch, choices_together(model, self.system, [messages[event] for event in batch]))
+            for batch in self.batches
+            if len(batch) > 1
+        )
+        self._choices = {batch: choices for batch, choices in together if choices is not None}
         self.requests = tuple(
             item.event(EventKind.REQUEST)
             for item in model.communications
@@ -271,6 +281,40 @@ class Controller:
 
     def _together(self, state: State, batch: tuple[str, ...]) -> dict[State, tuple[tuple[str, ...], bool]]:
         """What the events of a batch make of a state: with the events, and whether those are all of them."""
+        if batch not in self._choices:
+            return self._apart(state, batch)
+        found: dict[State, tuple[tuple[str, ...], bool]] = {}
+        for choice, keeps in product(self._choices[batch], (False, True)):
+            for target, (events, is_whole) in self._with_choice(state, batch, choice, keeps=keeps).items():
+                if target not in found or (is_whole and not found[target][1]):
+                    found[target] = events, is_whole
+        found.pop(state, None)
+        return found
+
+    def _with_choice(
+        self, state: State, batch: tuple[str, ...], choice: Choice, *, keeps: bool
+    ) -> dict[State, tuple[tuple[str, ...], bool]]:
+        """The same for some of the data that the events can carry together, with or without `on_unknown: keep`."""
+        found: dict[State, tuple[tuple[str, ...], bool]] = {state: ((), True)}
+        for event, options in zip(batch, choice, strict=True):
+            if not self._stands(state, event):
+                continue
+            further: dict[State, tuple[tuple[str, ...], bool]] = {}
+            happening = [option for option in options if not (keeps and option.is_unknown)]
+            for before, (events, is_whole) in found.items():
+                for option in happening:
+                    target = self._semantics.target_with(before, event, option.data)
+                    is_sure = is_whole and not option.is_unknown
+                    if target is not None and (target not in further or (is_sure and not further[target][1])):
+                        further[target] = (*events, event), is_sure
+            if keeps and any(option.may_be_left_out for option in options):
+                for before, (events, _) in found.items():
+                    further.setdefault(before, (events, False))
+            found = further
+        return found
+
+    def _apart(self, state: State, batch: tuple[str, ...]) -> dict[State, tuple[tuple[str, ...], bool]]:
+        """The same where nothing is known of what the events carry together."""
         found: dict[State, tuple[tuple[str, ...], bool]] = {state: ((), True)}
         for event in batch:
             if not self._stands(state, event):

@@ -4,9 +4,10 @@ from collections.abc import Iterable, Sequence
 
 from robosc.automata.compile import State
 from robosc.automata.plants import communication_plant_name
-from robosc.automata.state import subjects
+from robosc.automata.state import Subject, subjects
 from robosc.automata.structure import System
 from robosc.errors import Diagnostic, RelatedPlace, Severity
+from robosc.expressions.text import automaton_text
 from robosc.model.places import Places
 from robosc.model.structure import Model, is_tau
 from robosc.properties.outcome import Blocking, Conflict, Livelock, Order, Properties
@@ -67,7 +68,7 @@ def _conflict(model: Model, system: System, places: Places, conflict: Conflict) 
         Severity.WARNING,
         "not-confluent",
         f"the order of silent steps matters: {_when(conflict.trace)}, the executor's order "
-        f"{_told(system, chosen, other)}, but the order {_told(system, other, chosen)}",
+        f"{_told(model, system, chosen, other)}, but the order {_told(model, system, other, chosen)}",
         _place(model, places, at),
         "Let guards decide which of these steps is wanted, so that they are not enabled together.",
         _related(
@@ -76,21 +77,28 @@ def _conflict(model: Model, system: System, places: Places, conflict: Conflict) 
     )
 
 
-def _told(system: System, order: Order, beside: Order) -> str:
+def _told(model: Model, system: System, order: Order, beside: Order) -> str:
     """An order and where it ends, as far as that is not where another one ends."""
     told = _listed((*order.events, *order.cycle))
     if order.end is None:
         return f"{told} never ends"
-    return f"{told} ends" + (f" with {_difference(system, order.end, beside.end)}" if beside.end is not None else "")
+    if beside.end is None:
+        return f"{told} ends"
+    return f"{told} ends with {_difference(model, system, order.end, beside.end)}"
 
 
-def _difference(system: System, state: State, other: State) -> str:
+def _difference(model: Model, system: System, state: State, other: State) -> str:
     parts = [
-        f"{subject} = {str(value).lower() if isinstance(value, bool) else value}"
+        f"{_name(model, subject)} = {str(value).lower() if isinstance(value, bool) else value}"
         for subject, value, beside in zip(subjects(system), state, other, strict=True)
         if value != beside
     ]
     return ", ".join(parts[:MAXIMUM_NAMES]) + (", ..." if parts[MAXIMUM_NAMES:] else "")
+
+
+def _name(model: Model, subject: Subject) -> str:
+    components = {item.name for item in model.components}
+    return str(subject) if subject.variable is not None else automaton_text(subject.automaton, components)
 
 
 def _blocking(model: Model, system: System, places: Places, blocking: Blocking) -> Diagnostic:
@@ -107,7 +115,9 @@ def _blocking(model: Model, system: System, places: Places, blocking: Blocking) 
     homes = {communication_plant_name(item): places.communications[item.name] for item in model.communications}
     homes.update(places.components)
     what = (
-        "all parts of the robot are never marked together again" if lost is None else f"'{lost}' is never marked again"
+        "all parts of the robot are never marked together again"
+        if lost is None
+        else f"'{_name(model, Subject(lost))}' is never marked again"
     )
     return Diagnostic(
         Severity.WARNING,

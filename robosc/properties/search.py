@@ -30,7 +30,8 @@ class Searched:
         is_complete: Whether there are no others.
         livelock: Silent steps that do not end, the first by the number of events, or None.
         conflict: Silent steps whose order matters, or None.
-        blocking: A state from which no marked one is reachable, or None; also where the search is not complete.
+        blocking: The nearest state, or cycle of silent steps, from which no marked one is reachable, or None; also
+            where the search is not complete.
     """
 
     states: int = 0
@@ -115,8 +116,8 @@ def search(
                 livelock = Livelock((*graph.trace(parent), *events, *run.events), run.cycle)
                 if found.livelock is None or livelock.size < found.livelock.size:
                     found.livelock = livelock
-                if not run.is_marked and found.blocking is None:
-                    found.blocking = Blocking(livelock.trace, run.cycle_states)
+                if not run.is_marked:
+                    found.blocking = _shorter(found.blocking, Blocking(livelock.trace, run.cycle_states))
                 if run.is_marked and is_sure and parent is not None:
                     graph.good.add(parent)
             if orders is not None and found.conflict is None:
@@ -153,8 +154,14 @@ def search(
             enter(number, events, is_sure, node)
     found.states = len(visited)
     found.is_complete = True
-    found.blocking = found.blocking or _blocking(graph)
+    found.blocking = _shorter(found.blocking, _blocking(graph))
     return found
+
+
+def _shorter(first: Blocking | None, second: Blocking | None) -> Blocking | None:
+    """The one with fewer events; of two alike the first."""
+    found = [item for item in (first, second) if item is not None]
+    return min(found, key=lambda item: len(item.trace), default=None)
 
 
 def _blocking(graph: _Graph) -> Blocking | None:

@@ -1,6 +1,6 @@
 """Tests whether a place of the state holds one of some values, in the model's words, and how long they are."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -61,15 +61,24 @@ class Membership:
         return joined(self.operator, self.parts)
 
 
-def membership(subject: Subject, domain: SubjectDomain, indices: Indices) -> Membership:
-    """The shortest test whether a place holds one of some values: some, but not all that it can hold."""
-    inside = _membership("or", _one_of(subject, domain, indices))
-    outside = _membership("and", _none_of(subject, domain, _others(indices, len(domain))))
+def membership(
+    subject: Subject, domain: SubjectDomain, indices: Indices, components: Collection[str] = ()
+) -> Membership:
+    """The shortest test whether a place holds one of some values: some, but not all that it can hold.
+
+    Args:
+        subject: The place.
+        domain: What it can hold.
+        indices: Indices of the values.
+        components: Names of all components; needed where the text is shown.
+    """
+    inside = _membership("or", _one_of(subject, domain, indices), components)
+    outside = _membership("and", _none_of(subject, domain, _others(indices, len(domain))), components)
     return min(inside, outside, key=lambda test: test.size)
 
 
-def _membership(operator: Literal["and", "or"], parts: list[Expression]) -> Membership:
-    texts = [expression_text(part) for part in parts]
+def _membership(operator: Literal["and", "or"], parts: list[Expression], components: Collection[str]) -> Membership:
+    texts = [expression_text(part, components) for part in parts]
     if operator == "and" and len(parts) > 1:
         texts = [f"({text})" if _is_choice(part) else text for part, text in zip(parts, texts, strict=True)]
     text = f" {operator} ".join(texts)

@@ -15,6 +15,7 @@ from robosc.automata.plants import communication_plant_name
 from robosc.automata.state import subjects
 from robosc.errors import Diagnostic, sorted_diagnostics
 from robosc.expressions import Value
+from robosc.expressions.text import automaton_text
 from robosc.model import check
 from robosc.model.layers import layer_findings
 from robosc.model.structure import CommunicationKind, Deployment, Model
@@ -36,7 +37,8 @@ class StateInWords:
     Attributes:
         components: The state of each component with a behaviour.
         variables: The value of each synthesis variable, by `Component.variable`.
-        communications: Where each service and action is.
+        communications: Where each service and action is; of one that is called like a component, by `service name` or
+            `action name`.
     """
 
     components: dict[str, str]
@@ -238,13 +240,15 @@ def _beliefs(certificate: Certificate, found: Verification) -> list[str]:
 
 def state_in_words(system: System, model: Model, state: State) -> StateInWords:
     """A state of a model's automata in the words of the model."""
+    components = {item.name for item in model.components}
     values = {(item.automaton, item.variable): value for item, value in zip(subjects(system), state, strict=True)}
+    plants = [
+        communication_plant_name(item)
+        for item in model.communications
+        if item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
+    ]
     return StateInWords(
         components={item.name: str(values[item.name, None]) for item in model.components if item.behaviour},
         variables={f"{owner}.{name}": value for (owner, name), value in values.items() if name is not None},
-        communications={
-            item.name: str(values[communication_plant_name(item), None])
-            for item in model.communications
-            if item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
-        },
+        communications={automaton_text(plant, components): str(values[plant, None]) for plant in plants},
     )

@@ -25,7 +25,7 @@ def summary_json(supervisor: Supervisor) -> dict[str, object]:
     system = to_automata(supervisor.model, supervisor.deployment)
     variables = _variables(supervisor.model)
     certificate = supervisor.certificate
-    domains = diagram_domains(system)
+    domains, components = diagram_domains(system), _components(supervisor)
     added = _added(supervisor, system)
     return {
         "model": supervisor.model.name,
@@ -40,9 +40,9 @@ def summary_json(supervisor: Supervisor) -> dict[str, object]:
         "requirements": len(supervisor.model.requirements),
         "states": int(certificate.states),
         "transitions": None if certificate.transitions is None else int(certificate.transitions),
-        "added": {event: _told(diagram, formula) for event, diagram, formula in added},
+        "added": {event: _told(diagram, formula, components) for event, diagram, formula in added},
         "diagrams": {
-            event: [line.json() for line in diagram_lines(diagram, domains)]
+            event: [line.json() for line in diagram_lines(diagram, domains, components)]
             for event, diagram, formula in added
             if formula is None
         },
@@ -90,7 +90,12 @@ def summary_text(supervisor: Supervisor) -> str:
 
 def added_texts(supervisor: Supervisor, system: System) -> dict[str, str]:
     """For each controllable event what the supervisor adds, in the model's words; `true` where nothing."""
-    return {event: _told(diagram, formula) for event, diagram, formula in _added(supervisor, system)}
+    components = _components(supervisor)
+    return {event: _told(diagram, formula, components) for event, diagram, formula in _added(supervisor, system)}
+
+
+def _components(supervisor: Supervisor) -> frozenset[str]:
+    return frozenset(item.name for item in supervisor.model.components)
 
 
 def _added(supervisor: Supervisor, system: System) -> list[tuple[str, DecisionDiagram, Expression | None]]:
@@ -104,21 +109,21 @@ def _added(supervisor: Supervisor, system: System) -> list[tuple[str, DecisionDi
     ]
 
 
-def _told(diagram: DecisionDiagram, formula: Expression | None) -> str:
-    return size_in_words(diagram) if formula is None else in_words(formula)
+def _told(diagram: DecisionDiagram, formula: Expression | None, components: frozenset[str]) -> str:
+    return size_in_words(diagram) if formula is None else in_words(formula, components)
 
 
 def added_lines(supervisor: Supervisor, system: System) -> list[str]:
     """What the supervisor adds, for people: formulas, and the lines of diagrams as long as they are few."""
-    domains = diagram_domains(system)
+    domains, components = diagram_domains(system), _components(supervisor)
     added = _added(supervisor, system)
     width = max((len(event) for event, _, _ in added), default=0)
     lines: list[str] = []
     left = _LINES
     for event, diagram, formula in added:
-        told = [] if formula is not None else diagram_lines(diagram, domains)
+        told = [] if formula is not None else diagram_lines(diagram, domains, components)
         left -= sum(1 + line.operands for line in told)
-        parts = [_told(diagram, formula) if formula != TRUE else "nothing"]
+        parts = [_told(diagram, formula, components) if formula != TRUE else "nothing"]
         if told and left >= 0:
             parts = [f"{parts[0]}, to be read from [1] on:", *map(str, told)]
         elif told:

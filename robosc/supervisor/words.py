@@ -6,7 +6,7 @@ diagram.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from robosc.expressions import Expression
@@ -84,15 +84,20 @@ class Formulas:
             limit = OPERANDS
             # Every line writes down a test at least: those of very many need not be told to be counted.
             if len(_order(*_branches(diagram, self.domains), diagram.root)) < OPERANDS:
-                tests = sum(line.operands for line in diagram_lines(diagram, self.domains))
+                tests = sum(line.operands for line in diagram_lines(diagram, self.domains, ()))
                 limit = min(OPERANDS, max(SHORT, tests))
             self._known[diagram] = to_expression(diagram, self.domains, limit=limit, effort=self.effort)
         return self._known[diagram]
 
 
-def in_words(condition: Expression) -> str:
-    """A condition of a supervisor, as a user would write it, with `not` for the language's `!`."""
-    return _negated(expression_text(condition))
+def in_words(condition: Expression, components: Collection[str]) -> str:
+    """A condition of a supervisor, as a user would write it, with `not` for the language's `!`.
+
+    Args:
+        condition: The condition.
+        components: Names of all components.
+    """
+    return _negated(expression_text(condition, components))
 
 
 def _negated(text: str) -> str:
@@ -106,13 +111,20 @@ def size_in_words(diagram: DecisionDiagram) -> str:
     return f"a decision diagram of {count} node{'s' if count != 1 else ''}"
 
 
-def diagram_lines(diagram: DecisionDiagram, domains: Domains) -> tuple[Line, ...]:
-    """A diagram node by node, the root first; a node that decides nothing is left out for what it leads to."""
+def diagram_lines(diagram: DecisionDiagram, domains: Domains, components: Collection[str]) -> tuple[Line, ...]:
+    """A diagram node by node, the root first; a node that decides nothing is left out for what it leads to.
+
+    Args:
+        diagram: The diagram.
+        domains: What the places of the state can hold.
+        components: Names of all components.
+    """
     branches, leads_to = _branches(diagram, domains)
     order = _order(branches, leads_to, diagram.root)
     numbers = {number: place for place, number in enumerate(order, start=1)}
     return tuple(
-        _line(diagram.nodes[number - 2], branches[number], numbers, numbers[number], domains) for number in order
+        _line(diagram.nodes[number - 2], branches[number], numbers, numbers[number], domains, components)
+        for number in order
     )
 
 
@@ -144,9 +156,16 @@ def _order(branches: list[Branches], leads_to: list[int], root: int) -> list[int
     return sorted((number for number in needed if number > 1), reverse=True)
 
 
-def _line(node: DecisionNode, branches: Branches, numbers: Mapping[int, int], number: int, domains: Domains) -> Line:
+def _line(
+    node: DecisionNode,
+    branches: Branches,
+    numbers: Mapping[int, int],
+    number: int,
+    domains: Domains,
+    components: Collection[str],
+) -> Line:
     subject = (node.automaton, node.variable)
-    tests = [(membership(subject, domains[subject], where), child) for child, where in branches.items()]
+    tests = [(membership(subject, domains[subject], where, components), child) for child, where in branches.items()]
     # The longest test goes without saying; where all is decided, what it takes to be true is told.
     is_decided = all(child < 2 for child in branches)
     *cases, (_, last) = sorted(tests, key=lambda case: (-case[1] if is_decided else 0, case[0].size))

@@ -2,7 +2,7 @@
 
 from robosc.synthesis.engines import EngineOptions, UnknownEngineError, engine_names, register, resolve_engine
 from robosc.synthesis.findings import findings, questions_about
-from robosc.synthesis.questions import Answers, Cause, Questions, Restriction, Together
+from robosc.synthesis.questions import Answers, Cause, Never, Questions, Restriction, Together
 from robosc.synthesis.result import Progress, Statistics, SynthesisResult, SynthesisStatus
 from robosc.synthesis.synthesize import synthesize
 
@@ -10,6 +10,7 @@ __all__ = [
     "Answers",
     "Cause",
     "EngineOptions",
+    "Never",
     "Progress",
     "Questions",
     "Restriction",

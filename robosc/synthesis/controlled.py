@@ -4,9 +4,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from robosc.expressions import Expression
+from robosc.synthesis.causes import Causes
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.fixed_point import FixedPoint, Problem, allowed, initial_states, safe_states
-from robosc.synthesis.questions import Answers, Cause, Questions, Restriction, Together
+from robosc.synthesis.questions import Answers, Never, Questions, Restriction, Together
 from robosc.synthesis.runs import ShortestRuns
 from robosc.synthesis.symbolic import Symbols
 from robosc.synthesis.transitions import Steps
@@ -36,6 +37,7 @@ class ControlledSystem:
         self._reachable = reachable
         self._symbols = Symbols(encoding)
         self._steps = {steps.event.name: steps for steps in problem.steps}
+        self._causes = Causes(encoding, watch, problem, good, reachable)
         self._known: dict[str, Any] = {}
 
     def answers(self, questions: Questions) -> Answers:
@@ -60,16 +62,10 @@ class ControlledSystem:
             found = self._known[event] = self._reachable & steps.plant & allowed(steps, self._good)
         return found
 
-    def _never(self, events: Iterable[str]) -> Iterator[tuple[str, Cause]]:
+    def _never(self, events: Iterable[str]) -> Iterator[Never]:
         for event in events:
             if self._possible(event) == self._manager.false:
-                yield event, self._cause(self._steps[event])
-
-    def _cause(self, steps: Steps) -> Cause:
-        enabled = self._reachable & steps.plant
-        if enabled == self._manager.false:
-            return Cause.PLANT
-        return Cause.REQUIREMENT if enabled & steps.condition == self._manager.false else Cause.SUPERVISOR
+                yield self._causes.of(self._steps[event])
 
     # Restrictions
 

@@ -31,7 +31,7 @@ from robosc.model.structure import (
     is_tau,
 )
 from robosc.source import Location
-from robosc.synthesis.questions import Answers, Cause, Questions, Restriction, Together
+from robosc.synthesis.questions import Answers, Cause, Never, Questions, Restriction, Together
 
 MAXIMUM_EVENTS = 12
 """Events of a run that a message shows."""
@@ -87,7 +87,7 @@ def findings(model: Model, places: Places, answers: Answers) -> tuple[Diagnostic
         places: Where its parts stand.
         answers: The answers to `questions_about` it.
     """
-    never = dict(answers.never)
+    never = {item.event: item for item in answers.never}
     return (
         *_never_requested(model, places, never),
         *_never_taken(model, places, never),
@@ -105,19 +105,38 @@ def _warning(
 # Events that can never happen
 
 _EXPLANATIONS = {
-    Cause.PLANT: (
+    (Cause.PLANT, False): (
         "the behaviours never get to states that allow it",
         "Let every behaviour that reacts to it get to a state where it may happen, or remove it.",
     ),
-    Cause.REQUIREMENT: (
+    (Cause.REQUIREMENT, True): (
         "wherever the behaviours allow it, a requirement on it does not hold",
         "Relax the requirements on it, or let the components get to where they hold.",
     ),
-    Cause.SUPERVISOR: (
+    (Cause.REQUIREMENT, False): (
+        "requirements keep the behaviours from the states that allow it",
+        "Relax the requirements on what leads to these states.",
+    ),
+    (Cause.INVARIANT, True): (
+        "wherever it is allowed, what must always hold would not hold after it, or could not be kept",
+        "Relax what must always (or never) hold, or let it happen only from where that can be kept.",
+    ),
+    (Cause.INVARIANT, False): (
+        "what must always hold keeps the behaviours from the states that allow it",
+        "Relax what must always (or never) hold, or let the behaviours get to these states while it does.",
+    ),
+    (Cause.SUPERVISOR, True): (
         "synthesis forbids it everywhere, because of what could follow it",
-        "Give a way back to marked states and into every variable's range from wherever it leads.",
+        "Give a way back to marked states and into every variable's range from wherever it leads: what stops that "
+        "is told by 'robosc explain-synthesis'.",
+    ),
+    (Cause.SUPERVISOR, False): (
+        "synthesis keeps the behaviours from the states that allow it, because of what could follow there",
+        "Give a way back to marked states and into every variable's range from these states: what stops that is told "
+        "by 'robosc explain-synthesis'.",
     ),
 }
+"""Why, and what to do, by the cause and by whether the event would be allowed without it in a state that is reached."""
 
 _NEVER_TAKEN = (
     "its component never gets to a state where it stands and its guard holds",
@@ -125,7 +144,7 @@ _NEVER_TAKEN = (
 )
 
 
-def _never_requested(model: Model, places: Places, never: Mapping[str, Cause]) -> Iterator[Diagnostic]:
+def _never_requested(model: Model, places: Places, never: Mapping[str, Never]) -> Iterator[Diagnostic]:
     """Findings about the events of communications."""
     reactions = {item.event for component in model.components for item in _transitions(component)}
     for item in model.communications:
@@ -133,9 +152,17 @@ def _never_requested(model: Model, places: Places, never: Mapping[str, Cause]) -
         found = [event for event in item.events if event in never and (event != cancel or event in reactions)]
         for event in found[:1] if request in never else found:
             what = f"'{item.name}' can never be requested" if event == request else f"'{event}' can never happen"
-            why, mend = _EXPLANATIONS[never[event]]
-            related = _requirements_on(model, places, item.name) if never[event] is Cause.REQUIREMENT else ()
+            why, mend = _EXPLANATIONS[never[event].cause, never[event].is_reached]
+            related = _blamed(model, places, item.name, never[event])
             yield _warning("never-enabled", f"{what}: {why}", places.communications[item.name], mend, related)
+
+
+def _blamed(model: Model, places: Places, communication: str | None, never: Never) -> tuple[RelatedPlace, ...]:
+    """The first requirements that are the cause, where it is known which."""
+    if never.cause is Cause.REQUIREMENT and never.is_reached and communication is not None:
+        return _requirements_on(model, places, communication)
+    shown = islice(never.invariants, MAXIMUM_NAMES)
+    return tuple(RelatedPlace("this would not hold after it", places.invariants[place]) for place in shown)
 
 
 def _requirements_on(model: Model, places: Places, communication: str) -> tuple[RelatedPlace, ...]:
@@ -148,7 +175,7 @@ def _requirements_on(model: Model, places: Places, communication: str) -> tuple[
     return tuple(islice(found, MAXIMUM_NAMES))
 
 
-def _never_taken(model: Model, places: Places, never: Mapping[str, Cause]) -> Iterator[Diagnostic]:
+def _never_taken(model: Model, places: Places, never: Mapping[str, Never]) -> Iterator[Diagnostic]:
     """Findings about tau transitions."""
     for component in model.components:
         for location, transition in zip(
@@ -156,8 +183,10 @@ def _never_taken(model: Model, places: Places, never: Mapping[str, Cause]) -> It
         ):
             event = transition.event
             if is_tau(event) and event in never:
-                why, mend = _NEVER_TAKEN if never[event] is Cause.PLANT else _EXPLANATIONS[never[event]]
-                yield _warning("never-enabled", f"'{event}' can never happen: {why}", location, mend)
+                found = never[event]
+                why, mend = _NEVER_TAKEN if found.cause is Cause.PLANT else _EXPLANATIONS[found.cause, found.is_reached]
+                related = _blamed(model, places, None, found)
+                yield _warning("never-enabled", f"'{event}' can never happen: {why}", location, mend, related)
 
 
 def _transitions(component: Component) -> tuple[Transition, ...]:

@@ -79,7 +79,8 @@ class FixedPoint:
         self._watch = watch
         self.initial = initial_states(encoding)
         """The initial states."""
-        self._marked = marked_states(encoding)
+        self.marked = marked_states(encoding)
+        """The marked states."""
 
     def good_states(self, problem: Problem, known: Any) -> GoodStates:
         """The states from which a supervisor can solve a problem; `known` ones are told beforehand to be such."""
@@ -118,7 +119,7 @@ class FixedPoint:
     def _nonblocking(self, problem: Problem, good: Any, known: Any) -> Any:
         """The states of `good` that reach a marked state through transitions that stay in `good`."""
         closure = self._closure((self._towards(steps, good) for steps in self._each(problem)), good)
-        return closure.of((good & self._marked) | known, "coreachability")
+        return closure.of((good & self.marked) | known, "coreachability")
 
     def _towards(self, steps: Steps, good: Any) -> Step:
         source, names = self._source(steps, good)

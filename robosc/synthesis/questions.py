@@ -10,11 +10,32 @@ class Cause(StrEnum):
     """Why an event can never happen: the first of these that explains it."""
 
     PLANT = "plant"
-    """The plants never enable it, or taking it would always leave a variable's range."""
+    """The plants by themselves never enable it, or taking it would always leave a variable's range."""
     REQUIREMENT = "requirement"
-    """Wherever the plants enable it, an event condition is not true."""
+    """Under the event conditions the plants never get to where it is enabled and its own conditions are true."""
+    INVARIANT = "invariant"
+    """Synthesis keeps from it, and would not if there were no invariants."""
     SUPERVISOR = "supervisor"
-    """Synthesis disables it wherever plants and conditions allow it."""
+    """Synthesis keeps from it: it is uncontrollable, blocks, or leads to where a variable can leave its range."""
+
+
+@dataclass(frozen=True, slots=True)
+class Never:
+    """An event that can never happen.
+
+    Attributes:
+        event: The event.
+        cause: Why it cannot.
+        is_reached: Whether it is allowed, but for its cause, in some state that is reached: of a requirement, under
+            the event conditions, where the plants enable it; of an invariant or the supervisor, in the controlled
+            system, where the plants enable it and its own conditions are true.
+        invariants: Places in `System.invariants` of those that it would break at once.
+    """
+
+    event: str
+    cause: Cause
+    is_reached: bool
+    invariants: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,11 +89,11 @@ class Answers:
     """What was found out; each part in the order of its questions.
 
     Attributes:
-        never: Events that can never happen, and why.
+        never: Events that can never happen.
         unused: Places in `Questions.restrictions` of those that never restrict.
         together: Rivals that are possible together, by group, then by the second, then by the first.
     """
 
-    never: tuple[tuple[str, Cause], ...] = ()
+    never: tuple[Never, ...] = ()
     unused: tuple[int, ...] = ()
     together: tuple[Together, ...] = ()

@@ -60,9 +60,9 @@ def _row(family: str, size: int) -> list[str]:
     found = [formulas.formula(item.condition) for item in added]
     for item, formula in zip(added, found, strict=True):
         if formula is None:
-            "".join(map(str, diagram_lines(item.condition, domains)))
+            "".join(map(str, diagram_lines(item.condition, domains, ())))
         else:
-            in_words(formula)
+            in_words(formula, ())
     words = time.perf_counter() - begin
     longest = max((operands(formula) for formula in found if formula is not None), default=0)
     nodes = max(

@@ -11,6 +11,7 @@ from typing import Any
 
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.protocol import Reading
+from robosc.expressions.evaluate import evaluate
 from robosc.model.structure import CommunicationKind
 from robosc.supervisor.structure import Supervisor
 from support.execution import Bench
@@ -70,6 +71,10 @@ class _Wanted:
     def close(self, enabled: Any) -> None: ...
 
 
+def _nothing(*names: str) -> str:
+    raise KeyError(names)
+
+
 class _World:
     """An executor after a history."""
 
@@ -124,6 +129,12 @@ class _World:
     def _goal(self, action: str) -> int:
         return next(goal.number for goal in self.executor._replies._goals.all() if goal.action == action)
 
+    def _is_known(self, enum: str, data: dict[str, int]) -> bool:
+        """Whether every rule of an enum is true or false."""
+        rules = self.system.supervisor.model.enum(enum).rules
+        values = (evaluate(rule.condition, _nothing, _nothing, lambda path: data[str(path[0])]) for rule in rules)
+        return None not in values
+
     def moves(self) -> Iterator[tuple[Move, bool]]:
         """What may happen now, and whether it may under every setting."""
         model = self.system.supervisor.model
@@ -136,7 +147,8 @@ class _World:
         for identifier, types in topics.items():
             if type(types[0]).__name__ == "EnumType":
                 for n, m in product((0, 1, 6), repeat=2):
-                    yield ("message", identifier, {"n": n, "m": m}), n != 0 and m != 0  # type: ignore[misc]
+                    is_sure = all(self._is_known(type_.name, {"n": n, "m": m}) for type_ in types)
+                    yield ("message", identifier, {"n": n, "m": m}), is_sure  # type: ignore[misc]
             else:
                 for value in (False, True) if type(types[0]).__name__ == "BooleanType" else (None,):
                     yield ("message", identifier, value), True  # type: ignore[misc]

@@ -8,6 +8,8 @@ every kind of communication, also two messages on one topic and actions whose re
 from dataclasses import dataclass
 from random import Random
 
+import msgspec
+
 from robosc.automata import to_automata
 from robosc.expressions import (
     Binary,
@@ -59,6 +61,22 @@ def _enum(name: str, part: str) -> EnumDefinition:
 
 
 ENUMS = (_enum("First", "n"), _enum("Second", "m"))
+
+_LARGE = Binary("<", Binary("/", Constant(6), Received(("n",))), Constant(2))
+ONE_FIELD = (
+    tuple(
+        EnumDefinition(name, SAMPLE, ("small", "large"), (EnumRule(rule, "large"),), "small")
+        for name, rule in (
+            ("First", Binary(">", Received(("n",)), Constant(3))),
+            ("Second", Unary("not", Binary("<=", Received(("n",)), Constant(0)))),
+        )
+    ),
+    (
+        EnumDefinition("First", SAMPLE, ("small", "large"), (EnumRule(_LARGE, "large"),), "small"),
+        EnumDefinition("Second", SAMPLE, ("small", "large"), (EnumRule(_LARGE, "small"),), "large"),
+    ),
+)
+"""Two enums of one field: with 0, 1 and 6 all is said that they can be together."""
 TYPES = tuple(EnumType(item.name, item.values) for item in ENUMS)
 
 
@@ -72,14 +90,17 @@ class _Part:
     transitions: list[Transition]
 
 
-def random_controller(seed: int, *, is_plain: bool = False) -> Supervisor | None:
+def random_controller(
+    seed: int, *, is_plain: bool = False, enums: tuple[EnumDefinition, ...] = ENUMS
+) -> Supervisor | None:
     """The supervisor of a random robot, the same for the same seed; None if there is none.
 
     Args:
         seed: Decides everything else.
         is_plain: Whether the robot has no taus and no actions.
+        enums: The rules of its two enums.
     """
-    model = _model(Random(seed), is_plain)
+    model = msgspec.structs.replace(_model(Random(seed), is_plain), enums=enums)
     result = synthesize(to_automata(model, Deployment.CONTROLLER))
     if result.status is SynthesisStatus.EMPTY:
         return None

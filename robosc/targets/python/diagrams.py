@@ -19,11 +19,13 @@ class Diagrams:
     Attributes:
         system: Gives the domains of what the nodes test.
         scope: Gives the names of what the nodes test.
+        components: Names of all components.
         methods: Name and lines of each node's method so far.
     """
 
     system: System
     scope: Scope
+    components: frozenset[str]
     methods: list[tuple[str, list[str]]] = field(default_factory=list)
     _names: dict[tuple[object, ...], str] = field(default_factory=dict)
     _formulas: Formulas = field(init=False)
@@ -35,7 +37,7 @@ class Diagrams:
         """A diagram in words and as Python."""
         expression = self._formulas.formula(diagram)
         if expression is not None:
-            return in_words(expression), truth(expression, self.scope)
+            return in_words(expression, self.components), truth(expression, self.scope)
         codes = [FALSE_CODE, TRUE_CODE]
         for node in diagram.nodes:
             codes.append(self._node(node, codes))

@@ -41,7 +41,7 @@ class Writer:
 
     def __post_init__(self) -> None:
         self.scope = Scope(self._variable, self._location, _no_received, self.used.add, _no_type, _no_type)
-        self.diagrams = Diagrams(self.system, self.scope)
+        self.diagrams = Diagrams(self.system, self.scope, frozenset(item.name for item in self.model.components))
 
     @property
     def model(self) -> Model:

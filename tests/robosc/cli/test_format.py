@@ -280,7 +280,6 @@ def test_files_that_cannot_be_accessed_do_not_keep_the_others_from_it(
         (["x" * 300], f"cannot read {'x' * 300}: File name too long"),
         (["-", "a.rscd"], "- is standard input: it cannot be formatted together with files"),
         (["-", "-"], "- is standard input: it cannot be formatted together with files"),
-        (["--json", "-"], "with - the text goes to standard output: --json needs --check or --diff then"),
     ],
 )
 def test_wrong_use_changes_nothing(
@@ -290,6 +289,14 @@ def test_wrong_use_changes_nothing(
     assert main(["format", *arguments]) == 2
     assert capsys.readouterr() == ("", f"robosc: {message}\n")
     assert content("a.rscd") == UNTIDY
+
+
+def test_one_document_and_a_text_do_not_go_together(files: Files, capsys: pytest.CaptureFixture[str]) -> None:
+    message = "with - the text goes to standard output: --json needs --check or --diff then"
+    assert main(["format", "--json", "-"]) == 2
+    captured = capsys.readouterr()
+    assert captured.err == f"robosc: {message}\n"
+    assert json.loads(captured.out) == {"error": {"status": 2, "message": message}}
 
 
 def test_without_files(capsys: pytest.CaptureFixture[str]) -> None:

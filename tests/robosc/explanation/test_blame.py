@@ -43,8 +43,8 @@ class Symbolic:
         self.obstacles = obstacles_of(system)
         self.problems = Problems(self.encoding, self.watch)
 
-    def trouble(self) -> Trouble:
-        analysis = Analysis(self.encoding, self.watch, self.problems, self.obstacles, self.manager.false)
+    def trouble(self, dropped: Iterable[Obstacle] = ()) -> Trouble:
+        analysis = Analysis(self.encoding, self.watch, self.problems, self.obstacles, self.manager.false, dropped)
         return analysis.trouble_after(initial_states(self.encoding))
 
 
@@ -200,6 +200,62 @@ def test_trouble_is_real_and_the_run_is_shortest() -> None:
             _check_detour(system, search, trouble, last, met)
     assert all(met[name] for name in ("forced", "not forced", "blocking", "bad", "long", "invariant", "range")), met
     assert all(met[name] for name in ("condition", "no way", *map(str, HindranceKind))), met
+
+
+def test_trouble_without_some_obstacles_speaks_of_the_others_alone() -> None:
+    """Of what is blamed alone: the run is one of the system that is left, and whole in what it names."""
+    met: Counter[str] = Counter()
+    for seed in range(3 * EXAMPLES):
+        system = empty_system(seed)
+        symbolic = [Symbolic(system, engine) for engine in ENGINES]
+        blame = find_blame(symbolic[0].problems, symbolic[0].obstacles, symbolic[0].manager.false, symbolic[0].watch)
+        obstacles = symbolic[0].obstacles
+        kept = [obstacles[place] for place in blame.conflict]
+        dropped = [item for item in obstacles if item not in kept]
+        trouble, other = (item.trouble(dropped) for item in symbolic)
+        assert (trouble.run, trouble.is_forced, trouble.unmarked) == (other.run, other.is_forced, other.unmarked)
+        search = Search(without(system, dropped))
+        assert trouble.run.states[-1] in search.troubled
+        steps = list(zip(trouble.run.events, pairwise(trouble.run.states), strict=True))
+        assert all((name, after) in list(search.steps(before)) for name, (before, after) in steps)
+        _check_run_of_the_robot(system, search, trouble, met)
+        named = {place for item in kept for place in item.conditions}
+        hindrances = () if trouble.detour is None else trouble.detour.hindrances
+        assert {place for _, place in trouble.forbidden} <= named
+        assert {item.condition for item in hindrances if item.condition is not None} <= named
+        assert set(trouble.invariants) <= {place for item in kept for place in item.invariants}
+        assert {item for _, item in trouble.leaving} <= set(kept)
+        assert {item.range for item in hindrances if item.range is not None} <= set(kept)
+        assert set(trouble.unmarked) <= {item.marking for item in kept}
+        met["another story"] += trouble.run != symbolic[0].trouble().run
+    assert all(met[name] for name in ("another story", "real", "range dropped", "shortest")), met
+
+
+def _check_run_of_the_robot(system: System, search: Search, trouble: Trouble, met: Counter[str]) -> None:
+    """No update of the run stops at the end of a range, if there is such a run; and no shorter run is there."""
+    free = Semantics(without(system, [item for item in obstacles_of(system) if item.kind is not ObstacleKind.RANGE]))
+
+    def really(state: State, *, is_forced: bool) -> Iterator[tuple[str, State]]:
+        for name, target in search.steps(state):
+            if not (is_forced and system.event(name).is_controllable) and target in free.targets(state, name):
+                yield name, target
+
+    def distance(is_forced: bool) -> int | None:
+        return _distance(
+            {search.semantics.initial},
+            lambda state: (target for _, target in really(state, is_forced=is_forced)),
+            lambda state: state in search.troubled,
+        )
+
+    forced = distance(True)
+    shortest = distance(False) if forced is None else forced
+    if shortest is not None:
+        assert len(trouble.run.events) == shortest
+        for name, (before, after) in zip(trouble.run.events, pairwise(trouble.run.states), strict=True):
+            assert (name, after) in list(really(before, is_forced=trouble.is_forced))
+        met["shortest"] += shortest > 0
+        met["real"] += 1
+    met["range dropped"] += search.system.automata != system.automata
 
 
 def _check_what_is_broken(system: System, search: Search, trouble: Trouble, last: State, met: Counter[str]) -> None:

@@ -85,6 +85,23 @@ def place(location: Location | None) -> tuple[int, int]:
 # No supervisor
 
 
+def test_trouble_and_blame_tell_one_story() -> None:
+    """Two things are broken, each of them enough; the one that is not blamed would be broken sooner."""
+    text = """component C { outgoing message slip with type: none
+        behaviour { initial marked state a { on response from slip goto b }
+        marked state b { on response from slip goto c } marked state c { } } }"""
+    rules = ("requirement never C.c", "requirement never C.b")
+    blamed = set()
+    for first, second in (rules, rules[::-1]):
+        explanation = explained(robot(text, first, second)).empty
+        assert explanation is not None
+        (part,) = (item.part for item in explanation.blamed)
+        assert list(explanation.trouble.way.events) == ["slip.response"] * (2 if part.text == rules[0] else 1)
+        assert [item.text for item in explanation.trouble.parts] == [part.text]
+        blamed.add(part.text)
+    assert rules[0] in blamed
+
+
 def test_requirements_that_are_to_blame_together() -> None:
     """Each by itself could be kept; a third one has nothing to do with it."""
     door = DOOR.replace("initial marked", "initial")
@@ -146,16 +163,16 @@ def test_a_state_that_blocks() -> None:
 
 
 def test_a_way_that_the_environment_leads_into_trouble() -> None:
-    """The only way to the marked state goes through one that must never be."""
+    """The only way to the marked state goes through one that must never be; but that alone is to blame."""
     text = """component C { outgoing message slip with type: none incoming message go with type: none
         behaviour { initial state a { on response from slip goto b } state b { on request to go goto c }
         marked state c { } } }"""
     explanation = explained(robot(text, "requirement never C.b")).empty
     assert explanation is not None
-    stopped = explanation.trouble.stopped
-    assert stopped is not None
-    assert (stopped.events, stopped.stopped_at) == (("slip.response", "go.request"), 0)
-    assert (stopped.state.components, stopped.reasons) == ({"C": "a"}, ())
+    trouble = explanation.trouble
+    assert (trouble.kind, trouble.way.events, trouble.is_forced) == ("bad", ("slip.response",), True)
+    assert ([item.text for item in trouble.parts], trouble.stopped) == (["requirement never C.b"], None)
+    assert [item.part.text for item in explanation.blamed] == ["requirement never C.b"]
 
 
 def test_a_condition_on_cancel_that_is_to_blame() -> None:

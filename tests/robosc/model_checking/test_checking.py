@@ -39,7 +39,7 @@ FORMULAS = 6
 
 
 def claim(formula: Formula) -> Property:
-    return Property("", formula_text(formula), Location("here", 1, 1), formula)
+    return Property("", formula_text(formula, ()), Location("here", 1, 1), formula)
 
 
 def supervised(given_system: System, engine: str = "auto") -> tuple[AddedCondition, ...]:
@@ -65,10 +65,10 @@ def test_it_agrees_with_the_explicit_checker(seed: int) -> None:
     formulas = [random_formula(drawn, random) for _ in range(FORMULAS)]
     verdicts = verify_properties(drawn, added, [claim(formula) for formula in formulas])
     for formula, found in zip(formulas, verdicts, strict=True):
-        assert found.holds == explicit.holds(formula), formula_text(formula)
+        assert found.holds == explicit.holds(formula), formula_text(formula, ())
         if found.run is not None:
             assert (found.run.kind is RunKind.WITNESS) == found.holds
-            assert explicit.replay(found.run).shows(formula, found.holds), formula_text(formula)
+            assert explicit.replay(found.run).shows(formula, found.holds), formula_text(formula, ())
 
 
 @settings(max_examples=EXAMPLES // 30, deadline=None)

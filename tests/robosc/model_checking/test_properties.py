@@ -36,7 +36,7 @@ MODEL = model_of("""robot R {
 
 def read(text: str, model: Model = MODEL) -> str:
     (found,) = properties_of(model, [SourceFile("p", text)])
-    return formula_text(found.formula)
+    return formula_text(found.formula, {item.name for item in model.components})
 
 
 def faults(text: str, model: Model = MODEL) -> list[str]:
@@ -66,7 +66,8 @@ def faults(text: str, model: Model = MODEL) -> list[str]:
         ("enabled(A.tau_1) and enabled(mode.response)", "enabled(A.tau_1) and enabled(mode.response)"),
         # A component wins over a service of the same name.
         ("call.busy", "call.busy"),
-        ("service call.waiting", "call.waiting"),
+        ("service call.waiting", "service call.waiting"),
+        ("AG (service call.waiting or EF call.busy)", "AG ((service call.waiting) or EF call.busy)"),
         ("other.waiting or service other.failed", "other.waiting or other.failed"),
         # Words of ours that are names of the model.
         ("AG (A.mode = ^AG)", "AG (A.mode = AG)"),

@@ -9,13 +9,13 @@ import pytest
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.model.structure import Deployment
 from robosc.properties import Properties, check_controller
-from robosc.properties.controller import Controller
+from robosc.properties.controller import Controller, Node
 from robosc.properties.orders import Orders
 from robosc.properties.search import search
 from robosc.properties.structure import always_end, never_conflict, stays_nonblocking
 from robosc.supervisor.structure import Supervisor
 from support.controller_twin import twin_of
-from support.random_controllers import random_controller, random_robot
+from support.random_controllers import ONE_FIELD, random_controller, random_robot
 from support.random_supervisors import random_supervisor
 
 LIMIT = 2_000
@@ -60,6 +60,31 @@ def test_the_executor_shows_what_the_automaton_has(record_property: Callable[[st
         record_property(name, count)
     assert shares["compared"] > 20
     assert min(shares["livelock"], shares["conflict"], shares["blocking"]) >= 2
+
+
+def test_enums_of_one_field_agree(record_property: Callable[[str, object], None]) -> None:
+    """What one message cannot bring is neither visited nor reported; all that it can bring is."""
+    met: Counter[str] = Counter()
+    for seed in range(180):
+        supervisor = random_controller(seed, enums=ONE_FIELD[seed % 2])
+        topics = Counter(item.identifier for item in supervisor.model.communications) if supervisor else Counter()
+        if supervisor is None or 2 not in topics.values():
+            continue
+        twin = twin_of(supervisor, TWIN_LIMIT)
+        if twin is None:
+            continue
+        controller = Controller(supervisor.model, Deployment.CONTROLLER, supervisor.added)
+        found = search(controller, limit=LIMIT, orders=Orders(controller, LIMIT))
+        assert found.states == len(twin.states), seed
+        shown = (twin.has_livelock, twin.has_conflict, twin.is_blocking)
+        assert (found.livelock is not None, found.conflict is not None, found.blocking is not None) == shown, seed
+        controller._choices.clear()
+        apart = search(controller, limit=LIMIT, orders=Orders(controller, LIMIT))
+        met["compared"] += 1
+        met["fewer states"] += found.states < apart.states
+    for name, count in sorted(met.items()):
+        record_property(name, count)
+    assert met["compared"] > 10 and met["fewer states"] >= 3, met
 
 
 def _after(system: InterpretedSystem, states: list[dict[Any, Any]], event: str) -> list[dict[Any, Any]]:
@@ -122,6 +147,56 @@ def test_traces_tell_the_truth() -> None:
             assert _replayed(supervisor, found.blocking.trace)[1], seed
     assert all(count >= 10 for count in kinds.values()), kinds
     assert len(kinds) == 3
+
+
+def _shortest_blocking(controller: Controller) -> int | None:
+    """Fewest events to a stable state, or into a cycle, from which no marked one is reached: by relaxation."""
+    distances: dict[Node, int] = {}
+    good: set[Node] = set()
+    sure: dict[Node, set[Node]] = {}
+    cycles: list[int] = []
+
+    def enter(before: Node | None, events: int, is_sure: bool, node: Node) -> bool:
+        run = controller.run(node)
+        length = (0 if before is None else distances[before]) + events + len(run.events)
+        if before is not None and is_sure and run.is_marked:
+            good.add(before)
+        if run.end is None:
+            cycles.extend([length] * (not run.is_marked))
+            return False
+        if controller.is_marked(run.end):
+            good.add(run.end)
+        if before is not None and is_sure:
+            sure.setdefault(before, set()).add(run.end)
+        is_nearer = length < distances.get(run.end, length + 1)
+        if is_nearer:
+            distances[run.end] = length
+        return is_nearer
+
+    enter(None, 0, True, controller.start)
+    while True:
+        changes = [
+            enter(state, len(events), is_sure, node)
+            for state in list(distances)
+            for events, is_sure, node in controller.moves(state)
+        ]
+        if not any(changes):
+            break
+    while more := {state for state, targets in sure.items() if state not in good and targets & good}:
+        good |= more
+    return min([*cycles, *(length for state, length in distances.items() if state not in good)], default=None)
+
+
+def test_the_way_to_where_no_task_is_completed_is_a_shortest_one() -> None:
+    lengths: Counter[int | None] = Counter()
+    for seed in range(150):
+        supervisor = random_robot(seed)
+        controller = Controller(supervisor.model, Deployment.CONTROLLER, ())
+        found = search(controller, limit=LIMIT, orders=None)
+        length = _shortest_blocking(controller)
+        assert (None if found.blocking is None else len(found.blocking.trace)) == length, seed
+        lengths[length] += 1
+    assert sum(count for length, count in lengths.items() if length) > 10, lengths
 
 
 def test_what_is_proved_by_structure_is_true(record_property: Callable[[str, object], None]) -> None:

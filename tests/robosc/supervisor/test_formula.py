@@ -85,7 +85,7 @@ def test_formulas_and_lines_mean_their_diagrams(seed: int, is_ordered: bool) -> 
     diagram = random_diagram(seed, is_ordered=is_ordered)
     formula = to_expression(diagram, DOMAINS, limit=1000)
     assert formula is not None
-    lines = {line.number: line for line in diagram_lines(diagram, DOMAINS)}
+    lines = {line.number: line for line in diagram_lines(diagram, DOMAINS, ())}
     assert list(lines) == list(range(1, len(lines) + 1))
     for state in STATES:
         expected = holds(diagram, state)
@@ -110,7 +110,7 @@ def test_formulas_are_not_longer_than_diagrams_spelt_out() -> None:
         formula = to_expression(diagram, DOMAINS, limit=1000)
         assert formula is not None
         # A choice counts as an operand, and single steps may miss a little.
-        assert operands(formula) <= by_structure(diagram) + 2, (seed, in_words(formula))
+        assert operands(formula) <= by_structure(diagram) + 2, (seed, in_words(formula, ()))
         total, spelt_out = total + operands(formula), spelt_out + by_structure(diagram)
     assert total < 0.7 * spelt_out
 
@@ -160,7 +160,7 @@ FLAG = node("A", "flag", (0, 1), (0, 1))
 def test_small_diagrams_read_like_the_model(nodes: list[DecisionNode], text: str) -> None:
     formula = to_expression(DecisionDiagram(tuple(nodes), len(nodes) + 1), DOMAINS, limit=20)
     assert formula is not None
-    assert in_words(formula) == text
+    assert in_words(formula, ()) == text
 
 
 def test_a_choice_is_told_as_one() -> None:
@@ -170,7 +170,7 @@ def test_a_choice_is_told_as_one() -> None:
     diagram = DecisionDiagram((*nodes, node("X", None, (0, 1), (7, 4))), 8)
     formula = to_expression(diagram, domains)
     assert formula is not None
-    assert in_words(formula) == "if X.no then D.yes and E.yes and F.yes else A.yes and B.yes and C.yes"
+    assert in_words(formula, ()) == "if X.no then D.yes and E.yes and F.yes else A.yes and B.yes and C.yes"
 
 
 def parity(places: int) -> tuple[DecisionDiagram, dict[Subject, SubjectDomain]]:
@@ -193,7 +193,7 @@ def test_what_would_explode_is_given_up(places: int) -> None:
     assert effort.left >= 9 * STEPS - 1000
     formulas = Formulas(domains)
     assert formulas.formula(diagram) is None
-    assert len(diagram_lines(diagram, domains)) == len(diagram.nodes) - 1
+    assert len(diagram_lines(diagram, domains, ())) == len(diagram.nodes) - 1
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 30))
@@ -227,7 +227,7 @@ def test_many_ranges_of_one_place_are_told_without_a_formula(
     diagram = DecisionDiagram((node(*subject, starts, tuple(index % 2 for index in starts)),), 2)
     assert to_expression(diagram, domains, limit=10**6) is None
     assert Formulas(domains).formula(diagram) is None
-    (line,) = diagram_lines(diagram, domains)
+    (line,) = diagram_lines(diagram, domains, ())
     assert line.operands == count // 2
     assert str(line).startswith("[1] A.n = 1 or A.n = 3 or" if type_ else "[1] A.l1 or A.l3 or")
 
@@ -240,7 +240,7 @@ def test_a_diagram_line_by_line() -> None:
         node("A", None, (0, 1), (4, 2)),
     ]
     diagram = DecisionDiagram(tuple(nodes), 5)
-    lines = diagram_lines(diagram, DOMAINS)
+    lines = diagram_lines(diagram, DOMAINS, ())
     assert [str(line) for line in lines] == [
         "[1] if A.on then [2] else [3]",
         "[2] if A.n >= 2 then false else if A.n <= -1 then [3] else true",
@@ -251,4 +251,4 @@ def test_a_diagram_line_by_line() -> None:
         "cases": [{"if": "A.n >= 2", "then": False}, {"if": "A.n <= -1", "then": 3}],
         "else": True,
     }
-    assert diagram_lines(DecisionDiagram((), 1), DOMAINS) == ()
+    assert diagram_lines(DecisionDiagram((), 1), DOMAINS, ()) == ()

@@ -112,7 +112,7 @@ def test_what_is_printed_is_what_is_stored(path: Path) -> None:
             # No requirement can name where a service stands.
             formula = Formulas(diagram_domains(system)).formula(diagram)
             assert formula is not None
-            assert in_words(formula) == told
+            assert in_words(formula, ()) == told
             same_everywhere(system, formula, diagram)
             continue
         needs = f"requirement {request} needs {told.replace('not ', '!')}\n}}"

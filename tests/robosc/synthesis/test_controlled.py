@@ -24,6 +24,7 @@ from robosc.supervisor.structure import AddedCondition
 from robosc.synthesis import (
     Answers,
     Cause,
+    Never,
     Progress,
     Questions,
     Restriction,
@@ -82,11 +83,11 @@ class Twin:
 
     def answers(self, questions: Questions) -> Answers:
         found = Answers(
-            never=tuple((event, self._cause(event)) for event in questions.events if self._is_never(event)),
+            never=tuple(self._cause(event) for event in questions.events if self._is_never(event)),
             unused=self._unused(questions.restrictions),
             together=tuple(pair for group in questions.rivals for pair in self._pairs(group)),
         )
-        self.met.update(cause for _, cause in found.never)
+        self.met.update(f"{item.cause} {item.is_reached}" for item in found.never)
         self.met["unused"] += len(found.unused)
         self.met["together"] += len(found.together)
         self.met["long"] += sum(len(pair.trace) > 3 for pair in found.together)
@@ -95,12 +96,40 @@ class Twin:
     def _is_never(self, event: str) -> bool:
         return not any(self.can_happen(state, event) for state in self.supervisor.reachable)
 
-    def _cause(self, event: str) -> Cause:
-        enabled = [state for state in self.supervisor.reachable if self.semantics.enabled(state, event)]
-        if not enabled:
-            return Cause.PLANT
-        meets = any(self.semantics.condition(state, event) for state in enabled)
-        return Cause.SUPERVISOR if meets else Cause.REQUIREMENT
+    def _cause(self, event: str) -> Never:
+        enabled, condition = self.semantics.enabled, self.semantics.condition
+        if not any(enabled(state, event) for state in self._reached(enabled)):
+            return Never(event, Cause.PLANT, False)
+        under = self._reached(lambda state, other: enabled(state, other) and condition(state, other))
+        allowed = [condition(state, event) for state in under if enabled(state, event)]
+        if not any(allowed):
+            return Never(event, Cause.REQUIREMENT, bool(allowed))
+        here = [state for state in self.supervisor.reachable if enabled(state, event) and condition(state, event)]
+        free = explicit(replace(self.system, invariants=()))
+        if self.system.event(event).is_controllable:
+            is_free = any((state, event) in free.allowed for state in free.reachable)
+        else:
+            is_free = any(enabled(state, event) for state in free.reachable)
+        if not is_free:
+            return Never(event, Cause.SUPERVISOR, bool(here))
+        after = {target for state in here for target in self.semantics.targets(state, event)}
+        holds = [compile_expression(item, self._places) for item in self.system.invariants]
+        broken = [place for place, item in enumerate(holds) if any(item(state, NO_DATA) is not True for state in after)]
+        self.met["broken"] += bool(broken)
+        return Never(event, Cause.INVARIANT, bool(here), tuple(broken))
+
+    def _reached(self, is_possible: Callable[[State, str], bool]) -> set[State]:
+        """The states that are reached through some events, whatever synthesis makes of them."""
+        found = set(self.semantics.initial_states)
+        waiting = list(found)
+        while waiting:
+            state = waiting.pop()
+            for event in self.system.events:
+                if is_possible(state, event.name):
+                    new = self.semantics.targets(state, event.name) - found
+                    found |= new
+                    waiting += new
+        return found
 
     def _unused(self, restrictions: Sequence[Restriction]) -> tuple[int, ...]:
         """One after the other is left out for good if nothing changes: events' conditions first, later ones first."""
@@ -225,7 +254,18 @@ def test_random_systems(record_property: Callable[[str, object], None]) -> None:
 
     compare()
     record_property("answers compared with the explicit twin", ", ".join(f"{k} {met[k]}" for k in sorted(met)))
-    wanted = (*Cause, "used", "looked ahead used", "invariant used", "invariant unused", "together", "long")
+    causes = [f"{cause} {is_reached}" for cause in Cause for is_reached in (False, True)]
+    wanted = (
+        *causes[:1],
+        *causes[2:],
+        "broken",
+        "used",
+        "looked ahead used",
+        "invariant used",
+        "invariant unused",
+        "together",
+        "long",
+    )
     assert all(met[kind] >= 3 for kind in wanted), met
 
 
@@ -308,10 +348,26 @@ def trap() -> System:
 
 def test_causes(engine: str) -> None:
     answers = synthesize(trap(), engine=engine, questions=Questions(events=("climb", "jump", "walk"))).answers
-    assert answers.never == (("climb", Cause.PLANT), ("jump", Cause.SUPERVISOR))
+    assert answers.never == (Never("climb", Cause.REQUIREMENT, True), Never("jump", Cause.SUPERVISOR, True))
     stuck = replace(trap(), conditions=(EventCondition("jump", StateTest("A", "pit")),))
     answers = synthesize(stuck, engine=engine, questions=Questions(events=("climb", "jump", "walk"))).answers
-    assert answers.never == (("climb", Cause.PLANT), ("jump", Cause.REQUIREMENT))
+    assert answers.never == (Never("climb", Cause.REQUIREMENT, False), Never("jump", Cause.REQUIREMENT, True))
+
+
+def test_causes_of_what_is_cut_by_invariants_and_by_synthesis(engine: str) -> None:
+    questions = Questions(events=("climb", "jump", "walk"))
+    dry = replace(trap(), conditions=(), invariants=(StateTest("A", "ground"),))
+    answers = synthesize(dry, engine=engine, questions=questions).answers
+    assert answers.never == (Never("climb", Cause.INVARIANT, False), Never("jump", Cause.INVARIANT, True, (0,)))
+    lost = automaton("A", ["ground -jump-> pit", "pit -climb-> pit", "ground -walk-> ground"], marked=["ground"])
+    answers = synthesize(replace(dry, automata=(lost,), invariants=()), engine=engine, questions=questions).answers
+    assert answers.never == (Never("climb", Cause.SUPERVISOR, False), Never("jump", Cause.SUPERVISOR, True))
+    # Without the invariant it would be just as lost.
+    answers = synthesize(replace(dry, automata=(lost,)), engine=engine, questions=questions).answers
+    assert answers.never == (Never("climb", Cause.SUPERVISOR, False), Never("jump", Cause.SUPERVISOR, True))
+    apart = automaton("A", ["pit -jump-> ground", "pit -climb-> ground", "ground -walk-> ground"], initial="ground")
+    answers = synthesize(replace(dry, automata=(apart,)), engine=engine, questions=questions).answers
+    assert answers.never == (Never("climb", Cause.PLANT, False), Never("jump", Cause.PLANT, False))
 
 
 def test_a_condition_that_synthesis_looks_ahead_to_is_used(engine: str) -> None:
@@ -349,7 +405,7 @@ def test_an_update_that_always_leaves_its_range_is_the_plants_own_fault(engine: 
         variables=[DiscreteVariable("n", IntegerType(0, 3), (0,))],
     )
     answers = synthesize(system_of(plant), engine=engine, questions=Questions(events=("go", "stay"))).answers
-    assert answers.never == (("go", Cause.PLANT),)
+    assert answers.never == (Never("go", Cause.PLANT, False),)
 
 
 def test_many_rivals_are_told_by_the_first_hundred_pairs(engine: str) -> None:

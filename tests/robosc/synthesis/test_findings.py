@@ -134,7 +134,7 @@ def test_a_request_that_synthesis_forbids() -> None:
     both = found(robot(text.replace("MORE", more), "requirement unlock needs Door.opened").replace("§", ""))
     assert [item.message for item in both] == [
         "'lock' can never be requested: synthesis forbids it everywhere, because of what could follow it",
-        "'unlock' can never be requested: the behaviours never get to states that allow it",
+        "'unlock' can never be requested: wherever the behaviours allow it, a requirement on it does not hold",
     ]
     assert found(robot(text.replace("MORE", more)).replace("§", "")) == ()
     # Written twice, one of the two requirements can go: the later one.
@@ -142,6 +142,64 @@ def test_a_request_that_synthesis_forbids() -> None:
     (item,) = (item for item in found(twice) if item.code == "unused-requirement")
     assert item.location is not None
     assert item.location.line == len(twice.splitlines()) - 1
+
+
+def test_a_request_that_would_break_what_must_always_hold() -> None:
+    text = DOOR.replace("incoming message open", "incoming message §open")
+    both = found(robot(text, "requirement never Door.opened", "requirement always true").replace("§", ""))
+    assert [item.message for item in both if item.code == "never-enabled"] == [
+        "'open' can never be requested: wherever it is allowed, what must always hold would not hold after it, or "
+        "could not be kept",
+        "'shut' can never be requested: what must always hold keeps the behaviours from the states that allow it",
+    ]
+    assert [(place.message, place.location.line) for place in both[0].related] == [("this would not hold after it", 11)]
+    assert [item.mend[:11] for item in both[:2]] == ["Relax what "] * 2
+
+
+def test_a_request_after_which_what_must_always_hold_could_not_be_kept() -> None:
+    """Nothing is broken at once: but then the wind can open the door."""
+    text = DOOR.replace("incoming message open", "incoming message §lift").replace(
+        "on request to open", "on request to lift"
+    )
+    text = text.replace("component Door {", "component Door { outgoing message wind with type: none")
+    text = text.replace("marked state opened {", "marked state opened { on response from wind goto ajar")
+    text = text.replace("initial marked", "marked state ajar { on request to shut goto closed } initial marked")
+    broken, unreached = found(robot(text, "requirement never Door.ajar").replace("§", ""))
+    assert broken.message.startswith("'lift' can never be requested: wherever it is allowed, what must always hold")
+    assert (broken.related, unreached.message.partition(": ")[0]) == ((), "'shut' can never be requested")
+
+
+def test_a_request_that_requirements_on_others_exclude() -> None:
+    text = DOOR.replace("message shut", "message §shut")
+    both = found(robot(text, "requirement open needs Door.opened").replace("§", ""))
+    assert [item.message for item in both] == [
+        "'open' can never be requested: wherever the behaviours allow it, a requirement on it does not hold",
+        "'shut' can never be requested: requirements keep the behaviours from the states that allow it",
+    ]
+    assert both[1].related == ()
+
+
+def test_a_request_in_states_that_synthesis_keeps_from() -> None:
+    """A door that is locked can only be broken, and is then repaired only where that is not needed."""
+    door = """component Door {
+        incoming message lock with type: none
+        incoming message smash with type: none
+        incoming message repair with type: none
+        behaviour {
+            initial marked state closed { on request to lock goto locked }
+            state locked { on request to smash goto broken }
+            state broken { on request to repair goto closed }
+        }
+    }"""
+    assert found(robot(door)) == ()
+    lock, smash, repair = found(robot(door, "requirement repair needs Door.closed"))
+    assert repair.message.endswith("a requirement on it does not hold")
+    assert (lock.message, smash.message) == (
+        "'lock' can never be requested: synthesis forbids it everywhere, because of what could follow it",
+        "'smash' can never be requested: synthesis keeps the behaviours from the states that allow it, because of what "
+        "could follow there",
+    )
+    assert "robosc explain-synthesis" in smash.mend
 
 
 def test_of_a_call_that_is_never_made_only_the_request_is_told() -> None:

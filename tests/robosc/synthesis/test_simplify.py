@@ -120,4 +120,4 @@ def test_families_in_words(family: str, size: int, event: str, words: str) -> No
     added = {item.event: item.condition for item in synthesize(system).added}
     formula = Formulas(diagram_domains(system)).formula(added[event])
     assert formula is not None
-    assert in_words(formula) == words
+    assert in_words(formula, ()) == words

@@ -1,0 +1,88 @@
+"""Why an event can never happen in the controlled system: what is to be blamed first, from the plants onwards."""
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+from robosc.synthesis.closure import Closure, Step
+from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.fixed_point import FixedPoint, Problem, allowed, initial_states, safe_states
+from robosc.synthesis.questions import Cause, Never
+from robosc.synthesis.symbolic import Symbols
+from robosc.synthesis.transitions import Steps
+from robosc.synthesis.watch import Watch
+
+
+class Causes:
+    """Tells causes; what they are judged by is worked out once it is needed.
+
+    Args:
+        encoding: The variables.
+        watch: Who waits.
+        problem: What was solved.
+        good: Its good states.
+        reachable: States of the controlled system.
+    """
+
+    def __init__(self, encoding: Encoding, watch: Watch, problem: Problem, good: Any, reachable: Any) -> None:
+        self._encoding = encoding
+        self._false = encoding.manager.false
+        self._watch = watch
+        self._problem = problem
+        self._good = good
+        self._reachable = reachable
+
+    def of(self, steps: Steps) -> Never:
+        """Why an event of the problem, which cannot happen in the controlled system, cannot."""
+        event = steps.event.name
+        if self._is_nowhere(steps.plant) or self._is_nowhere(steps.plant & self._by_plants):
+            return Never(event, Cause.PLANT, is_reached=False)
+        enabled = steps.plant & self._under_conditions
+        if self._is_nowhere(enabled & steps.condition):
+            return Never(event, Cause.REQUIREMENT, is_reached=not self._is_nowhere(enabled))
+        enabled = self._reachable & steps.plant & steps.condition
+        is_reached = not self._is_nowhere(enabled)
+        if not self._is_possible_without_invariants(steps):
+            return Never(event, Cause.SUPERVISOR, is_reached)
+        return Never(event, Cause.INVARIANT, is_reached, self._broken(steps.image(enabled)))
+
+    def _is_nowhere(self, states: Any) -> bool:
+        return bool(states == self._false)
+
+    @cached_property
+    def _by_plants(self) -> Any:
+        """What the plants reach by themselves."""
+        return self._reached(lambda steps: steps.plant)
+
+    @cached_property
+    def _under_conditions(self) -> Any:
+        """What they reach where event conditions are heeded and nothing else is."""
+        return self._reached(lambda steps: steps.plant & steps.condition)
+
+    def _reached(self, possible: Callable[[Steps], Any]) -> Any:
+        def onwards(steps: Steps) -> Step:
+            source = possible(steps)
+            return Step(lambda states: steps.image(states & source), steps.names)
+
+        closure = Closure([onwards(steps) for steps in self._problem.steps], self._encoding.state_names, self._watch)
+        return closure.of(initial_states(self._encoding), "reachability")
+
+    def _is_possible_without_invariants(self, steps: Steps) -> bool:
+        if not self._encoding.system.invariants:
+            return False
+        good, reachable = self._without_invariants
+        return not self._is_nowhere(reachable & steps.plant & allowed(steps, good))
+
+    @cached_property
+    def _without_invariants(self) -> tuple[Any, Any]:
+        """Good states, and states of the controlled system, if nothing had to hold always."""
+        fixed_point = FixedPoint(self._encoding, self._watch)
+        problem = Problem(self._problem.steps, safe_states(self._encoding, ()))
+        good = fixed_point.good_states(problem, known=self._good).states
+        return good, fixed_point.reachable_states(problem, good)
+
+    def _broken(self, states: Any) -> tuple[int, ...]:
+        """The invariants that some of the states break."""
+        holds = Symbols(self._encoding).holds
+        invariants = enumerate(self._encoding.system.invariants)
+        return tuple(place for place, item in invariants if not self._is_nowhere(states & ~holds(item)))

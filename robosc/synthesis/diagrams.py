@@ -6,7 +6,7 @@ from robosc.automata.state import Subject
 from robosc.errors import UnsupportedModelError
 from robosc.supervisor.structure import DecisionDiagram, DecisionNode
 from robosc.synthesis.encoding import Bits, Encoding
-from robosc.synthesis.nodes import cofactors, is_constant
+from robosc.synthesis.nodes import cofactors
 
 MAXIMUM_BRANCHES = 100_000
 """Ranges of one variable's values beyond which a diagram is refused."""
@@ -21,7 +21,12 @@ class _Extractor:
     def __init__(self, encoding: Encoding) -> None:
         self._encoding = encoding
         self._manager = encoding.manager
-        self._home = {name: subject for subject, bits in encoding.subjects.items() for name in bits.names}
+        self._constants = {int(self._manager.true): 1, int(self._manager.false): 0}
+        self._home = {
+            name: (subject, place)
+            for subject, bits in encoding.subjects.items()
+            for place, name in enumerate(bits.names)
+        }
         self._nodes: list[DecisionNode] = []
         self._numbers: dict[DecisionNode, int] = {}
         self._known: dict[int, tuple[Any, int]] = {}
@@ -32,8 +37,9 @@ class _Extractor:
 
     def _number(self, predicate: Any) -> int:
         """The number of a predicate in the diagram: 0 false, 1 true, from 2 on its nodes."""
-        if is_constant(self._manager, predicate):
-            return int(predicate == self._manager.true)
+        constant = self._constants.get(int(predicate))
+        if constant is not None:
+            return constant
         found = self._known.get(int(predicate))
         if found is None:
             # The predicate is kept with its number: the engine could otherwise give its node to another one.
@@ -41,11 +47,11 @@ class _Extractor:
         return found[1]
 
     def _new_number(self, predicate: Any) -> int:
-        subject = self._home[predicate.var]
+        subject, _ = self._home[predicate.var]
         bits = self._encoding.subjects[subject]
         starts: list[int] = []
         children: list[int] = []
-        for start, below in self._runs(bits, predicate, 0):
+        for start, below in self._runs(subject, bits, predicate, 0):
             if start >= len(bits.domain):
                 # Codes that stand for no value: what a predicate says of them is nobody's business.
                 break
@@ -64,17 +70,20 @@ class _Extractor:
             self._nodes.append(node)
         return self._numbers[node]
 
-    def _runs(self, bits: Bits, predicate: Any, place: int) -> list[_Run]:
+    def _runs(self, subject: Subject, bits: Bits, predicate: Any, place: int) -> list[_Run]:
         """What is left of a predicate for each index of the bits from `place` on, equal neighbours put together."""
-        if is_constant(self._manager, predicate) or predicate.var not in bits.names[place:]:
+        if int(predicate) in self._constants:
+            return [(0, predicate)]
+        home, tested = self._home[predicate.var]
+        if home != subject or tested < place:
             return [(0, predicate)]
         half = 1 << (len(bits.names) - place - 1)
-        if predicate.var == bits.names[place]:
+        if tested == place:
             low, high = cofactors(predicate)
-            runs, upper = self._runs(bits, low, place + 1), self._runs(bits, high, place + 1)
+            runs, upper = self._runs(subject, bits, low, place + 1), self._runs(subject, bits, high, place + 1)
         else:
             # The bit does not matter: both halves look alike.
-            upper = self._runs(bits, predicate, place + 1)
+            upper = self._runs(subject, bits, predicate, place + 1)
             runs = list(upper)
         for start, below in upper:
             if start or runs[-1][1] != below:
@@ -82,7 +91,7 @@ class _Extractor:
         if len(runs) > MAXIMUM_BRANCHES:
             raise UnsupportedModelError(
                 f"a condition of the supervisor tells apart more than {MAXIMUM_BRANCHES} ranges of the values of "
-                f"'{self._home[bits.names[0]]}'; use a smaller range"
+                f"'{subject}'; use a smaller range"
             )
         return runs
 

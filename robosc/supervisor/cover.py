@@ -9,8 +9,7 @@ for VLSI Synthesis", Kluwer, 1984, ch. 4 (expand, irredundant, reduce); R. L. Ru
 """
 
 from robosc.expressions import Expression, StateTest, VariableRead, leaves
-from robosc.supervisor.diagram import Domains, Subject
-from robosc.supervisor.literals import Membership, Size, membership, merged, operands, size
+from robosc.supervisor.literals import Indices, Membership, Size, Vocabulary, merged, operands, size
 from robosc.supervisor.multivalued import Cube, GaveUp, Node, Space
 
 MAXIMUM_CUBES = 64
@@ -25,14 +24,14 @@ class Words:
 
     Args:
         space: Gives the classes of values.
-        domains: Give the values.
+        vocabulary: Puts tests into words.
     """
 
-    def __init__(self, space: Space, domains: Domains) -> None:
+    def __init__(self, space: Space, vocabulary: Vocabulary) -> None:
         self._space = space
-        self._domains = domains
+        self._vocabulary = vocabulary
         self._tests: dict[tuple[int, int], tuple[Membership, Size]] = {}
-        self._ranks: dict[Subject, int] = {subject: rank for rank, subject in enumerate(domains)}
+        self._ranks = vocabulary.ranks
         self.ranks = [self._ranks[subject] for subject in space.subjects]
         """For each place where it stands in the model's text."""
 
@@ -53,14 +52,20 @@ class Words:
         """How long that test is; nothing for the test that is always true."""
         return (0, 0) if mask == self._space.full[variable] else self._test(variable, mask)[1]
 
+    def ranges(self, variable: int, mask: int) -> int:
+        """Over how many ranges of integers its values lie; other values lie as they come."""
+        return len(self._runs(variable, mask)) if variable in self._space.integers else 0
+
+    def _runs(self, variable: int, mask: int) -> Indices:
+        classes = self._space.classes[variable]
+        return merged(run for place, item in enumerate(classes) if mask >> place & 1 for run in item)
+
     def _test(self, variable: int, mask: int) -> tuple[Membership, Size]:
         found = self._tests.get((variable, mask))
         if found is None:
-            classes = self._space.classes[variable]
-            runs = merged(run for place, item in enumerate(classes) if mask >> place & 1 for run in item)
-            self._space.effort.spend(len(runs) + len(classes))
-            subject = self._space.subjects[variable]
-            test = membership(subject, self._domains[subject], runs)
+            runs = self._runs(variable, mask)
+            self._space.effort.spend(len(runs) + len(self._space.classes[variable]))
+            test = self._vocabulary.test(self._space.subjects[variable], runs)
             self._space.effort.spend(len(test.parts))
             if len(test.parts) > MAXIMUM_PARTS:
                 raise GaveUp
@@ -73,7 +78,7 @@ class Words:
         return sum(item[0] for item in sizes), sum(item[1] for item in sizes)
 
 
-def cover(space: Space, words: Words, wanted: Node, forbidden: Node) -> list[Cube]:
+def cover(space: Space, words: Words, wanted: Node, forbidden: Node, *, most: int = MAXIMUM_CUBES) -> list[Cube]:
     """Cubes that together are true where `wanted` is and false where `forbidden` is; none of them can go.
 
     Args:
@@ -81,6 +86,7 @@ def cover(space: Space, words: Words, wanted: Node, forbidden: Node) -> list[Cub
         words: They tell which cubes are short.
         wanted: Where they must be true.
         forbidden: Where they must be false; apart from `wanted`.
+        most: How many cubes there may be before some of them are dropped.
 
     Raises:
         GaveUp: There would be too many, or it takes too many steps.
@@ -88,7 +94,7 @@ def cover(space: Space, words: Words, wanted: Node, forbidden: Node) -> list[Cub
     cubes: list[Cube] = []
     rest = wanted
     while rest != 0:
-        if len(cubes) == MAXIMUM_CUBES:
+        if len(cubes) == most:
             raise GaveUp
         cube = _expanded(space, words, space.shortest_path(rest), forbidden)
         cubes.append(cube)
@@ -116,14 +122,8 @@ def _expanded_in(space: Space, cube: Cube, forbidden: Node, order: list[int]) ->
             masks[variable] = before
             kept.append(variable)
     for variable in kept:
-        mask = masks[variable]
-        for place in range(len(space.classes[variable])):
-            if not mask >> place & 1:
-                # A cube is free of forbidden states if it is so for each value by itself.
-                masks[variable] = 1 << place
-                if not space.meets(forbidden, tuple(masks)):
-                    mask |= 1 << place
-        masks[variable] = mask
+        # A cube is free of forbidden states if it is so for each value by itself.
+        masks[variable] = space.full[variable] & ~space.meeting(forbidden, tuple(masks), variable)
     return tuple(masks)
 
 
@@ -159,27 +159,37 @@ def _shortened(space: Space, words: Words, cubes: list[Cube], wanted: Node) -> l
         masks = list(cube)
         for variable, mask in enumerate(cube):
             if mask != space.full[variable]:
-                masks[variable] = _shortest(words, variable, _values(space, own, variable, mask), mask)
+                masks[variable] = _shortest(
+                    space, words, variable, space.meeting(own, space.full, variable) & mask, mask
+                )
         kept.append(tuple(masks))
     return kept
 
 
-def _values(space: Space, node: Node, variable: int, mask: int) -> int:
-    """The classes of `mask` that a place has anywhere in a predicate."""
-    found = 0
-    for place in range(len(space.classes[variable])):
-        if mask >> place & 1:
-            cube = list(space.full)
-            cube[variable] = 1 << place
-            if space.meets(node, tuple(cube)):
-                found |= 1 << place
-    return found
+def _shortest(space: Space, words: Words, variable: int, low: int, high: int) -> int:
+    """The set of classes between two sets that is told in the fewest words, as far as it is found; rather one range."""
+    candidates = [_filled(space, variable, low, high)] if variable in space.integers else []
+    candidates += [_stepwise(words, variable, high, high & ~low), _stepwise(words, variable, low, high & ~low)]
+
+    def told(mask: int) -> tuple[int, int, int]:
+        operands, characters = words.size(variable, mask)
+        return operands, words.ranges(variable, mask), characters
+
+    return min(candidates, key=told)
 
 
-def _shortest(words: Words, variable: int, low: int, high: int) -> int:
-    """The set of classes between two sets that is told in the fewest words, as far as single steps find it."""
-    candidates = [_stepwise(words, variable, high, high & ~low), _stepwise(words, variable, low, high & ~low)]
-    return min(candidates, key=lambda mask: words.size(variable, mask))
+def _filled(space: Space, variable: int, low: int, high: int) -> int:
+    """The lower set with each gap between its values, and before and after them, that the upper set fills whole."""
+    runs = sorted((run.start, 1 << place) for place, item in enumerate(space.classes[variable]) for run in item)
+    found, gap = low, 0
+    for _, place in runs:
+        if not place & low:
+            gap |= place
+            continue
+        if not gap & ~high:
+            found |= gap
+        gap = 0
+    return found if gap & ~high else found | gap
 
 
 def _stepwise(words: Words, variable: int, mask: int, free: int) -> int:

@@ -1,10 +1,10 @@
-"""Short formulas of decision diagrams: sums of products and products of sums, factored, whichever is shortest.
+"""Short formulas of decision diagrams: factored sums of products, their duals and relations, whichever is shortest.
 
 A formula can be exponentially larger than its diagram, so the work is bounded in steps and the result in operands;
 beyond either bound there is none, and the diagram itself is what can be shown.
 
 Sources: R. K. Brayton, "Factoring logic functions", IBM Journal of Research and Development 31(2), 1987, pp. 187-198
-(common literals); `cover` for the sums.
+(common literals); `cover` for the sums, `relations` for the relations.
 """
 
 from collections import Counter
@@ -13,10 +13,11 @@ from dataclasses import dataclass
 from functools import partial
 
 from robosc.expressions import FALSE, TRUE, BinaryOperator, Conditional, Expression, Unary
-from robosc.supervisor.cover import Words, cover
+from robosc.supervisor.cover import MAXIMUM_CUBES, Words, cover
 from robosc.supervisor.diagram import Domains
-from robosc.supervisor.literals import joined, operands, size
+from robosc.supervisor.literals import Vocabulary, has_relation, joined, operands, size, spine
 from robosc.supervisor.multivalued import Cube, Effort, GaveUp, Node, Space
+from robosc.supervisor.relations import Description, Relations
 from robosc.supervisor.structure import DecisionDiagram
 
 OPERANDS = 40
@@ -24,6 +25,9 @@ OPERANDS = 40
 
 _LONG = 5
 """Operands from which on a formula is compared with one that chooses between two shorter ones."""
+
+_MAXIMUM_OUTCOMES = 4
+"""What one place may lead to where a formula is divided by its values."""
 
 STEPS = 30_000
 """Steps that the search for one formula may take: some hundredths of a second."""
@@ -52,6 +56,17 @@ _Factors = frozenset[_Literal]
 """A product; empty where it is always true."""
 
 
+def _most_cubes(limit: int) -> int:
+    """Cubes that a sum of so many operands can have: most of them if it is a product of sums of three."""
+    return min(MAXIMUM_CUBES, max(2, round(3 ** (min(limit, 12) / 3))))
+
+
+def length(expression: Expression) -> tuple[int, bool, int]:
+    """How long a formula is; of two with as many operands the one without relations reads better."""
+    count, characters = size(expression)
+    return count, has_relation(expression), characters
+
+
 def to_expression(
     diagram: DecisionDiagram, domains: Domains, *, limit: int = OPERANDS, effort: Effort | None = None
 ) -> Expression | None:
@@ -63,57 +78,171 @@ def to_expression(
         limit: Operands that it may have.
         effort: What the search may take, at most `STEPS` of it; without one, `STEPS`.
     """
+    return formula_in(Vocabulary(domains), diagram, limit=limit, effort=Effort(STEPS) if effort is None else effort)
+
+
+def formula_in(vocabulary: Vocabulary, diagram: DecisionDiagram, *, limit: int, effort: Effort) -> Expression | None:
+    """The same as `to_expression`, for many diagrams in one vocabulary."""
     if diagram.root < 2:
         return TRUE if diagram.root else FALSE
-    own = Effort(STEPS) if effort is None else effort.part(STEPS)
     try:
-        space = Space([diagram], domains, own)
-        found = _Formulas(space, domains, limit).shortest(space.of(diagram))
+        space = Space([diagram], vocabulary.domains, effort.part(STEPS))
+        found = _Formulas(space, vocabulary, limit).shortest(space.of(diagram))
     except GaveUp:
         return None
-    return found if found is not None and size(found)[0] <= limit else None
+    return found if found is not None and operands(found) <= limit else None
 
 
 class _Formulas:
     """Finds formulas of the nodes of one store."""
 
-    def __init__(self, space: Space, domains: Domains, limit: int) -> None:
+    def __init__(self, space: Space, vocabulary: Vocabulary, limit: int) -> None:
         self._space = space
-        self._words = Words(space, domains)
+        self._words = Words(space, vocabulary)
+        self._relations = Relations(space, self._words, vocabulary.domains)
         self._limit = limit
         self._known: dict[Node, Expression | None] = {0: FALSE, 1: TRUE}
+        self._covers: dict[Node, list[Cube]] = {}
 
     def shortest(self, node: Node) -> Expression | None:
         """The shortest of the formulas that are found; the first of several."""
         if node not in self._known:
-            self._known[node] = self._searched(node)
+            # While it is looked for there is none: a form of it in terms of itself would not end.
+            self._known[node] = None
+            try:
+                self._known[node] = self._searched(node)
+            except GaveUp:
+                del self._known[node]
+                raise
         return self._known[node]
 
     def _searched(self, node: Node) -> Expression | None:
-        if len(self._support(node)) > self._limit:
+        tested = self._support(node)
+        if len(tested) > self._limit:
             # Whatever a node tests matters, so it stands in every formula.
             return None
         opposite = self._space.without(1, node)
+        integers = self._relations.integers(tested)
+        # A sum that is not the smallest may have some more.
+        most = 2 + 2 * _most_cubes(self._limit)
+        found: list[Expression] = []
+        if integers:
+            # A formula that tests each place once has few products, and is found soon.
+            found += self._of_sums(node, opposite, max(2, len(tested)))
+            if not found or self._least(found) > len(tested):
+                found += self._of_relations(node, opposite, integers, len(tested))
+            if found:
+                most = _most_cubes(self._least(found))
+        if not found or self._least(found) > len(tested):
+            found += self._of_sums(node, opposite, min(most, MAXIMUM_CUBES))
+            if len(self._covers.get(node, ())) == 1 or len(self._covers.get(opposite, ())) == 1:
+                # One product is a sum of its literals the other way round: only relations are shorter.
+                return min(found, key=length, default=None)
+            if not found or self._least(found) >= _LONG:
+                found += self._tried(partial(self._choice_at, node))
+            if integers and (not found or self._least(found) > len(tested)):
+                found += self._tried(partial(self._divided, node, tested))
+        return min(found, key=length, default=None)
+
+    @staticmethod
+    def _least(found: list[Expression]) -> int:
+        return min(map(operands, found))
+
+    def _of_sums(self, node: Node, opposite: Node, most: int) -> list[Expression]:
+        """The formulas of a sum of at most so many products, and of the negation of such a sum."""
         found: list[Expression] = []
         # What has fewer ways to true mostly has the shorter sum.
         for is_negated in sorted((False, True), key=lambda negated: self._space.paths(opposite if negated else node)):
-            pair = (opposite, node) if is_negated else (node, opposite)
-            cubes = self._tried(partial(cover, self._space, self._words, *pair))
+            wanted, forbidden = (opposite, node) if is_negated else (node, opposite)
+            if wanted not in self._covers:
+                cubes = self._tried(partial(cover, self._space, self._words, wanted, forbidden, most=most))
+                if cubes:
+                    self._covers[wanted] = cubes
+            cubes = self._covers.get(wanted, [])
             found += self._tried(partial(self._of_sum, cubes, is_negated))
             if len(cubes) == 1:
-                # One product is a sum of its literals the other way round: there is nothing shorter.
-                return min(found, key=size, default=None)
-        if not found or min(map(operands, found)) >= _LONG:
-            found += self._tried(partial(self._choice, node))
-        return min(found, key=size, default=None)
+                break
+        return found
 
     def _tried[Found](self, search: Callable[[], Iterable[Found]]) -> list[Found]:
-        """What a search finds with a third of the steps that are left; nothing where it needs more."""
+        """What a search finds with a third of the steps that are left."""
+        found: list[Found] = []
         try:
             with self._space.within(self._space.effort.part(self._space.effort.left // 3)):
-                return list(search())
+                for item in search():
+                    found.append(item)  # what was found before it gives up is kept
         except GaveUp:
-            return []
+            pass
+        return found
+
+    def _of_relations(self, node: Node, opposite: Node, integers: tuple[int, ...], least: int) -> list[Expression]:
+        """Formulas with relations, if there are any; no further ones after one with the least operands."""
+        pairs = [(node, opposite, False), (opposite, node, True)]
+        exact = [pair for pair in pairs if self._tried(partial(self._enough, *pair[:2], integers))]
+        found: list[Expression] = []
+        for pair in exact or pairs:
+            found += self._tried(partial(self._related, *pair, integers, least))
+            if found and self._least(found) <= least:
+                break
+        return found
+
+    def _enough(self, wanted: Node, forbidden: Node, integers: tuple[int, ...]) -> list[bool]:
+        return [True] if self._relations.are_enough(wanted, forbidden, integers) else []
+
+    def _related(
+        self, wanted: Node, forbidden: Node, is_negated: bool, integers: tuple[int, ...], least: int
+    ) -> Iterator[Expression]:
+        """Relations and whatever else they need, or, where they were found for the opposite, the negation of that."""
+        for description in self._relations.around(wanted, forbidden, integers):
+            parts = self._described(description, is_negated)
+            if parts is not None:
+                found = self._join("or" if is_negated else "and", parts)
+                yield found
+                if operands(found) <= least:
+                    return
+
+    def _described(self, description: Description, is_negated: bool) -> list[Expression] | None:
+        """The parts of a description, or of its negation; None where one of them has no formula."""
+        operator: BinaryOperator = "or" if is_negated else "and"
+        told = [self._relations.expression(item.opposite if is_negated else item) for item in description.relations]
+        if description.single != 1:
+            single = self._space.without(1, description.single) if is_negated else description.single
+            part = self.shortest(single)
+            if part is None:
+                return None
+            told += spine(operator, part)
+        if description.inner is not None:
+            inner = self._described(description.inner, not is_negated)
+            if inner is None:
+                return None
+            told += spine(operator, self._join("and" if is_negated else "or", inner))
+        return told
+
+    def _divided(self, node: Node, tested: Iterable[int]) -> Iterator[Expression]:
+        """What is left for the values of each place by itself: it may be relations alone."""
+        for variable in tested:
+            outcomes: dict[Node, int] = {}
+            for place, outcome in enumerate(self._space.fixed(node, variable)):
+                outcomes[outcome] = outcomes.get(outcome, 0) | 1 << place
+            if len(outcomes) <= _MAXIMUM_OUTCOMES:
+                yield from self._cases(variable, outcomes)
+
+    def _cases(self, variable: int, outcomes: dict[Node, int]) -> Iterator[Expression]:
+        """Tests of one place, each with what is left for its values."""
+        parts = {outcome: self.shortest(outcome) for outcome in outcomes if outcome > 1}
+        told = []
+        for outcome, mask in outcomes.items():
+            part = parts.get(outcome, TRUE)
+            if part is None:
+                return
+            if outcome == 1 or (outcome and 1 in outcomes and len(outcomes) == 2):
+                # What is true for the other values needs no test of its own.
+                told.append(part if outcome > 1 else self._words.test(variable, mask))
+            elif outcome:
+                told.append(self._join("and", [self._words.test(variable, mask), part]))
+        yield self._join("or", told)
+        if len(parts) == len(outcomes) == 2:
+            yield from self._choice(variable, outcomes)
 
     def _of_sum(self, cubes: list[Cube], is_negated: bool) -> Iterator[Expression]:
         """A sum of products, or, where it was found for the opposite, the product of sums and the negation."""
@@ -134,20 +263,22 @@ class _Formulas:
         else:
             yield self._expression(tree)
 
-    def _choice(self, node: Node) -> Iterator[Expression]:
+    def _choice_at(self, node: Node) -> Iterator[Expression]:
         """`if ... then ... else ...`, where the first test has two outcomes that both need more tests."""
-        children = self._space.children(node)
-        outcomes = list(dict.fromkeys(children))
-        if len(outcomes) != 2 or min(outcomes) < 2:
-            return
-        variable = self._space.variable(node)
-        masks = [sum(1 << place for place, child in enumerate(children) if child == outcome) for outcome in outcomes]
-        if self._words.size(variable, masks[1]) < self._words.size(variable, masks[0]):
-            masks.reverse()
-            outcomes.reverse()
-        then, otherwise = (self.shortest(outcome) for outcome in outcomes)
+        outcomes: dict[Node, int] = {}
+        for place, child in enumerate(self._space.children(node)):
+            outcomes[child] = outcomes.get(child, 0) | 1 << place
+        if len(outcomes) == 2 and min(outcomes) > 1:
+            yield from self._choice(self._space.variable(node), outcomes)
+
+    def _choice(self, variable: int, outcomes: dict[Node, int]) -> Iterator[Expression]:
+        """`if ... then ... else ...` with the shorter test."""
+        (first, mask), (second, other) = outcomes.items()
+        if self._words.size(variable, other) < self._words.size(variable, mask):
+            first, mask, second = second, other, first
+        then, otherwise = self.shortest(first), self.shortest(second)
         if then is not None and otherwise is not None:
-            yield Conditional(self._words.test(variable, masks[0]), then, otherwise)
+            yield Conditional(self._words.test(variable, mask), then, otherwise)
 
     # Sums
 

@@ -19,7 +19,7 @@ from robosc.expressions import (
     VariableRead,
 )
 from robosc.expressions.text import expression_text
-from robosc.supervisor.diagram import Subject, SubjectDomain
+from robosc.supervisor.diagram import Domains, Subject, SubjectDomain
 
 Indices = tuple[range, ...]
 """Runs of indices into a domain, ascending and apart."""
@@ -61,6 +61,30 @@ class Membership:
         return joined(self.operator, self.parts)
 
 
+class Vocabulary:
+    """Tests of the places of a state, each put into words once.
+
+    Args:
+        domains: What the places can hold.
+
+    Attributes:
+        domains: The same.
+        ranks: For each place where it stands in the model's text.
+    """
+
+    def __init__(self, domains: Domains) -> None:
+        self.domains = domains
+        self.ranks: dict[Subject, int] = {subject: rank for rank, subject in enumerate(domains)}
+        self._known: dict[tuple[Subject, Indices], Membership] = {}
+
+    def test(self, subject: Subject, indices: Indices) -> Membership:
+        """The shortest test whether a place holds one of some values: some, but not all that it can hold."""
+        found = self._known.get((subject, indices))
+        if found is None:
+            found = self._known[subject, indices] = membership(subject, self.domains[subject], indices)
+        return found
+
+
 def membership(
     subject: Subject, domain: SubjectDomain, indices: Indices, components: Collection[str] = ()
 ) -> Membership:
@@ -100,8 +124,30 @@ def _length(text: str) -> int:
 
 
 def operands(expression: Expression) -> int:
-    """The tests in a condition: of a location, a boolean or a comparison; each choice counts as one more."""
+    """The tests in a condition: of a location, a boolean or an integer; each choice counts as one more.
+
+    A comparison of several variables counts once for each of them.
+    """
     count, stack = 0, [expression]
+    while stack:
+        match stack.pop():
+            case Binary(left=left, right=right):
+                stack += [left, right]
+            case Unary(operand=operand):
+                stack.append(operand)
+            case Conditional(condition=condition, then=then, otherwise=otherwise):
+                count += 1
+                stack += [condition, then, otherwise]
+            case StateTest() | VariableRead():
+                count += 1
+            case other if not isinstance(other, Constant | EnumValue):
+                raise TypeError(f"no condition of a supervisor: {other!r}")
+    return count
+
+
+def has_relation(expression: Expression) -> bool:
+    """Whether a condition compares variables with each other."""
+    stack = [expression]
     while stack:
         match stack.pop():
             case Binary(operator="and" | "or", left=left, right=right):
@@ -109,25 +155,22 @@ def operands(expression: Expression) -> int:
             case Unary(operand=operand):
                 stack.append(operand)
             case Conditional(condition=condition, then=then, otherwise=otherwise):
-                count += 1
                 stack += [condition, then, otherwise]
-            case Binary() | StateTest() | VariableRead():
-                count += 1
-            case other if not isinstance(other, Constant):
-                raise TypeError(f"no condition of a supervisor: {other!r}")
-    return count
+            case Binary() as comparison if operands(comparison) > 1:
+                return True
+    return False
 
 
 def joined(operator: BinaryOperator, parts: Iterable[Expression]) -> Expression:
     """Conditions put together by `and` or `or`, without parentheses around what the same operator joins already."""
-    flat = [item for part in parts for item in _spine(operator, part)]
+    flat = [item for part in parts for item in spine(operator, part)]
     result = flat[0]
     for item in flat[1:]:
         result = Binary(operator, result, item)
     return result
 
 
-def _spine(operator: BinaryOperator, expression: Expression) -> list[Expression]:
+def spine(operator: BinaryOperator, expression: Expression) -> list[Expression]:
     """The operands of a chain of one operator."""
     found: list[Expression] = []
     while isinstance(expression, Binary) and expression.operator == operator:

@@ -8,12 +8,13 @@ ICCAD 1990, pp. 92-95.
 """
 
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
 from typing import Self
 
+from robosc.expressions import IntegerType
 from robosc.supervisor.diagram import Domains, Subject
 from robosc.supervisor.literals import Indices, merged
 from robosc.supervisor.structure import DecisionDiagram, DecisionNode
@@ -71,9 +72,11 @@ class Space:
         diagrams: They decide which values are told apart.
         domains: What the places can hold.
         effort: What the work may take.
+        apart: Places whose values are all told apart.
 
     Attributes:
         subjects: The places, in the order of the diagrams.
+        integers: Which of them hold integers, by number.
         classes: For each place, the indices of each class.
         full: The cube of all states.
         effort: What further work may take.
@@ -82,7 +85,13 @@ class Space:
         GaveUp: They test too many places or tell too many values apart.
     """
 
-    def __init__(self, diagrams: Sequence[DecisionDiagram], domains: Domains, effort: Effort) -> None:
+    def __init__(
+        self,
+        diagrams: Sequence[DecisionDiagram],
+        domains: Domains,
+        effort: Effort,
+        apart: Collection[Subject] = (),
+    ) -> None:
         self.effort = effort
         self.subjects = _ordered(diagrams)
         if len(self.subjects) > MAXIMUM_SUBJECTS:
@@ -91,7 +100,17 @@ class Space:
         nodes: dict[Subject, list[DecisionNode]] = {subject: [] for subject in self.subjects}
         for node in (node for diagram in diagrams for node in diagram.nodes):
             nodes[node.automaton, node.variable].append(node)
-        self.classes = [_classes(nodes[subject], len(domains[subject]), effort) for subject in self.subjects]
+        self.integers = frozenset(
+            place for place, subject in enumerate(self.subjects) if isinstance(domains[subject].type, IntegerType)
+        )
+        # Only one range each, so that relations between integers can tell where they stand.
+        ranges = {self.subjects[place] for place in self.integers} if len(self.integers) > 1 else ()
+        self.classes = [
+            _singles(len(domains[subject]), effort)
+            if subject in apart
+            else _classes(nodes[subject], len(domains[subject]), effort, are_ranges=subject in ranges)
+            for subject in self.subjects
+        ]
         self.full: Cube = tuple((1 << len(classes)) - 1 for classes in self.classes)
         # The constants are tested below everything.
         self._nodes: list[tuple[int, tuple[Node, ...]]] = [(len(self.subjects), ())] * 2
@@ -167,6 +186,25 @@ class Space:
         here, children = self._nodes[node]
         return children if here == variable else (node,) * len(self.classes[variable])
 
+    def fixed(self, node: Node, variable: int) -> tuple[Node, ...]:
+        """For each class of a place's values what is left of a node."""
+        known: dict[Node, tuple[Node, ...]] = {}
+
+        def left(item: Node) -> tuple[Node, ...]:
+            here, children = self._nodes[item]
+            if here == variable:
+                return children
+            if here > variable:
+                return (item,) * len(self.classes[variable])
+            found = known.get(item)
+            if found is None:
+                self.effort.spend()
+                below = [left(child) for child in children]
+                found = known[item] = tuple(self.make(here, row) for row in zip(*below, strict=True))
+            return found
+
+        return left(node)
+
     # Cubes
 
     def of_cube(self, cube: Cube) -> Node:
@@ -181,6 +219,38 @@ class Space:
                 node = self.make(variable, tuple(node if cube[variable] >> item & 1 else 0 for item in range(count)))
         self._cubes[cube] = node
         return node
+
+    def around(self, node: Node) -> Cube:
+        """The smallest cube around a node that is not false."""
+        masks = [0] * len(self.subjects)
+        # Every child but false leads to true.
+        seen, stack = {0, 1}, [node]
+        self._untested(masks, 0, node)
+        while stack:
+            item = stack.pop()
+            if item in seen:
+                continue
+            seen.add(item)
+            self.effort.spend()
+            variable, children = self._nodes[item]
+            for place, child in enumerate(children):
+                if child:
+                    masks[variable] |= 1 << place
+                    self._untested(masks, variable + 1, child)
+                    stack.append(child)
+        return tuple(masks)
+
+    def _untested(self, masks: list[int], first: int, node: Node) -> None:
+        """Let places from one on up to a node's hold whatever they can."""
+        last = self._nodes[node][0]
+        masks[first:last] = self.full[first:last]
+
+    def all_of(self, nodes: Iterable[Node]) -> Node:
+        """Where all of some nodes are true."""
+        result = 1
+        for node in nodes:
+            result = self.both(result, node)
+        return result
 
     def sum_of(self, cubes: Iterable[Cube]) -> Node:
         """Where one of some cubes is."""
@@ -208,6 +278,37 @@ class Space:
             stack += below
         self.effort.spend(len(seen))
         return False
+
+    def meeting(self, node: Node, cube: Cube, variable: int) -> int:
+        """The classes of one place, as bits, with which a node is true somewhere in a cube, whatever its own are."""
+        known: dict[Node, bool] = {0: False, 1: True}
+        seen, stack = {0, node}, [node] if node else []
+        found = 0
+        while stack and found != self.full[variable]:
+            item = stack.pop()
+            here, children = self._nodes[item]
+            if here < variable:
+                below = {child for place, child in enumerate(children) if cube[here] >> place & 1} - seen
+                seen |= below
+                stack += below
+            elif here > variable:
+                found = self.full[variable] if self._leads(item, cube, known) else found
+            else:
+                for place, child in enumerate(children):
+                    if child and not found >> place & 1 and self._leads(child, cube, known):
+                        found |= 1 << place
+        self.effort.spend(len(seen) + len(known))
+        return found
+
+    def _leads(self, node: Node, cube: Cube, known: dict[Node, bool]) -> bool:
+        """Whether a node is true somewhere in a cube."""
+        found = known.get(node)
+        if found is None:
+            variable, children = self._nodes[node]
+            mask = cube[variable]
+            below = {child for place, child in enumerate(children) if mask >> place & 1}
+            found = known[node] = 1 in below or any(self._leads(child, cube, known) for child in below)
+        return found
 
     def paths(self, node: Node) -> int:
         """Ways from a node to true, those through one and the same nodes counted once."""
@@ -301,11 +402,23 @@ def _ordered(diagrams: Sequence[DecisionDiagram]) -> tuple[Subject, ...]:
         return tuple(later)
 
 
-def _classes(nodes: Sequence[DecisionNode], count: int, effort: Effort) -> list[Indices]:
+def _singles(count: int, effort: Effort) -> list[Indices]:
+    """Each index by itself."""
+    if count > MAXIMUM_RUNS:
+        raise GaveUp
+    effort.spend(count)
+    return [(range(index, index + 1),) for index in range(count)]
+
+
+def _classes(nodes: Sequence[DecisionNode], count: int, effort: Effort, *, are_ranges: bool) -> list[Indices]:
     """The indices of a place's values in classes that none of its nodes tells apart, in the order of their first."""
     starts = sorted({start for node in nodes for start in node.starts})
     if len(starts) > MAXIMUM_RUNS:
         raise GaveUp
+    if are_ranges and count <= 2 * len(starts):
+        return _singles(count, effort)
+    if are_ranges:
+        return [(range(start, end),) for start, end in pairwise([*starts, count])]
     effort.spend(len(starts) * len(nodes))
     found: dict[tuple[int, ...], list[range]] = {}
     for start, end in pairwise([*starts, count]):

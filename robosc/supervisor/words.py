@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from robosc.expressions import Expression
 from robosc.expressions.text import expression_text
 from robosc.supervisor.diagram import Domains
-from robosc.supervisor.formula import OPERANDS, to_expression
-from robosc.supervisor.literals import Indices, Membership, membership, merged
+from robosc.supervisor.formula import OPERANDS, formula_in
+from robosc.supervisor.literals import Indices, Membership, Vocabulary, membership, merged, operands
 from robosc.supervisor.multivalued import Effort
 from robosc.supervisor.structure import DecisionDiagram, DecisionNode
 
@@ -70,24 +70,34 @@ class Formulas:
 
     Attributes:
         domains: The same.
+        vocabulary: Puts their tests into words.
         effort: What the search may still take.
     """
 
     def __init__(self, domains: Domains) -> None:
         self.domains = domains
+        self.vocabulary = Vocabulary(domains)
         self.effort = Effort(TOTAL_STEPS)
-        self._known: dict[DecisionDiagram, Expression | None] = {}
+        # With the operands that were allowed when they were looked for.
+        self._known: dict[DecisionDiagram, tuple[int, Expression | None]] = {}
 
-    def formula(self, diagram: DecisionDiagram) -> Expression | None:
-        """A formula that reads better than its diagram, or None where none was found."""
-        if diagram not in self._known:
-            limit = OPERANDS
-            # Every line writes down a test at least: those of very many need not be told to be counted.
-            if len(_order(*_branches(diagram, self.domains), diagram.root)) < OPERANDS:
-                tests = sum(line.operands for line in diagram_lines(diagram, self.domains, ()))
-                limit = min(OPERANDS, max(SHORT, tests))
-            self._known[diagram] = to_expression(diagram, self.domains, limit=limit, effort=self.effort)
-        return self._known[diagram]
+    def formula(self, diagram: DecisionDiagram, *, limit: int = OPERANDS) -> Expression | None:
+        """A formula that reads better than its diagram, or None where none of at most `limit` operands was found."""
+        most, found = self._known.get(diagram, (-1, None))
+        if found is None and most < limit:
+            found = formula_in(self.vocabulary, diagram, limit=limit, effort=self.effort)
+            if found is not None and self._is_longer(found, diagram):
+                found = None
+            self._known[diagram] = limit, found
+        return found if found is not None and operands(found) <= limit else None
+
+    def _is_longer(self, formula: Expression, diagram: DecisionDiagram) -> bool:
+        """Whether a formula that is not short takes more tests than its diagram, told line by line."""
+        most = operands(formula)
+        # Every line takes a test at least: those of very many need not be told to be counted.
+        if most <= SHORT or len(_order(*_branches(diagram, self.domains), diagram.root)) >= most:
+            return False
+        return most > sum(line.operands for line in diagram_lines(diagram, self.domains, ()))
 
 
 def in_words(condition: Expression, components: Collection[str]) -> str:

@@ -4,10 +4,11 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
-from robosc.synthesis.closure import Closure, Step
+from robosc.synthesis.closure import closure_under
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.fixed_point import FixedPoint, Problem, allowed, initial_states, safe_states
 from robosc.synthesis.questions import Cause, Never
+from robosc.synthesis.step import Step
 from robosc.synthesis.symbolic import Symbols
 from robosc.synthesis.transitions import Steps
 from robosc.synthesis.watch import Watch
@@ -64,7 +65,8 @@ class Causes:
             source = possible(steps)
             return Step(lambda states: steps.image(states & source), steps.names)
 
-        closure = Closure([onwards(steps) for steps in self._problem.steps], self._encoding.state_names, self._watch)
+        steps = map(onwards, self._problem.steps)
+        closure = closure_under(self._encoding, steps, self._encoding.manager.true, self._watch)
         return closure.of(initial_states(self._encoding), "reachability")
 
     def _is_possible_without_invariants(self, steps: Steps) -> bool:

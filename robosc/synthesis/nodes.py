@@ -123,23 +123,25 @@ def restrict(manager: Manager, node: Any, care: Any) -> Any:
 class _Restrict:
     def __init__(self, manager: Manager) -> None:
         self._manager = manager
+        self._constants = {int(manager.true), int(manager.false)}
         self._known: dict[tuple[int, int], tuple[Any, Any, Any]] = {}
 
     def walk(self, f: Any, c: Any) -> Any:
-        if is_constant(self._manager, c) or is_constant(self._manager, f):
-            return f
         key = (int(f), int(c))
         found = self._known.get(key)
         if found is None:
+            if not self._constants.isdisjoint(key):
+                return f
             found = self._known[key] = (f, c, self._step(f, c))
         return found[2]
 
     def _step(self, f: Any, c: Any) -> Any:
         low_c, high_c = cofactors(c)
-        if c.level < f.level:
+        here, level = f.level, c.level
+        if level < here:
             return self.walk(f, low_c | high_c)
         low_f, high_f = cofactors(f)
-        if f.level < c.level:
+        if here < level:
             return self._manager.ite(self._manager.var(f.var), self.walk(high_f, c), self.walk(low_f, c))
         if low_c == self._manager.false:
             return self.walk(high_f, high_c)

@@ -1,29 +1,33 @@
 """What the supervisor adds to an event: of the conditions that do the same in every state that matters, a short one.
 
 A condition matters where the controlled system can be, the plant enables the event and the requirements allow it. Among
-those that agree there, candidates are found in four ways: by restricting, by leaving out places of the state, and as
-sums of products for what is wanted and for what is not. The one with the shortest formula is kept, and without any the
-one with the smallest diagram. What is kept is what the supervisor holds, so its formula is right in all states.
+those that agree there, candidates are found in five ways: by restricting, by leaving out places of the state, as
+relations between integers, and as sums of products for what is wanted and for what is not. The one with the shortest
+formula is kept, and without any the one with the smallest diagram. What is kept is what the supervisor holds, so its
+formula is right in all states.
 
 Source: O. Coudert and J. C. Madre, "A unified framework for the formal verification of sequential circuits", IEEE
 ICCAD 1990, pp. 126-129 (restrict).
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from robosc.automata.state import Subject
 from robosc.errors import UnsupportedModelError
+from robosc.expressions import TRUE, IntegerType
 from robosc.supervisor.cover import Words, cover
+from robosc.supervisor.diagram import Subject as Place
 from robosc.supervisor.diagram import diagram_domains
-from robosc.supervisor.formula import STEPS
-from robosc.supervisor.literals import Size, size
+from robosc.supervisor.formula import OPERANDS, STEPS, length
+from robosc.supervisor.literals import operands
 from robosc.supervisor.multivalued import GaveUp, Space
+from robosc.supervisor.relations import MAXIMUM_PLACES, Relations
 from robosc.supervisor.structure import DecisionDiagram
 from robosc.supervisor.words import Formulas
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.encoding import Encoding
-from robosc.synthesis.nodes import node_count, restrict, support
+from robosc.synthesis.nodes import restrict, support
 
 MAXIMUM_NODES = 20_000
 """Nodes of what matters up to which more than restricting is tried."""
@@ -37,6 +41,13 @@ nodes than their values do."""
 
 MAXIMUM_SUBJECTS = 40
 """Places that a restricted condition may test: with more, no formula would be short."""
+
+
+_Length = tuple[bool, tuple[int, bool, int], int]
+"""Whether there is no formula, how long it is, and the nodes of the diagram."""
+
+_SHORT: _Length = (False, (2, False, 0), 0)
+"""Longer than a condition than which none is shorter."""
 
 
 class Simplifier:
@@ -70,27 +81,61 @@ class Simplifier:
             return extract(self._encoding, self._manager.false)
         plain = wanted & self._encoding.valid_states()
         simple = restrict(self._manager, wanted, care)
-        if node_count(self._manager, simple) > node_count(self._manager, plain):
+        if simple.dag_size > plain.dag_size:
             simple = plain
-        first = extract(self._encoding, simple)
-        is_short = self._length(first) < (False, (2, 0), 0)
-        others = [] if is_short or care.dag_size > MAXIMUM_NODES else self._others(simple, positive, negative)
-        return min(dict.fromkeys((first, *others)), key=self._length)
+        places = {self._home[name] for name in support(self._manager, simple)}
+        is_large = care.dag_size > MAXIMUM_NODES
+        first = extract(self._encoding, simple) if is_large or len(places) == 1 else None
+        if first is not None and (is_large or self._length(first) < _SHORT):
+            return first
+        found: dict[DecisionDiagram, _Length] = {}
+        limit = OPERANDS
+        for diagram in self._others(places, positive, negative):
+            if diagram in found:
+                continue
+            found[diagram] = self._length(diagram, limit)
+            if not found[diagram][0]:
+                limit = min(limit, found[diagram][1][0])
+        if all(length[0] for length in found.values()) or len(places) <= limit:
+            # What restricting gives needs a test of each of its places, and is mostly the longest: soon given up.
+            first = extract(self._encoding, simple)
+            found[first] = self._length(first, limit)
+            return min((first, *found), key=lambda diagram: found[diagram])
+        return min(found, key=lambda diagram: found[diagram])
 
-    def _length(self, diagram: DecisionDiagram) -> tuple[bool, Size, int]:
+    def _length(self, diagram: DecisionDiagram, limit: int = OPERANDS) -> _Length:
         """How long a condition's formula is; one without a formula is longer than any with."""
-        found = self._formulas.formula(diagram)
-        return found is None, (0, 0) if found is None else size(found), len(diagram.nodes)
+        nodes = len(diagram.nodes)
+        formula = None
+        # Unless places are tested again, or compared with each other, no formula has more nodes than operands.
+        if nodes <= limit or limit == OPERANDS or len(self._integers([diagram])) > 1:
+            formula = self._formulas.formula(diagram, limit=limit)
+        return formula is None, length(TRUE if formula is None else formula), nodes
 
-    def _others(self, simple: Any, positive: Any, negative: Any) -> Iterator[DecisionDiagram]:
-        """Other conditions that are true in the positive states and false in the negative ones."""
-        tested = {self._home[name] for name in support(self._manager, simple)}
+    def _integers(self, diagrams: Iterable[DecisionDiagram]) -> list[Place]:
+        """The integers that diagrams test."""
+        return [subject for subject in _subjects(diagrams) if isinstance(self._domains[subject].type, IntegerType)]
+
+    def _others(self, tested: set[Subject], positive: Any, negative: Any) -> Iterator[DecisionDiagram]:
+        """Other conditions over some places that are true in the positive states and false in the negative ones."""
         if len(tested) > MAXIMUM_SUBJECTS:
             return
         # Both stay apart: a condition over the places that are left tells them from each other.
         away = [name for name in self._encoding.state_names if self._home[name] not in tested]
-        positive, negative = self._away(away, positive), self._away(away, negative)
-        yield from self._sums(*self._needed(tested, positive, negative))
+        positive, negative = self._needed(tested, self._away(away, positive), self._away(away, negative))
+        if self._is_large(positive) or self._is_large(negative):
+            return
+        try:
+            diagrams = [extract(self._encoding, states, MAXIMUM_RANGES) for states in (positive, negative)]
+        except UnsupportedModelError:
+            return
+        for diagram in self._related(diagrams):
+            yield diagram
+            found = self._formulas.formula(diagram)
+            if found is not None and operands(found) <= len(_subjects(diagrams)):
+                # Each place is needed.
+                return
+        yield from self._sums(diagrams)
 
     def _away(self, names: Iterable[str], states: Any) -> Any:
         """The values that the other places have in states, whatever some have."""
@@ -115,18 +160,38 @@ class Simplifier:
     def _is_large(self, states: Any) -> bool:
         return bool(states.dag_size > MAXIMUM_KEPT_NODES)
 
-    def _sums(self, positive: Any, negative: Any) -> Iterator[DecisionDiagram]:
-        """The states that a short sum of products covers: one for the positive states, one for the negative."""
-        if self._is_large(positive) or self._is_large(negative):
+    def _related(self, diagrams: Sequence[DecisionDiagram]) -> Iterator[DecisionDiagram]:
+        """The states that relations between integers and a short sum of products describe together."""
+        integers = self._integers(diagrams)
+        if not 2 <= len(integers) <= MAXIMUM_PLACES:
             return
         try:
-            diagrams = [extract(self._encoding, states, MAXIMUM_RANGES) for states in (positive, negative)]
+            space = Space(diagrams, self._domains, self._formulas.effort.part(STEPS), apart=integers)
+            relations = Relations(space, Words(space, self._formulas.vocabulary), self._domains)
+            sets = [space.of(diagram) for diagram in diagrams]
+            places = relations.integers(range(len(space.subjects)))
+            pairs = [(sets[0], sets[1]), (sets[1], sets[0])]
+            pairs = [pair for pair in pairs if relations.are_enough(*pair, places)] or pairs
+        except GaveUp:
+            return
+        for wanted, forbidden in pairs:
+            try:
+                with space.within(self._formulas.effort.part(STEPS)):
+                    for description in relations.around(wanted, forbidden, places):
+                        states = relations.states(description)
+                        yield space.diagram(states if wanted == sets[0] else space.without(1, states))
+            except GaveUp:
+                continue
+
+    def _sums(self, diagrams: Sequence[DecisionDiagram]) -> Iterator[DecisionDiagram]:
+        """The states that a short sum of products covers: one for the positive states, one for the negative."""
+        try:
             space = Space(diagrams, self._domains, self._formulas.effort.part(STEPS))
-            words = Words(space, self._domains)
+            words = Words(space, self._formulas.vocabulary)
             sets = [space.of(diagram) for diagram in diagrams]
             # What has fewer ways to true mostly has the shorter sum.
             pairs = sorted((sets, sets[::-1]), key=lambda pair: space.paths(pair[0]))
-        except (GaveUp, UnsupportedModelError):
+        except GaveUp:
             return
         for wanted, forbidden in pairs:
             try:
@@ -139,3 +204,8 @@ class Simplifier:
             if len(cubes) == 1:
                 # The other sum would say the same the other way round.
                 return
+
+
+def _subjects(diagrams: Iterable[DecisionDiagram]) -> set[Place]:
+    """The places that diagrams test."""
+    return {(node.automaton, node.variable) for diagram in diagrams for node in diagram.nodes}

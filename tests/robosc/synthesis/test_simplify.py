@@ -1,18 +1,20 @@
 """Simplified conditions against the slow way: every valuation, every reachable state, both engines."""
 
 import sys
+from dataclasses import replace
 from itertools import product
 from math import prod
+from random import Random
 from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robosc.automata import System
+from robosc.automata import DiscreteVariable, System
 from robosc.automata.semantics import Semantics
 from robosc.automata.state import subjects
-from robosc.expressions import Expression
+from robosc.expressions import Binary, BinaryOperator, Expression, IntegerType, StateTest
 from robosc.expressions.evaluate import evaluate as evaluate_expression
 from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.diagram import diagram_domains, validate
@@ -24,8 +26,11 @@ from robosc.synthesis.nodes import restrict
 from robosc.verification import synthesize_explicit
 from support.families import FAMILIES
 from support.random_systems import random_system
+from support.systems import automaton, edge, operation, read, system
 
 MOST_STATES = 2_000
+SIGNS: list[BinaryOperator] = ["+", "-"]
+COMPARISONS: list[BinaryOperator] = ["<=", "<", ">="]
 
 
 def plain(system: System, formula: Expression, state: tuple[Any, ...]) -> Any:
@@ -62,6 +67,45 @@ def test_random_systems(seed: int) -> None:
     found = synthesize(system, engine="autoref")
     if found.status is SynthesisStatus.SUPERVISOR:
         check_conditions(system, found.added)
+
+
+def counters(seed: int) -> System:
+    """Two or three counters that some events raise and others lower, and what must hold between them."""
+    dice = Random(seed)
+    names = "abc"[: dice.choice([2, 2, 3])]
+    automata = []
+    for name in names:
+        low = dice.randint(-2, 1)
+        high = low + dice.randint(2, 5)
+        level = read(f"{name}.n")
+        edges = [
+            edge(f"still -{name}_raise-> moving"),
+            edge(f"moving -u_{name}_raised-> still", n=operation(level, "+", dice.randint(1, 2))),
+            edge(f"still -{name}_lower-> still", n=operation(level, "-", 1)),
+        ]
+        variables = [DiscreteVariable("n", IntegerType(low, high), (low,))]
+        automata.append(automaton(name, edges, marked=["still"], variables=variables))
+    first, second, *others = (read(f"{name}.n") for name in dice.sample(names, len(names)))
+    total = operation(first, dice.choice(SIGNS), second)
+    for other in others:
+        total = operation(total, dice.choice(SIGNS), other)
+    required = [operation(total, dice.choice(COMPARISONS), dice.randint(-1, 3))]
+    if dice.random() < 0.5:
+        required.append(Binary("or", StateTest("a", "still"), operation(first, "!=", second)))
+    return replace(system(*automata), invariants=tuple(required))
+
+
+def test_counters_that_depend_on_each_other() -> None:
+    together = ""
+    for seed in range(12):
+        system_ = counters(seed)
+        found = synthesize(system_, engine="autoref")
+        if found.status is SynthesisStatus.SUPERVISOR:
+            check_conditions(system_, found.added)
+            formulas = [Formulas(diagram_domains(system_)).formula(item.condition) for item in found.added]
+            together += "; ".join(in_words(formula, ()) for formula in formulas if formula is not None)
+    for part in ("a.n + b.n <= ", "a.n != b.n"):
+        assert part in together, together
 
 
 @pytest.mark.parametrize(("family", "size"), [("dining philosophers", 3), ("cat and mouse, 1 pair", 2)])

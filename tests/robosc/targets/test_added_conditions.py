@@ -31,6 +31,12 @@ def test_a_formula_stands_beside_its_words() -> None:
     assert "_node_" not in text
 
 
+def test_a_relation_between_integers_is_one_comparison() -> None:
+    text = controller("budget")
+    assert "and self.Drive__n + self.Arm__load + self.Lamp__level <= 4\n" in text
+    assert "_node_" not in text
+
+
 def test_a_diagram_becomes_methods_that_share_nodes() -> None:
     text = controller("parity")
     assert "# added by the supervisor: a decision diagram of 11 nodes\n" in text

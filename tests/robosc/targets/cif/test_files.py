@@ -55,6 +55,23 @@ def test_examples(name: str, deployment: Deployment) -> None:
     assert assert_same_control(supervisor, reachable=10 * states) >= states
 
 
+GOLDEN = Path(__file__).parents[2] / "supervisor" / "golden"
+
+
+@pytest.mark.parametrize(
+    ("name", "test"),
+    [
+        ("capacity", "component_Bolts.v_n + component_Nuts.v_m <= 19"),
+        # What is -2 in the model is 0 in the file.
+        ("follower", "component_First.v_at >= component_Second.v_at"),
+    ],
+)
+def test_relations_between_integers(name: str, test: str) -> None:
+    supervisor = made((GOLDEN / f"{name}.rscd").read_text(encoding="utf-8"))
+    assert test in generate(supervisor, "cif")["supervisor.cif"]
+    assert assert_same_control(supervisor, reachable=100, others=50) >= 100
+
+
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.booleans())
 def test_random_supervisors(seed: int, is_layer: bool) -> None:

@@ -195,6 +195,8 @@ class _Event:
         source = model.enum(declared.name).source if isinstance(declared, EnumType) else declared
         # A basic type stands for one field of the message.
         self._base: Path = () if isinstance(source, ObjectType) else root
+        # Not linked, it is received as a ROS integer of 16 bits; linked, it may be one that is wider than ours.
+        self._is_narrow = item.interface is None and isinstance(source, IntegerType)
         self._message: Hashable = item.interface or (type(source), getattr(source, "name", None))
         inputs = [one for one in system.inputs if one.event == item.event(EventKind.RESPONSE)]
         self._free: list[InputVariable] = []
@@ -249,8 +251,9 @@ class _Event:
         is_element = any(isinstance(step, int) for step in path)
         kind = type_.name if isinstance(type_, EnumType) else type(type_)
         key = (self._message, (*self._base, *path), kind)
-        # A received double may be no number.
-        may_be_unknown = is_element or isinstance(type_, DoubleType)
+        # A received double may be no number, and a received integer too large for 32 bits; in a range it is clamped.
+        is_wide = isinstance(type_, IntegerType) and not self._is_narrow and (type_.low is None or type_.high is None)
+        may_be_unknown = is_element or is_wide or isinstance(type_, DoubleType)
         ends: list[float | str] = []
         if isinstance(type_, IntegerType):
             ends = [end for end in (type_.low, type_.high) if end is not None]

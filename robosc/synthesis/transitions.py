@@ -225,6 +225,7 @@ class Steps:
         """Whether it leads to one state at most."""
         self.names = _names(encoding, transition)
         """The current-state variables that it reads or changes."""
+        self._state_names = encoding.state_names
         self._in_range = transition.possible & ~transition.out_of_range
         self._changed = tuple(transition.functions)
         self._arrival = encoding.all_of(
@@ -243,6 +244,8 @@ class Steps:
         """The same event under other event conditions."""
         other = copy(self)
         other.condition = condition & self._transition.watched
+        read = support(self._manager, other.condition)
+        other.names = self.names | (frozenset(self._state_names) & read)
         return other
 
     def moving(self) -> Any:

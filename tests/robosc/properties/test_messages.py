@@ -1,5 +1,7 @@
 """Events of one middleware message: a fault that needs them to disagree is none, any other one is."""
 
+import re
+
 import pytest
 
 from robosc.automata import to_automata
@@ -10,7 +12,9 @@ from support.models import model_of
 
 ROBOT = """robot R {
     interface sample use Sample from sensing
-    datatype object Sample { x: double y: double on_: boolean name: string part: array(double) }
+    datatype object Sample {
+        x: double y: double on_: boolean name: string n: integer w: integer(0..9) part: array(double)
+    }
     datatype enum First from %(first_type)s to { %(first)s -> first_yes default -> first_no }
     datatype enum Second from %(second_type)s to { %(second)s -> second_yes default -> second_no }
     component Eye {
@@ -109,6 +113,35 @@ def test_other_types(first: str, second: str, types: tuple[str, ...], can_be: bo
 )
 def test_properties_of_an_object(first: str, second: str, can_be: bool) -> None:
     assert spins(first, second, "Sample") is can_be
+
+
+@pytest.mark.parametrize(
+    ("field", "types", "can_be"),
+    [
+        # Beyond 32 bits it is unknown, so that neither rule is true and both enums have their default.
+        ("value.n", "Sample", True),
+        ("value.w", "Sample", False),
+        ("value", "integer", False),
+    ],
+)
+def test_an_integer_that_may_be_too_large(field: str, types: str, can_be: bool) -> None:
+    swapped = {"first_yes": "first_no", "first_no": "first_yes", "second_yes": "second_no", "second_no": "second_yes"}
+    enums, rest = ROBOT.split("component Eye", 1)
+    enums = re.sub("|".join(swapped), lambda found: swapped[found[0]], enums)
+    values = {"first": f"{field} < 5", "second": f"{field} >= 5", "first_type": types, "second_type": types}
+    text = f"{enums}component Eye{rest}" % {
+        **values,
+        "topic": "sample",
+        "links": "links sample" if types == "Sample" else "",
+    }
+    model = model_of(
+        text.replace("variable a: First", "variable a: First = first_no").replace(
+            "variable b: Second", "variable b: Second = second_no"
+        )
+    )
+    added = synthesize(to_automata(model, Deployment.CONTROLLER)).added
+    found = check_controller(model, Deployment.CONTROLLER, added, is_nonblocking=True)
+    assert found.finite_response == ("failed" if can_be else "passed")
 
 
 @pytest.mark.parametrize(("limit", "can_be"), [(2, False), (1, True)])

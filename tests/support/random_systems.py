@@ -132,7 +132,9 @@ class _Builder:
         self.variables = {
             (name, f"v{number}"): self._type() for name in names for number in range(random.choice((0, 1, 1, 2)))
         }
-        self.inputs = tuple(item for event in self.events if not event.is_controllable for item in self._inputs(event))
+        # Data of a controllable event is the environment's choice, too: wherever it leads must be good.
+        carrying = [event for event in self.events if not event.is_controllable or (is_wide and self._chance(0.25))]
+        self.inputs = tuple(item for event in carrying for item in self._inputs(event))
 
     def _chance(self, share: float) -> bool:
         return self.random.random() < share

@@ -25,10 +25,11 @@ class _ListTargets(argparse.Action):
     """`--list-targets`: print what can be generated and leave, without a model."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object, **__: object) -> None:
-        from robosc.targets import available_targets
+        from robosc.targets import ALL, available_targets
 
         for target in available_targets():
             sys.stdout.write(f"{target.name:10} {target.description}\n")
+        sys.stdout.write(f"{ALL:10} all of them, each in a folder of its own\n")
         parser.exit()
 
 
@@ -49,7 +50,9 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 def add_generate_arguments(parser: argparse.ArgumentParser) -> None:
     """What to generate, and where to."""
-    parser.add_argument("--target", required=True, metavar="NAME", help="what to generate: see --list-targets")
+    parser.add_argument(
+        "--target", required=True, metavar="NAME", help="what to generate: see --list-targets; all for everything"
+    )
     parser.add_argument("--list-targets", action=_ListTargets, nargs=0, help="list what can be generated")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="folder to write to")
     parser.add_argument("--force", action="store_true", help="overwrite generated files even where you changed them")
@@ -57,12 +60,12 @@ def add_generate_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Synthesize, generate and write; 0 if files were written."""
-    from robosc.targets import generate, judged_for, require_target
+    from robosc.targets import generated, require_generatable
 
-    require_target(arguments.target)
+    require_generatable(arguments.target)
     bundle = read_bundle(arguments)
-    made = judged_for(synth.make(arguments, bundle, allow_livelock=arguments.allow_livelock), arguments.target)
-    files = generate(made.supervisor, arguments.target) if made.supervisor else None
+    made = synth.make(arguments, bundle, allow_livelock=arguments.allow_livelock)
+    made, files = generated(made, arguments.target)
     return report_generated(arguments, made, files, bundle)
 
 
@@ -70,10 +73,12 @@ def report_generated(
     arguments: argparse.Namespace, made: "Made", files: "GeneratedFiles | None", bundle: Bundle
 ) -> ExitCode:
     """Write the files, print the outcome as asked and return the exit status."""
-    from robosc.targets import write_files
+    from robosc.targets import refusals, write_files
 
     written: list[str] = []
+    left_out: tuple[str, ...] = ()
     if files is not None:
+        left_out = refusals(files, arguments.target)
         written = [str(path) for path in write_files(files, arguments.output, force=arguments.force)]
     if arguments.json:
         print_json(
@@ -83,6 +88,7 @@ def report_generated(
                 "target": arguments.target,
                 "folder": str(arguments.output),
                 "files": written,
+                "left_out": list(left_out),
                 **diagnostics_json(made.diagnostics),
             }
         )
@@ -90,4 +96,6 @@ def report_generated(
         synth.report_problems(made, bundle)
         for path in written:
             sys.stdout.write(f"{path}\n")
+        if left_out:
+            sys.stderr.write(f"not generated: {', '.join(left_out)}; README.md says why\n")
     return ExitCode.OK if files is not None else ExitCode.FAILED

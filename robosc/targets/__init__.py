@@ -4,6 +4,7 @@ A target reads a supervisor and returns files as text (`GeneratedFiles`); `write
 that writes them. Same supervisor, same bytes: no time, no machine path, everything sorted.
 """
 
+from robosc.targets.everything import ALL, generated, refusals, require_generatable
 from robosc.targets.files import GeneratedFiles, OverwriteError, write_files
 from robosc.targets.judgement import judged_for
 from robosc.targets.registry import (
@@ -17,6 +18,7 @@ from robosc.targets.registry import (
 )
 
 __all__ = [
+    "ALL",
     "GenerateOptions",
     "GeneratedFiles",
     "OverwriteError",
@@ -24,8 +26,11 @@ __all__ = [
     "UnknownTargetError",
     "available_targets",
     "generate",
+    "generated",
     "judged_for",
+    "refusals",
     "register",
+    "require_generatable",
     "require_target",
     "write_files",
 ]

@@ -224,10 +224,10 @@ def _figures(supervisor: "Supervisor") -> Figures:
 
 
 def _generate(job: GenerateJob, on_report: Callable[[Report], None]) -> GenerateOutcome | Refused:
-    from robosc.targets import UnknownTargetError, generate, judged_for, require_target
+    from robosc.targets import UnknownTargetError, generated, require_generatable
 
     try:
-        require_target(job.target)
+        require_generatable(job.target)
     except UnknownTargetError as error:
         return Refused(str(error))
     made = _made(job.synthesis, on_report)
@@ -235,12 +235,11 @@ def _generate(job: GenerateJob, on_report: Callable[[Report], None]) -> Generate
         return made
     if isinstance(made, SynthesizeOutcome):
         return GenerateOutcome(str(made.status), made.diagnostics, made.reason)
-    made = judged_for(made, job.target)
-    if made.supervisor is None:
-        return GenerateOutcome(str(made.status), made.diagnostics, made.reason, explanation=_explanation(made))
     try:
-        files = generate(made.supervisor, job.target)
+        made, files = generated(made, job.target)
     except UnsupportedModelError as error:
         return GenerateOutcome(UNSUPPORTED_MODEL, made.diagnostics, str(error))
+    if files is None:
+        return GenerateOutcome(str(made.status), made.diagnostics, made.reason, explanation=_explanation(made))
     listing = tuple((path, text, path in files.executables) for path, text in files.items())
     return GenerateOutcome(str(made.status), made.diagnostics, "", listing)

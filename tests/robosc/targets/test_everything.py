@@ -1,0 +1,119 @@
+"""All targets at once: what each gives alone, in folders, and what refuses is told."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from robosc.cli.main import main
+from robosc.errors import UnsupportedModelError
+from robosc.model.structure import Deployment
+from robosc.supervisor import Made, make_supervisor
+from robosc.targets import (
+    ALL,
+    GeneratedFiles,
+    GenerateOptions,
+    TargetInfo,
+    UnknownTargetError,
+    available_targets,
+    generate,
+    generated,
+    refusals,
+    register,
+    registry,
+    require_generatable,
+)
+from robosc.targets.registry import Target
+from support.models import bundle_of
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+MAZE = EXAMPLES / "maze_solver" / "maze_solver.rscd"
+
+SPACES = """robot Spaces {
+    component Arm {
+        incoming message lift with identifier: "with spaces", type: none
+        behaviour { initial marked state there { on request to lift } }
+    }
+}"""
+
+
+@pytest.fixture(autouse=True)
+def own_registry(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "_registered", {})
+
+
+def made_of(text: str) -> Made:
+    return make_supervisor(bundle_of(text), deployment=Deployment.CONTROLLER)
+
+
+def refusing(name: str) -> None:
+    """A target that refuses every model."""
+
+    def refuse(supervisor: object, options: GenerateOptions) -> GeneratedFiles:
+        raise UnsupportedModelError("no | model\nwill do")
+
+    register(Target(TargetInfo(name, "picky"), refuse))
+
+
+def test_each_target_gives_what_it_gives_alone() -> None:
+    made = made_of(MAZE.read_text(encoding="utf-8"))
+    judged, files = generated(made, ALL)
+    assert judged == made
+    assert files is not None
+    assert made.supervisor is not None
+    expected = {"README.md"}
+    for info in available_targets():
+        alone = generate(made.supervisor, info.name)
+        expected |= {f"{info.name}/{path}" for path in alone}
+        assert {path: files[f"{info.name}/{path}"] for path in alone} == dict(alone)
+        assert {f"{info.name}/{path}" for path in alone.executables} <= files.executables
+    assert set(files) == expected
+    assert refusals(files, ALL) == ()
+    assert generated(made, ALL)[1] == files
+
+
+def test_what_refuses_is_left_out_and_told() -> None:
+    refusing("cobol")
+    _, files = generated(made_of(MAZE.read_text(encoding="utf-8")), ALL)
+    assert files is not None
+    assert refusals(files, ALL) == ("cobol",)
+    assert "| cobol | picky | not generated: no \\| model will do |" in files["README.md"].splitlines()
+    assert refusals(files, "cif") == ()
+
+
+def test_an_error_of_one_target_leaves_out_that_one() -> None:
+    made = made_of(SPACES)
+    assert generated(made, "ros2")[1] is None
+    _, files = generated(made, ALL)
+    assert files is not None
+    assert "ros2" in refusals(files, ALL)
+    assert "python" not in refusals(files, ALL)
+    assert "[invalid-identifier]" in files["README.md"]
+
+
+def test_where_every_target_refuses_there_is_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "_BUILT_IN", {})
+    refusing("cobol")
+    with pytest.raises(UnsupportedModelError, match="no target can do this model"):
+        generated(made_of(MAZE.read_text(encoding="utf-8")), ALL)
+
+
+def test_names() -> None:
+    require_generatable(ALL)
+    with pytest.raises(UnknownTargetError):
+        require_generatable("every")
+
+
+def test_without_a_supervisor_there_are_no_files() -> None:
+    made, files = generated(made_of("robot R { nonsense }"), ALL)
+    assert (made.supervisor, files) == (None, None)
+
+
+def test_the_command_tells_what_is_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    refusing("cobol")
+    assert main(["generate", str(MAZE), "--target", "all", "-o", str(tmp_path)]) == 0
+    out, err = capsys.readouterr()
+    assert f"{tmp_path / 'README.md'}\n" in out
+    assert "not generated: cobol; README.md says why\n" in err
+    assert main(["generate", str(MAZE), "--target", "all", "-o", str(tmp_path), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["left_out"] == ["cobol"]

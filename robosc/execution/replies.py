@@ -47,6 +47,9 @@ class Replies:
             self._steps.happen("{}.error".format(service), None, "timeout")
             self._steps.settle()
         for goal in self._goals.expired(now_s):
+            if not goal.is_running:
+                # What another one's end led to has cancelled it.
+                continue
             goal.is_running = False
             self._steps.happen(goal.action + ".error", None, "timeout")
             self._steps.settle()

@@ -67,6 +67,15 @@ class Twins:
             if item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION):
                 assert self.generated.location(item.name) == self.interpreted.location(item.name)
 
+    def match(self, data: Any) -> None:
+        """Which incoming messages a message could be."""
+        for item in self.model.communications:
+            if item.kind is CommunicationKind.INCOMING_MESSAGE:
+                generated, interpreted = (s.matches(item.name, data) for s in (self.generated, self.interpreted))
+                assert tuple(generated) == tuple(interpreted), (item.name, data)
+                self.seen["match" if interpreted.holds else "no match"] += item.when is not None
+                self.seen["unknown in a condition"] += bool(interpreted.unknown)
+
     def step(self, event: str, data: Any = None) -> tuple[str, ...] | None:
         """Take an event, with data if it is one of the environment."""
         readings: list[Any] = [None, None]
@@ -101,6 +110,7 @@ class Twins:
                 enabled = [name for name in names if is_controllable(name) and self.interpreted.enabled(name)]
                 event = dice.choice(enabled) if enabled else event
             self.step(event, random_data(dice))
+            self.match(random_data(dice))
         self.compare()
         self.generated.restart()
         self.interpreted.restart()
@@ -135,6 +145,7 @@ def test_the_random_supervisors_show_everything() -> None:
         total[what] > least
         for what, least in {"enabled": 500, "disabled": 500, "unknown": 10, "unknown enum": 10, "skipped": 30}.items()
     )
+    assert total["match"] > 100 and total["no match"] > 100 and total["unknown in a condition"] > 10
 
 
 @pytest.mark.parametrize(("name", "deployment"), EXAMPLE_DEPLOYMENTS)

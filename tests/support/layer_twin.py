@@ -97,6 +97,7 @@ class LayerTwin:
     Attributes:
         told: Everything that either side was told, in order; the caller's ends of one step come last, sorted.
         events: Every event that happened.
+        unexpected: Replies that the model did not wait for, and cancels of what has ended for the caller.
     """
 
     def __init__(self, supervisor: Supervisor, settings: dict[str, Any]) -> None:
@@ -106,6 +107,7 @@ class LayerTwin:
         self.now = 0.0
         self.told: list[Told] = []
         self.events: list[str] = []
+        self.unexpected = 0
         self.calls: list[TwinCall] = []
         self.goals: list[TwinGoal] = []
         self.last_call = self.last_goal = 0
@@ -240,7 +242,10 @@ class LayerTwin:
             self.told += [("goal", action, goal.number, message), ("accept", action, caller)]
 
     def cancelled_by_caller(self, goal: TwinGoal) -> None:
-        if goal.has_ended_for_caller or goal.was_cancelled_by_caller:
+        if goal.has_ended_for_caller:
+            self.unexpected += 1
+            return
+        if goal.was_cancelled_by_caller:
             return
         goal.was_cancelled_by_caller = True
         goal.runs_in_model = False
@@ -292,6 +297,8 @@ class LayerTwin:
             with self.guard():
                 assert self.take(f"{goal.action}.feedback")
                 self.settle()
+        else:
+            self.unexpected += 1
         # Also if this very feedback turns the goal against its requirements.
         if not goal.has_ended_for_caller:
             self.told.append(("feedback", goal.action, goal.caller, data))
@@ -303,6 +310,8 @@ class LayerTwin:
             with self.guard():
                 assert self.take(f"{goal.action}.{'response' if outcome == 'succeeded' else 'error'}")
                 self.settle()
+        elif outcome == "succeeded":
+            self.unexpected += 1
         if not goal.has_ended_for_caller:
             as_it_is = outcome in ("succeeded", "cancelled") if goal.was_cancelled_by_caller else outcome == "succeeded"
             told = outcome if as_it_is else "aborted"

@@ -224,6 +224,15 @@ def test_what_a_request_makes_due_goes_out_before_it() -> None:
     assert b.request("/beep") == [ZERO, ("publish", "beep", None)]
 
 
+def test_what_a_request_makes_false_does_not_release_its_own_earlier_message() -> None:
+    text = ROBOT.replace("free { on request to move ", "free { on request to move goto silent ")
+    b = layer(text.replace("needs Sensor.is_clear", "needs Wheels.free"))
+    assert b.request("/cmd_vel", ON) == [MOVE]
+    # It went back by itself: `move` is enabled again, and the same message once more releases nothing.
+    b.receive("/power", False)
+    assert b.request("/cmd_vel", ON) == [MOVE]
+
+
 @pytest.mark.parametrize("timeout_s", [1.0, 0.25])
 def test_a_silent_caller_is_released(timeout_s: float) -> None:
     b = layer(ROBOT) if timeout_s == 1.0 else layer(ROBOT, command_timeout_s=timeout_s)

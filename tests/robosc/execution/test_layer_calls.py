@@ -302,6 +302,14 @@ def test_a_cancelled_goal_no_longer_turns_against_its_requirements() -> None:
     b.cancel("drive", "g")
     assert b.receive("safe", False) == [("pass", "safe", False)]
     assert b.end(1, "cancelled") == end("cancelled")
+    assert b.executor.counters.unexpected == 0
+
+
+def test_a_cancelled_goal_no_longer_takes_too_long() -> None:
+    b = driving(action_timeout_s=2.0)
+    b.cancel("drive", "g")
+    assert b.wait(3.0) == []
+    assert b.executor.counters.unexpected == 0
 
 
 def test_a_refused_cancel_of_a_running_goal_is_a_fault_also_if_the_caller_wanted_it() -> None:

@@ -129,6 +129,7 @@ class Pair:
             x for x in map(repr, right) if x[2:].split("'")[0] not in ends
         ]
         assert bench.events == twin.events
+        assert bench.executor.counters.unexpected == twin.unexpected
         assert bench.system.state() == twin.system.state()
         assert (bench.status() in (Status.STOPPED, Status.STOPPING)) is bool(twin.reasons)
         assert bench.executor.is_faulty is ("fault" in twin.reasons)

@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from collections.abc import Callable
 from random import Random
 from typing import Any
 
@@ -18,6 +19,7 @@ from robosc.expressions.evaluate import evaluate
 from robosc.model.structure import Communication, CommunicationKind, Deployment
 from robosc.supervisor.structure import Supervisor
 from support.execution import supervisor_of
+from support.generated import load_system
 from support.layer_twin import LayerTwin, TwinCall, TwinGoal
 from support.layers import LayerBench
 from support.random_controllers import SAMPLE, random_robot
@@ -79,9 +81,14 @@ class Watched(InterpretedSystem):
 
 
 class Pair:
-    """A layer and its twin in one world."""
+    """A layer and its twin in one world.
 
-    def __init__(self, seed: int) -> None:
+    Args:
+        seed: Decides the robot and all that happens.
+        load: Makes the layer's system of a supervisor.
+    """
+
+    def __init__(self, seed: int, load: Callable[[Supervisor], Any] = Watched) -> None:
         dice = self.dice = Random(seed)
         supervisor = random_layer(dice)
         model = supervisor.model
@@ -97,7 +104,7 @@ class Pair:
             "command_timeout_s": dice.choice((0.0, 0.5, 1.0)),
             "max_age_s": {name: 3.0 for name in topics if dice.random() < 0.2},
         }
-        self.system = Watched(supervisor)
+        self.system = load(supervisor)
         self.bench = LayerBench(self.system, **self.settings)
         self.twin = LayerTwin(supervisor, self.settings)
         self.callers = 0
@@ -238,6 +245,11 @@ class Pair:
 @given(st.integers(0, 2**32))
 def test_the_layer_does_what_its_twin_does(seed: int) -> None:
     Pair(seed).run(STEPS)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_so_does_a_layer_on_generated_code(seed: int) -> None:
+    Pair(seed, load_system).run(STEPS)
 
 
 @pytest.fixture(scope="module")

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 from robosc.execution.edges import have_fallen, held_ever
-from robosc.execution.protocol import ControlledSystem
+from robosc.execution.protocol import ControlledSystem, RobotSide
 
 FOREVER = float("inf")
 
@@ -35,17 +35,26 @@ class Calls:
         self._calls: Dict[int, Call] = {}
         self._next_id = 1
 
-    def open(self, service: str, now_s: float) -> int:
-        """The id of a new call."""
+    def call(self, robot: RobotSide, service: str, message: Any, now_s: float) -> int:
+        """Call a service: the id of the new call. Nothing is awaited from a call that could not be made."""
         number = self._next_id
         self._next_id += 1
         self._calls[number] = Call(service, now_s + self._timeout_s)
+        try:
+            robot.call(service, number, message)
+        except Exception:
+            self.close(number)
+            raise
         return number
 
     def close(self, number: int) -> Optional[str]:
         """End a call: its service, or None if no such call is under way."""
         call = self._calls.pop(number, None)
         return None if call is None else call.service
+
+    def is_open(self, number: int) -> bool:
+        """Whether a call is under way."""
+        return number in self._calls
 
     def expired(self, now_s: float) -> List[int]:
         """Ids of the calls whose time is over."""
@@ -117,12 +126,20 @@ class Goals:
     def __bool__(self) -> bool:
         return bool(self._goals)
 
-    def open(self, action: str, now_s: float) -> Goal:
-        """A new goal; the system is in the stable state after its request."""
+    def send(self, robot: RobotSide, action: str, message: Any, now_s: float) -> Goal:
+        """Send a new goal; the system is in the stable state after its request.
+
+        Nothing is awaited from a goal that could not be sent.
+        """
         goal = Goal(self._next_id, action, now_s + self._timeout_s, self._system.requirements(action))
         self._next_id += 1
         goals = [*self._goals.values(), goal]
         self._goals = {item.number: item for item in sorted(goals, key=lambda g: self._actions.index(g.action))}
+        try:
+            robot.send_goal(action, goal.number, message)
+        except Exception:
+            self.close(goal.number)
+            raise
         return goal
 
     def find(self, number: int) -> Optional[Goal]:

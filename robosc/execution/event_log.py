@@ -6,7 +6,7 @@ An entry is a dict with `time` (seconds since 1970-01-01 UTC), `kind` and, by ki
     unexpected  something that the state could not accept: event or what
     unknown     event and what was unknown; a request of this kind was not issued
     release     the default message went out: identifier
-    blocked     a supervision layer held a request back: identifier
+    blocked     a supervision layer held a request back: identifier, why
     fault       a fault: what
     stop        a safe stop that is no fault (a stale sensor, a signal): what
     resume      the end of such a stop: what
@@ -23,6 +23,8 @@ import threading
 import time
 from pathlib import Path
 from typing import Any, Dict, List, Protocol, TextIO
+
+from robosc.execution.foreign import fields_of
 
 Entry = Dict[str, Any]
 
@@ -137,7 +139,12 @@ class JsonLinesLog:
         self._try(self._stream.close)
 
     def _write_line(self, entry: Entry) -> None:
-        line = json_line(entry)
+        try:
+            line = json_line(entry)
+        except Exception:
+            # An entry may hold a message of any class, which may do anything when it is asked for its parts.
+            self._lost += 1
+            return
         # After a failure the last line may be cut off: the next one must not become part of it.
         if self._try(lambda: self._stream.write("\n" + line if self._is_torn else line)):
             self._is_torn = False
@@ -187,7 +194,7 @@ def json_line(entry: Entry) -> str:
 
 
 def plain(value: Any, depth: int = 0) -> Any:
-    """A value in what JSON knows: NaN, infinities, very long integers and foreign objects as text."""
+    """A value in what JSON knows: messages by their fields; NaN, infinities, long integers, other objects as text."""
     if value is None or value is True or value is False or isinstance(value, str):
         return value
     if isinstance(value, int):
@@ -199,4 +206,7 @@ def plain(value: Any, depth: int = 0) -> Any:
             return {str(plain(key)): plain(item, depth + 1) for key, item in value.items()}
         if isinstance(value, (list, tuple)):
             return [plain(item, depth + 1) for item in value]
+        fields = fields_of(value)
+        if fields:
+            return {name: plain(item, depth + 1) for name, item in fields.items()}
     return type(value).__name__

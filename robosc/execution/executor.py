@@ -1,72 +1,21 @@
-"""The executor of a controller: semantics part 3, points 1 to 6 and 8, around any `ControlledSystem`.
-
-Its adapter drives it from one thread: `tick` once a period, the other methods when something comes. Its
-middleware must not call it back from within. No method raises: an exception of the system or of the
-middleware becomes a fault, and the robot comes to rest.
-
-A request is always taken in this order: prepare its message, take the event, silent steps to the end,
-releases that it made due, send the message. So no request is decided on a state that lags behind.
-"""
+"""The executor of a controller: it issues the requests itself (semantics 3.5), on top of what all executors do."""
 
 from __future__ import annotations
 
-from enum import Enum
-from functools import wraps
-from typing import Any, Callable, Dict, Optional, Tuple, TypeVar, cast
+from typing import Optional
 
-from robosc.execution.calls import Calls, Goals
-from robosc.execution.clock import Clock, SystemClock
+from robosc.execution.clock import Clock
 from robosc.execution.decision import Policy, make_policy
-from robosc.execution.event_log import EventLog, NullLog
-from robosc.execution.protocol import CommunicationInfo, ControlledSystem, Description, Middleware
-from robosc.execution.recorder import Counters, Recorder
-from robosc.execution.release import Releases
-from robosc.execution.replies import Replies
-from robosc.execution.requests import Decisions, by_identifier, requests_of
-from robosc.execution.rest import Rest, describe_error
-from robosc.execution.sensors import Sensors
-from robosc.execution.settings import Settings, settings_for
-from robosc.execution.steps import ExecutionError, Steps
-
-_FAULT = "fault"
-_STOPPED_BY_HAND = "stop"
+from robosc.execution.event_log import EventLog
+from robosc.execution.protocol import ControlledSystem, Middleware
+from robosc.execution.requests import Decisions
+from robosc.execution.rest import describe_error
+from robosc.execution.runner import Runner
+from robosc.execution.settings import Settings
 
 
-class Status(str, Enum):
-    """What an executor is doing."""
-
-    NEW = "new"
-    """Not started."""
-    WAITING = "waiting"
-    """Requests nothing before the first message of every sensor with a maximum age."""
-    RUNNING = "running"
-    STOPPING = "stopping"
-    """At rest; the ends of cancelled goals are awaited."""
-    STOPPED = "stopped"
-
-
-class DeploymentError(ValueError):
-    """The supervisor was made for another deployment."""
-
-
-_Method = TypeVar("_Method", bound=Callable[..., None])
-
-
-def _guarded(method: _Method) -> _Method:
-    """The method with every exception turned into a fault."""
-
-    @wraps(method)
-    def guarded(self: Executor, *arguments: Any, **named: Any) -> None:
-        try:
-            method(self, *arguments, **named)
-        except Exception as error:
-            self._fail(describe_error(error))
-
-    return cast(_Method, guarded)
-
-
-class Executor:
-    """Makes a controlled system run.
+class Executor(Runner):
+    """Makes a controlled system run as the robot's controller.
 
     Args:
         system: Plants, requirements and supervisor with their state.
@@ -75,11 +24,8 @@ class Executor:
         clock: The only source of time; the computer's if None.
         log: The event log; none if None.
 
-    Attributes:
-        settings: The settings in force, release identifiers spelled out.
-
     Raises:
-        DeploymentError: The model has actions and the supervisor was made for another deployment.
+        DeploymentError: The model has actions and the supervisor was made for a supervision layer.
         SettingsError: A setting is wrong, or names what the model does not have.
     """
 
@@ -91,76 +37,20 @@ class Executor:
         clock: Optional[Clock] = None,
         log: Optional[EventLog] = None,
     ) -> None:
-        infos = system.description.communications
-        _require_controller(system.description)
-        self.settings = settings_for(settings or Settings(), system.description)
-        self._clock: Clock = SystemClock() if clock is None else clock
-        self._recorder = Recorder(system, self._clock, NullLog() if log is None else log)
-        released = self.settings.release_identifiers or ()
-        requests = requests_of(infos, released)
-        releases = Releases(system, released, by_identifier(requests))
-        calls = Calls(self.settings.service_timeout_s)
-        goals = Goals(system, [info.name for info in infos if info.kind == "action"], self.settings.action_timeout_s)
-        self._sensors = Sensors(
-            [(info.name, info.identifier, info.max_age_s) for info in infos if info.kind == "outgoing message"],
-            self.settings.max_age_s,
-        )
-        self._rest = Rest(middleware, releases, goals)
-        self._steps = Steps(system, middleware, self._recorder, releases, goals, self.settings.on_unknown)
-        self._request_names = [request.name for request in requests]
+        super().__init__(system, middleware, "controller", settings, clock, log)
+        self._request_names = [request.name for request in self._requests]
         self._decisions = Decisions(
             system,
             middleware,
-            requests,
+            self._requests,
             self._steps,
             self._recorder,
-            releases,
-            calls,
-            goals,
+            self._releases,
+            self._calls,
+            self._goals,
             self._new_policy(),
         )
-        self._replies = Replies(self._steps, middleware, self._recorder, calls, goals)
-        self._batches = _batches(infos)
         self._decides_after_batch = self.settings.every == "event"
-        self._is_started = False
-        self._may_request = False
-        self._now_s = 0.0
-        # Nothing that waits for time to pass is over before this reading of the clock.
-        self._deadline_s = 0.0
-
-    # What an adapter may ask.
-
-    @property
-    def status(self) -> Status:
-        """What the executor is doing now."""
-        if self._rest.reasons:
-            return Status.STOPPING if self._rest.is_awaiting(self._clock.monotonic()) else Status.STOPPED
-        if not self._is_started:
-            return Status.NEW
-        return Status.RUNNING if self._may_request else Status.WAITING
-
-    @property
-    def reasons(self) -> Tuple[str, ...]:
-        """Why it is stopped, in words; empty if it is not."""
-        return tuple(self._rest.reasons.values())
-
-    @property
-    def is_faulty(self) -> bool:
-        """Whether a fault stopped it; only `restart` ends that."""
-        return _FAULT in self._rest.reasons
-
-    @property
-    def counters(self) -> Counters:
-        """What went wrong so far."""
-        return self._recorder.counters()
-
-    # What an adapter tells.
-
-    @_guarded
-    def start(self) -> None:
-        """Begin in the initial state; what comes earlier is ignored. Does nothing the second time."""
-        if not self._is_started:
-            self._begin()
 
     def tick(self) -> None:
         """A period has passed: one decision."""
@@ -179,156 +69,9 @@ class Executor:
         except Exception as error:
             self._fail(describe_error(error))
 
-    def watch(self) -> None:
-        """Time has passed, but no period: stale sensors, replies that did not come, messages and cancels still owed.
-
-        An adapter with a long period calls this in between: none of these may wait for the next decision.
-        """
-        if not self._is_started:
-            return
-        try:
-            self._look_at_clock()
-            if self._rest.reasons:
-                self._rest.retry()
-        except Exception as error:
-            self._fail(describe_error(error))
-
-    def receive(self, identifier: str, data: Any) -> None:
-        """A middleware message came: one batch, the events of all messages of the model that it stands for.
-
-        Args:
-            identifier: Where it came.
-            data: Mapping or object with the properties, or the plain value of a basic type; None for no data.
-        """
-        if not self._is_started:
-            return
-        try:
-            self._look_at_clock()
-            batch = self._batches.get(identifier)
-            if batch is None:
-                self._recorder.unexpected({"what": "a message on {}".format(identifier)})
-                return
-            for name, event in batch:
-                if self._steps.happen_with_data(event, data, may_keep=True):
-                    self._see(name)
-            self._end_batch()
-        except Exception as error:
-            self._fail(describe_error(error))
-
-    @_guarded
-    def on_reply(self, request_id: int, data: Any) -> None:
-        """A service call was answered."""
-        self._look_at_clock()
-        if self._replies.reply(request_id, data):
-            self._end_batch()
-
-    @_guarded
-    def on_call_failed(self, request_id: int, reason: str) -> None:
-        """A service call will not be answered: its server is absent or lost, or refuses it."""
-        self._look_at_clock()
-        if self._replies.call_failed(request_id, reason):
-            self._end_batch()
-
-    @_guarded
-    def on_goal_accepted(self, goal_id: int) -> None:
-        """A goal was accepted by its server."""
-        self._look_at_clock()
-        self._replies.goal_accepted(goal_id)
-
-    @_guarded
-    def on_feedback(self, goal_id: int, data: Any) -> None:
-        """A goal's server told how far it is."""
-        self._look_at_clock()
-        if self._replies.feedback(goal_id, data):
-            self._end_batch()
-
-    @_guarded
-    def on_goal_ended(self, goal_id: int, outcome: str, data: Any = None) -> None:
-        """A goal's end is known, or its server is lost.
-
-        Args:
-            goal_id: Which goal.
-            outcome: `succeeded`, `rejected`, `aborted`, `cancelled` or `lost`.
-            data: Its result, if it succeeded.
-        """
-        self._look_at_clock()
-        if self._replies.goal_ended(goal_id, outcome, data):
-            self._end_batch()
-
-    @_guarded
-    def on_cancel_refused(self, goal_id: int, ended: bool) -> None:
-        """A cancel was refused.
-
-        Args:
-            goal_id: Which goal.
-            ended: Whether because the goal had ended already; its result follows or came already.
-        """
-        self._look_at_clock()
-        self._replies.cancel_refused(goal_id, ended)
-
-    def stop(self, reason: str, is_fault: bool = False) -> None:
-        """Come to rest until `restart`: on a signal, or, if `is_fault`, on a fault that the adapter found.
-
-        Goals that are running are cancelled: the status is `stopping` until they have ended, 0.5 s at most.
-        """
-        self._now_s = self._clock.monotonic()
-        if is_fault:
-            self._fail(reason)
-        else:
-            self._stop(_STOPPED_BY_HAND, reason)
-
-    @_guarded
-    def restart(self) -> None:
-        """Begin again in the initial state, whatever happened; goals and calls under way are the old run's."""
-        self._now_s = self._clock.monotonic()
-        if not self._rest.reasons or self._rest.restless:
-            self._come_to_rest()
-        if self._rest.restless:
-            raise ExecutionError("no restart: the robot could not be brought to rest")
-        self._rest.reasons.clear()
-        self._recorder.note("restart", "")
-        self._begin()
-
-    # Time.
-
     def _begin(self) -> None:
-        self._is_started = True
-        now = self._now_s = self._recorder.began_s = self._clock.monotonic()
-        self._replies.forget()
-        self._sensors.start(now)
         self._decisions.policy = self._new_policy()
-        self._steps.restart()
-        self._steps.settle()
-        self._deadline_s = self._next_deadline(now)
-        self._update_may_request()
-
-    def _look_at_clock(self) -> None:
-        """Take the time; whatever is over by now has its effect first."""
-        now = self._clock.monotonic()
-        self._now_s = self._recorder.began_s = now
-        if now >= self._deadline_s and self._is_started:
-            self._check_time(now)
-
-    def _next_deadline(self, now: float) -> float:
-        return min(self._replies.deadline_s(), self._sensors.deadline_s(now))
-
-    def _check_time(self, now: float) -> None:
-        """Replies that did not come in time, and stale sensors."""
-        self._replies.expire(now)
-        for name, identifier in self._sensors.stale(now):
-            if _stale_key(name) not in self._rest.reasons:
-                self._stop(_stale_key(name), "{} on {} is stale".format(name, identifier))
-        self._deadline_s = self._next_deadline(now)
-
-    def _see(self, name: str) -> None:
-        """A message came: its sensor is fresh, and a stop because it was not is over."""
-        if self._sensors.see(name, self._now_s):
-            if self._rest.reasons.pop(_stale_key(name), None) is not None:
-                self._recorder.note("resume", "{} is back".format(name))
-                self._deadline_s = self._next_deadline(self._now_s)
-            self._update_may_request()
-
-    # Decisions.
+        super()._begin()
 
     def _end_batch(self) -> None:
         """Silent steps, and a decision if each batch brings one."""
@@ -338,48 +81,3 @@ class Executor:
 
     def _new_policy(self) -> Policy:
         return make_policy(self.settings.policy, self._request_names, self.settings.priority, self.settings.seed)
-
-    def _update_may_request(self) -> None:
-        self._may_request = self._is_started and not self._rest.reasons and self._sensors.are_all_seen()
-
-    # Rest.
-
-    def _fail(self, reason: str) -> None:
-        """A fault. Never raises."""
-        self._recorder.fault(reason)
-        self._rest.reasons.setdefault(_FAULT, reason)
-        self._come_to_rest()
-
-    def _stop(self, key: str, reason: str) -> None:
-        """A safe stop that is no fault. Never raises."""
-        self._recorder.note("stop", reason)
-        self._rest.reasons.setdefault(key, reason)
-        self._come_to_rest()
-
-    def _come_to_rest(self) -> None:
-        """Nothing is requested any more, wheels stop, goals are cancelled; what fails is a fault. Never raises."""
-        self._may_request = False
-        for failure in self._rest.come_to_rest(self._now_s):
-            self._recorder.fault(failure)
-            self._rest.reasons.setdefault(_FAULT, failure)
-
-
-def _require_controller(description: Description) -> None:
-    if description.deployment != "controller" and any(info.kind == "action" for info in description.communications):
-        raise DeploymentError(
-            "this supervisor was made for the deployment '{}', and its model has actions; "
-            "make one for the deployment 'controller'".format(description.deployment)
-        )
-
-
-def _batches(infos: Tuple[CommunicationInfo, ...]) -> Dict[str, Tuple[Tuple[str, str], ...]]:
-    """For each identifier that is received, the messages of the model that it stands for, with their events."""
-    batches: Dict[str, Tuple[Tuple[str, str], ...]] = {}
-    for info in infos:
-        if info.kind == "outgoing message":
-            batches[info.identifier] = (*batches.get(info.identifier, ()), (info.name, info.name + ".response"))
-    return batches
-
-
-def _stale_key(name: str) -> str:
-    return "stale " + name

@@ -3,7 +3,8 @@
 A `ControlledSystem` is the supervisor as code: `robosc.execution.interpreter` interprets a
 `Supervisor`, a target generates a class with the same methods. The `Executor` adds what semantics
 part 3 says about time: batches, silent steps, decisions, release, safe stop, log. `Middleware` is what
-it needs of ROS, a bridge or a test.
+it needs of ROS, a bridge or a test. The `Layer` does the same for requests of an existing controller: its
+`RobotSide` is what it needs of the robot, its `LayerMiddleware` what it needs of that controller.
 
 This package's modules other than `interpreter` import nothing of RoboSC but each other and run on
 Python 3.8 and later: generated packages carry copies of them.
@@ -27,6 +28,7 @@ class CommunicationInfo(NamedTuple):
         requirement_count: Number of requirements on its request.
         conjunct_count: Number of top-level conjuncts of those requirements, all counted on.
         max_age_s: Seconds after which an outgoing message is stale, if the model says so.
+        has_condition: Whether an incoming message says with `when` which messages it is, in a supervision layer.
     """
 
     name: str
@@ -38,6 +40,7 @@ class CommunicationInfo(NamedTuple):
     requirement_count: int
     conjunct_count: int
     max_age_s: Optional[float] = None
+    has_condition: bool = False
 
 
 class Description(NamedTuple):
@@ -79,6 +82,24 @@ class Reading(NamedTuple):
     enum_unknown: bool
 
 
+class Match(NamedTuple):
+    """Whether a message that an existing controller sent is a certain incoming message of the model.
+
+    Attributes:
+        holds: Whether the condition `when` is true of it; yes if there is none.
+        unknown: What was unknown, as in a `Reading`.
+        enum_unknown: As in a `Reading`.
+    """
+
+    holds: bool
+    unknown: Tuple[str, ...]
+    enum_unknown: bool
+
+
+MATCHES = Match(True, (), False)
+"""Any message is one that has no condition."""
+
+
 class ControlledSystem(Protocol):
     """Plants, requirements and supervisor of one robot, with their current state."""
 
@@ -110,6 +131,9 @@ class ControlledSystem(Protocol):
         Data is a dict of properties (nested dicts), a plain value, or None for the middleware's default.
         """
 
+    def matches(self, communication: str, data: Any) -> Match:
+        """Whether a message is an incoming message, by its condition `when`; never raises for any data."""
+
     def requirements(self, communication: str) -> Tuple[bool, ...]:
         """For each requirement on a communication's request, in source order: whether it holds now."""
 
@@ -126,23 +150,14 @@ class ControlledSystem(Protocol):
         """A hashable value that tells states apart, as cheaply as possible."""
 
 
-class Middleware(Protocol):
-    """What an executor asks of the world; replies come back through the executor's methods, later."""
-
-    def prepare(self, communication: str, data: Any) -> Any:
-        """The middleware's message for a request, from the model's data (None: the default message).
-
-        The data is not to be changed: it stands in the log, and may come again.
-
-        Raises:
-            DataDoesNotFit: A value does not fit its field; the request is then not issued.
-        """
+class RobotSide(Protocol):
+    """What an executor of either deployment asks of the robot; replies come back through its methods, later."""
 
     def is_default(self, communication: str, message: Any) -> bool:
-        """Whether a prepared message is the all-default one (its header apart)."""
+        """Whether a message of a request is the all-default one (its header apart)."""
 
     def publish(self, communication: str, message: Any) -> None:
-        """Send an incoming message's prepared message."""
+        """Send an incoming message's message."""
 
     def publish_default(self, identifier: str) -> None:
         """Send the all-default message on an identifier that several communications may share."""
@@ -155,6 +170,57 @@ class Middleware(Protocol):
 
     def cancel_goal(self, communication: str, goal_id: int) -> None:
         """Ask the server to cancel an accepted goal."""
+
+
+class Middleware(RobotSide, Protocol):
+    """What the executor of a controller asks of the world: the robot, and messages made of the model's data."""
+
+    def prepare(self, communication: str, data: Any) -> Any:
+        """The middleware's message for a request, from the model's data (None: the default message).
+
+        The data is not to be changed: it stands in the log, and may come again.
+
+        Raises:
+            DataDoesNotFit: A value does not fit its field; the request is then not issued.
+        """
+
+
+class LayerMiddleware(Protocol):
+    """What a supervision layer tells the existing controller, the caller.
+
+    The ids of calls and goals here are the caller's own; the robot's side never sees them.
+    """
+
+    def pass_on(self, identifier: str, message: Any) -> None:
+        """A message of the robot, unchanged, after the supervisor has seen it."""
+
+    def blocked(self, identifier: str) -> None:
+        """A request on an identifier was held back."""
+
+    def answer(self, communication: str, call_id: Any, data: Any) -> None:
+        """The service's reply to a call, unchanged."""
+
+    def answer_default(self, communication: str, call_id: Any) -> None:
+        """A default reply to a call that was held back or has failed."""
+
+    def accept_goal(self, communication: str, goal_id: Any) -> None:
+        """A goal is let through: it is accepted. Exactly one `end_goal` follows."""
+
+    def reject_goal(self, communication: str, goal_id: Any) -> None:
+        """A goal is held back: it is rejected."""
+
+    def pass_feedback(self, communication: str, goal_id: Any, data: Any) -> None:
+        """Feedback of a goal, unchanged."""
+
+    def end_goal(self, communication: str, goal_id: Any, outcome: str, data: Any) -> None:
+        """An accepted goal has ended for its caller.
+
+        Args:
+            communication: The action.
+            goal_id: Which goal.
+            outcome: `succeeded`, `aborted` or `cancelled`.
+            data: The server's result, unchanged; None for the default one.
+        """
 
 
 class DataDoesNotFit(Exception):

@@ -99,6 +99,10 @@ class Recorder:
         """The default message goes out on an identifier."""
         self._write({"kind": "release", "identifier": identifier})
 
+    def blocked(self, identifier: str, why: str) -> None:
+        """A supervision layer held a request back."""
+        self._write({"kind": "blocked", "identifier": identifier, "why": why})
+
     def note(self, kind: str, what: str) -> None:
         """A stop, its end, or a restart."""
         self._write({"kind": kind, "what": what})

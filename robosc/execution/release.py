@@ -37,14 +37,20 @@ class Releases:
         system: Tells what is enabled and what holds.
         identifiers: The release identifiers.
         requests: For each of them its communications, in source order.
+        may_wait: Whether a due release waits while another request there is enabled: only a controller's does.
     """
 
-    __slots__ = ("_acting", "_events", "_system", "identifiers", "waiting")
+    __slots__ = ("_acting", "_events", "_may_wait", "_system", "identifiers", "waiting")
 
     def __init__(
-        self, system: ControlledSystem, identifiers: Sequence[str], requests: Dict[str, Tuple[str, ...]]
+        self,
+        system: ControlledSystem,
+        identifiers: Sequence[str],
+        requests: Dict[str, Tuple[str, ...]],
+        may_wait: bool,
     ) -> None:
         self._system = system
+        self._may_wait = may_wait
         self.identifiers = tuple(identifiers)
         self._events = {
             identifier: tuple((name, name + ".request") for name in requests[identifier]) for identifier in identifiers
@@ -68,7 +74,8 @@ class Releases:
                 continue
             self._observe(acting)
             if acting.is_due:
-                (waiting if self._another_is_enabled(identifier, acting) else now).append(identifier)
+                must_wait = self._may_wait and self._another_is_enabled(identifier, acting)
+                (waiting if must_wait else now).append(identifier)
         self.waiting = tuple(waiting)
         return now
 
@@ -111,6 +118,10 @@ class Releases:
     def is_acting(self, identifier: str) -> bool:
         """Whether the last message sent on a release identifier still acts."""
         return identifier in self._acting
+
+    def acting(self) -> Tuple[str, ...]:
+        """The release identifiers whose last message still acts."""
+        return tuple(self._acting)
 
     def released(self, identifier: str) -> None:
         """The default message went out on an identifier, or another message is about to."""

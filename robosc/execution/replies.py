@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Optional
 
 from robosc.execution.calls import OUTCOMES, Calls, Goal, Goals
-from robosc.execution.protocol import Middleware
+from robosc.execution.protocol import RobotSide
 from robosc.execution.recorder import Recorder
 from robosc.execution.rest import request_cancel
 from robosc.execution.steps import ExecutionError, Steps
@@ -24,7 +24,7 @@ class Replies:
 
     __slots__ = ("_calls", "_goals", "_middleware", "_recorder", "_steps")
 
-    def __init__(self, steps: Steps, middleware: Middleware, recorder: Recorder, calls: Calls, goals: Goals) -> None:
+    def __init__(self, steps: Steps, middleware: RobotSide, recorder: Recorder, calls: Calls, goals: Goals) -> None:
         self._steps = steps
         self._middleware = middleware
         self._recorder = recorder
@@ -47,6 +47,9 @@ class Replies:
             self._steps.happen("{}.error".format(service), None, "timeout")
             self._steps.settle()
         for goal in self._goals.expired(now_s):
+            if not goal.is_running:
+                # What another one's end led to has cancelled it.
+                continue
             goal.is_running = False
             self._steps.happen(goal.action + ".error", None, "timeout")
             self._steps.settle()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Dict, NamedTuple, Optional, Sequence, Tuple
+from typing import Dict, NamedTuple, Optional, Sequence, Tuple
 
 from robosc.execution.calls import Calls, Goals
 from robosc.execution.decision import Policy
@@ -192,9 +192,9 @@ class Decisions:
                     releases.sent_unchanged(name, identifier, is_default)
             middleware.publish(name, message)
         elif kind == "service":
-            self._call(name, message, now_s)
+            self._calls.call(middleware, name, message, now_s)
         else:
-            self._send_goal(name, message, now_s)
+            self._goals.send(middleware, name, message, now_s)
         return True
 
     def _withhold(self, request: Request, reason: str) -> bool:
@@ -203,19 +203,3 @@ class Decisions:
         if request.keeps_acting and self._releases.is_acting(request.identifier):
             self._steps.release(request.identifier)
         return False
-
-    def _call(self, service: str, message: Any, now_s: float) -> None:
-        number = self._calls.open(service, now_s)
-        try:
-            self._middleware.call(service, number, message)
-        except Exception:
-            self._calls.close(number)
-            raise
-
-    def _send_goal(self, action: str, message: Any, now_s: float) -> None:
-        goal = self._goals.open(action, now_s)
-        try:
-            self._middleware.send_goal(action, goal.number, message)
-        except Exception:
-            self._goals.close(goal.number)
-            raise

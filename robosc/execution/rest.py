@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Dict, List, Tuple
 
 from robosc.execution.calls import Goal, Goals
-from robosc.execution.protocol import Middleware
+from robosc.execution.protocol import RobotSide
 from robosc.execution.release import Releases
 
 CANCEL_WAIT_S = 0.5
@@ -20,7 +20,7 @@ def describe_error(error: BaseException) -> str:
     return "{}: {}".format(type(error).__name__, text) if text else type(error).__name__
 
 
-def request_cancel(middleware: Middleware, goal: Goal) -> None:
+def request_cancel(middleware: RobotSide, goal: Goal) -> None:
     """Ask for the cancel of a goal, once; before its acceptance it is only remembered."""
     goal.is_cancel_wanted = True
     if goal.is_accepted and not goal.is_cancel_sent:
@@ -44,7 +44,7 @@ class Rest:
 
     __slots__ = ("_goals", "_middleware", "_releases", "awaited_until_s", "reasons", "restless")
 
-    def __init__(self, middleware: Middleware, releases: Releases, goals: Goals) -> None:
+    def __init__(self, middleware: RobotSide, releases: Releases, goals: Goals) -> None:
         self._middleware = middleware
         self._releases = releases
         self._goals = goals

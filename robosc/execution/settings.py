@@ -36,6 +36,8 @@ class Settings(NamedTuple):
         service_timeout_s: Seconds until a service call without a reply counts as failed; None: never.
         action_timeout_s: Seconds until a goal without a result counts as failed; None: never.
         on_unknown: What happens when an enum falls to its default past an unknown rule: `default`, `keep`, `fault`.
+        command_timeout_s: In a supervision layer, the seconds without a message from the existing controller on a
+            release identifier after which its last one is released; 0: never.
     """
 
     period_s: float = 0.1
@@ -48,6 +50,14 @@ class Settings(NamedTuple):
     service_timeout_s: Optional[float] = 10.0
     action_timeout_s: Optional[float] = None
     on_unknown: str = "default"
+    command_timeout_s: float = 1.0
+
+
+OTHER_DEPLOYMENT = {
+    "controller": ("command_timeout_s",),
+    "layer": ("policy", "priority", "seed", "every"),
+}
+"""For each deployment the settings that mean something in the other one only: a layer decides nothing."""
 
 
 def settings_from(given: Mapping[str, Any]) -> Settings:
@@ -80,6 +90,7 @@ def validated(settings: Settings) -> Settings:
         service_timeout_s=_optional_seconds("service_timeout_s", settings.service_timeout_s),
         action_timeout_s=_optional_seconds("action_timeout_s", settings.action_timeout_s),
         on_unknown=_choice("on_unknown", settings.on_unknown, ON_UNKNOWN),
+        command_timeout_s=_seconds_or_zero("command_timeout_s", settings.command_timeout_s),
     )
 
 
@@ -100,6 +111,22 @@ def settings_for(settings: Settings, description: Description) -> Settings:
         return checked._replace(release_identifiers=default_release_identifiers(description))
     _require_known("release_identifiers", release, published, "the identifier of an incoming message")
     return checked
+
+
+def require_settings_of(settings: Settings, deployment: str) -> None:
+    """Do nothing if every setting that means nothing in a deployment has its default.
+
+    Args:
+        settings: Valid settings.
+        deployment: `controller` or `layer`.
+
+    Raises:
+        SettingsError: One has not.
+    """
+    defaults = Settings()._asdict()
+    for name in OTHER_DEPLOYMENT[deployment]:
+        if getattr(settings, name) != defaults[name]:
+            raise SettingsError("setting '{}' means nothing in the deployment '{}'".format(name, deployment))
 
 
 def default_release_identifiers(description: Description) -> Tuple[str, ...]:
@@ -141,6 +168,12 @@ def _seconds(name: str, value: Any, least: float = 0.0) -> float:
 
 def _optional_seconds(name: str, value: Any) -> Optional[float]:
     return None if value is None else _seconds(name, value)
+
+
+def _seconds_or_zero(name: str, value: Any) -> float:
+    if isinstance(value, (int, float)) and not isinstance(value, bool) and 0 <= value < math.inf:
+        return float(value)
+    raise _wrong(name, value, "a number of seconds, or 0 for never")
 
 
 def _integer(name: str, value: Any) -> int:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any, Dict, Optional, Tuple
 
 from robosc.execution.calls import Goals
-from robosc.execution.protocol import ControlledSystem, Middleware, Reading
+from robosc.execution.protocol import ControlledSystem, Reading, RobotSide
 from robosc.execution.recorder import Recorder
 from robosc.execution.release import Releases
 from robosc.execution.rest import request_cancel
@@ -54,7 +54,7 @@ class Steps:
     def __init__(
         self,
         system: ControlledSystem,
-        middleware: Middleware,
+        middleware: RobotSide,
         recorder: Recorder,
         releases: Releases,
         goals: Goals,

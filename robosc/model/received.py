@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from robosc.expressions import EnumType, ObjectType, PathStep, Received, Type, leaves
+from robosc.expressions import EnumType, Expression, ObjectType, PathStep, Received, Type, leaves
 from robosc.model.structure import EventKind, Model, is_tau
 
 Path = tuple[PathStep, ...]
@@ -17,12 +17,17 @@ def converted_paths(model: Model, event: str) -> tuple[Path, ...]:
     return tuple(dict.fromkeys((*_read_paths(model, event), *_enum_paths(model, event))))
 
 
+def received_paths(expression: Expression) -> tuple[Path, ...]:
+    """The parts of received data that an expression reads, each once."""
+    return tuple(dict.fromkeys(leaf.path for leaf in leaves(expression) if isinstance(leaf, Received)))
+
+
 def _read_paths(model: Model, event: str) -> Iterator[Path]:
     for component in model.components:
         for transition in component.behaviour.transitions if component.behaviour else ():
             if transition.event == event:
                 for update in transition.updates:
-                    yield from (leaf.path for leaf in leaves(update.expression) if isinstance(leaf, Received))
+                    yield from received_paths(update.expression)
 
 
 def _enum_paths(model: Model, event: str) -> Iterator[Path]:

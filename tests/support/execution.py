@@ -5,9 +5,10 @@ from typing import Any
 
 from robosc.execution.clock import ManualClock
 from robosc.execution.event_log import MemoryLog
-from robosc.execution.executor import Executor, Status
+from robosc.execution.executor import Executor
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.protocol import ControlledSystem, DataDoesNotFit
+from robosc.execution.runner import Runner, Status
 from robosc.execution.settings import Settings
 from robosc.model.structure import Deployment, Model
 from robosc.supervisor.structure import AddedCondition, Certificate, Supervisor
@@ -96,7 +97,42 @@ def _is_zero(message: Any) -> bool:
     return message is None or message == 0
 
 
-class Bench:
+class Observed:
+    """What is asked of an executor in a test.
+
+    Attributes:
+        system: What it executes.
+        executor: The executor.
+        log: Its log.
+    """
+
+    system: ControlledSystem
+    executor: Runner
+    log: MemoryLog
+
+    def status(self) -> Status:
+        """What the executor is doing."""
+        return self.executor.status
+
+    def state(self, component: str) -> str:
+        """The state of a component."""
+        return str(self.system.state()[component]["state"])
+
+    def variable(self, component: str, name: str) -> Any:
+        """The value of a variable."""
+        return self.system.state()[component]["variables"][name]
+
+    @property
+    def events(self) -> list[str]:
+        """Every event that was taken, in order."""
+        return [entry["event"] for entry in self.log.entries if entry["kind"] == "event"]
+
+    def entries(self, kind: str) -> list[dict[str, Any]]:
+        """The log's entries of one kind."""
+        return [entry for entry in self.log.entries if entry["kind"] == kind]
+
+
+class Bench(Observed):
     """An executor with everything around it.
 
     Args:
@@ -104,6 +140,8 @@ class Bench:
         start: Whether to start it.
         settings: Settings by name.
     """
+
+    executor: Executor
 
     def __init__(self, system: ControlledSystem, *, start: bool = True, **settings: Any) -> None:
         self.system = system
@@ -127,27 +165,6 @@ class Bench:
         before = len(self.middleware.sent)
         self.executor.receive(identifier, data)
         return self.middleware.sent[before:]
-
-    def status(self) -> Status:
-        """What the executor is doing."""
-        return self.executor.status
-
-    def state(self, component: str) -> str:
-        """The state of a component."""
-        return str(self.system.state()[component]["state"])
-
-    def variable(self, component: str, name: str) -> Any:
-        """The value of a variable."""
-        return self.system.state()[component]["variables"][name]
-
-    @property
-    def events(self) -> list[str]:
-        """Every event that was taken, in order."""
-        return [entry["event"] for entry in self.log.entries if entry["kind"] == "event"]
-
-    def entries(self, kind: str) -> list[dict[str, Any]]:
-        """The log's entries of one kind."""
-        return [entry for entry in self.log.entries if entry["kind"] == kind]
 
     def published(self) -> list[str]:
         """Names of the messages that were published, and `default` for default messages."""

@@ -12,6 +12,8 @@ from random import Random
 from types import SimpleNamespace
 from typing import Any
 
+from msgspec import structs
+
 from robosc.automata import System, to_automata
 from robosc.automata.state import subject_domain, subjects
 from robosc.expressions import (
@@ -340,6 +342,20 @@ def _communication(dice: Random, name: str, component: str, enums: Sequence[Enum
     )
 
 
+def _with_conditions(dice: Random, communications: Sequence[Communication]) -> tuple[Communication, ...]:
+    """The communications, most incoming messages with a condition (`when`) over what arrives."""
+    found = []
+    for item in communications:
+        if item.kind is CommunicationKind.INCOMING_MESSAGE and item.request != NONE and dice.random() < 0.8:
+            type_ = dice.choice([item.request, OBJECT, KIND, RANGE]) if item.request != OBJECT else OBJECT
+            assert type_ is not None
+            condition = _expression(dice, _World((), (), type_), BOOLEAN, 3)
+            found.append(structs.replace(item, request=type_, when=condition))
+        else:
+            found.append(item)
+    return tuple(found)
+
+
 def _variable(dice: Random, name: str, enums: Sequence[EnumDefinition]) -> Variable:
     kinds = [EnumType(enum.name, enum.values) for enum in enums]
     type_ = dice.choice([*_types(enums), *kinds * 3])
@@ -358,6 +374,7 @@ def random_supervisor(seed: int) -> Supervisor:
     communications = tuple(
         _communication(dice, messages.pop(), component, enums) for component in names for _ in range(dice.randint(0, 2))
     )
+    communications = _with_conditions(Random(f"{seed} when"), communications)
     variables = {
         name: tuple(_variable(dice, item, enums) for item in dice.sample(VARIABLE_NAMES, dice.randint(0, 3)))
         for name in names

@@ -56,6 +56,7 @@ def _info(model: Model, communication: Communication) -> CommunicationInfo:
         requirement_count=len(requirements),
         conjunct_count=sum(len(conjuncts(item.condition)) for item in requirements),
         max_age_s=communication.max_age,
+        has_condition=communication.when is not None,
     )
 
 

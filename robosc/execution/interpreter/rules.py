@@ -16,7 +16,7 @@ from robosc.execution.interpreter.functions import (
     no_data,
 )
 from robosc.expressions import DoubleType, IntegerType, Type, Value, domain, values
-from robosc.model.received import converted_paths
+from robosc.model.received import converted_paths, received_paths
 from robosc.model.structure import (
     CONTROLLABLE_KINDS,
     Behaviour,
@@ -101,6 +101,27 @@ class EventRule:
     added: Callable[[State], bool] | None
     received: Type | None
     paths: tuple[Path, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class WhenRule:
+    """Which messages are an incoming message (language B.13).
+
+    Attributes:
+        type: Its declared type.
+        paths: The parts of a message that are converted.
+        condition: What must be true of them.
+    """
+
+    type: Type | None
+    paths: tuple[Path, ...]
+    condition: Function
+
+    @classmethod
+    def of(cls, communication: Communication) -> "WhenRule":
+        """The rule of a communication that has a condition."""
+        assert communication.when is not None  # noqa: S101  # The caller has seen to that.
+        return cls(communication.request, received_paths(communication.when), function_of(communication.when))
 
 
 def initial_state(model: Model) -> dict[Place, Value]:

@@ -11,11 +11,12 @@ from robosc.execution.interpreter.rules import (
     EventRule,
     Participant,
     TransitionRule,
+    WhenRule,
     event_rules,
     initial_state,
     provided_function,
 )
-from robosc.execution.protocol import Reading
+from robosc.execution.protocol import MATCHES, Match, Reading
 from robosc.expressions import Value, conjuncts
 from robosc.model.structure import is_tau
 from robosc.supervisor.structure import Supervisor
@@ -74,6 +75,7 @@ class InterpretedSystem:
             )
             for item in model.communications
         }
+        self._when = {item.name: WhenRule.of(item) for item in model.communications if item.when is not None}
         self._initial = initial_state(model)
         self._state = self._initial
 
@@ -116,6 +118,14 @@ class InterpretedSystem:
             if condition is None or holds(condition, self._state):
                 return value(self._state)
         return True, None
+
+    def matches(self, communication: str, data: Any) -> Match:
+        """Whether a message is an incoming message, by its condition `when`."""
+        rule = self._when.get(communication)
+        if rule is None:
+            return MATCHES
+        reading = self._reader.read(rule.type, rule.paths, data)
+        return Match(rule.condition({}, reading.values.get) is True, reading.unknown, reading.enum_unknown)
 
     def requirements(self, communication: str) -> tuple[bool, ...]:
         """Which requirements on a request hold."""

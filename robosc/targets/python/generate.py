@@ -13,6 +13,7 @@ from robosc.targets.python.provide import provide_method
 from robosc.targets.python.received import converter
 from robosc.targets.python.step import read_method, step_method
 from robosc.targets.python.text import indent, printable
+from robosc.targets.python.when import matches_method
 from robosc.targets.python.writer import Writer, make_writer
 
 _READING_FUNCTIONS = frozenset(
@@ -95,7 +96,9 @@ def _module_docstring(writer: Writer) -> list[str]:
 
 
 def _imports(writer: Writer, package: str) -> list[str]:
-    lines = [f"from {package}.protocol import CommunicationInfo, Description, Reading"]
+    has_condition = any(item.when is not None for item in writer.model.communications)
+    protocol = ["MATCHES", "CommunicationInfo", "Description", *["Match"] * has_condition, "Reading"]
+    lines = [f"from {package}.protocol import {', '.join(protocol)}"]
     reading = sorted(writer.used & _READING_FUNCTIONS)
     kleene = sorted(name for name in writer.used - _READING_FUNCTIONS if hasattr(values, name))
     if reading:
@@ -121,6 +124,7 @@ def _class(writer: Writer) -> list[str]:
     methods += [step_method(writer, event) for event in (*writer.layout.controllable, *writer.layout.uncontrollable)]
     for make in (provide_method, requirements_method, conjuncts_method):
         methods += [make(writer, name) for name in requested]
+    methods += [matches_method(writer, item) for item in model.communications if item.when is not None]
     methods += [method for _, method in writer.diagrams.methods]
     lines = [
         "class Supervisor:",
@@ -149,7 +153,7 @@ def _constructor(writer: Writer) -> list[str]:
     for (purpose, subject), method in methods.items():
         tables.setdefault(purpose, []).append(f"{subject!r}: self.{method},")
     lines = ["def __init__(self):"]
-    for purpose in ("allow", "read", "step", "provide", "requirements", "conjuncts"):
+    for purpose in ("allow", "read", "step", "provide", "requirements", "conjuncts", "matches"):
         entries = tables.get(purpose, [])
         lines += (
             [f"    self._{purpose} = {{", *indent(entries, 2), "    }"] if entries else [f"    self._{purpose} = {{}}"]
@@ -229,6 +233,10 @@ def step(self, event, reading=None):
 def provide(self, communication):
     """Data for a request in the current state: (is known, data)."""
     return self._provide[communication]()''',
+        '''\
+def matches(self, communication, data):
+    """Whether a message that a supervision layer received is an incoming message, by its condition `when`."""
+    return self._matches[communication](data) if communication in self._matches else MATCHES''',
         '''\
 def requirements(self, communication):
     """For each requirement on a request: whether it holds now."""

@@ -22,6 +22,7 @@ PROTOCOL_NAMES = (
     "description",
     "enabled",
     "location",
+    "matches",
     "provide",
     "read",
     "requirements",
@@ -42,7 +43,7 @@ class Layout:
         locations: Attribute of each automaton's location: components by name, `service s`, `action a`.
         variables: Attribute and type of each variable, by component and variable.
         methods: Method by (purpose, event or communication); purposes are `allow`, `read`, `step`,
-            `provide`, `requirements`, `conjuncts`.
+            `provide`, `requirements`, `conjuncts`, `matches`.
         converters: Function that makes each enum out of received data.
     """
 
@@ -135,6 +136,8 @@ def _method_names(model: Model, members: Namer) -> dict[tuple[str, str], str]:
         if EventKind.REQUEST in EVENT_KINDS[item.kind]:
             for purpose in ("provide", "requirements", "conjuncts"):
                 methods[purpose, item.name] = members.name(f"{purpose}_{item.name}")
+        if item.when is not None:
+            methods["matches", item.name] = members.name(f"matches_{item.name}")
     return methods
 
 

@@ -3,11 +3,48 @@
 from importlib import resources
 
 from robosc.errors import UnsupportedModelError
+from robosc.model.structure import Deployment
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.python.generate import header, supervisor_module
 from robosc.targets.python.naming import snake_case
 from robosc.targets.registry import GenerateOptions
+
+_USAGE = {
+    Deployment.CONTROLLER: '''\
+"""The supervisor of the robot {robot} and its executor, as a controller.
+
+    from {package}.runtime.executor import Executor
+    from {package}.supervisor import Supervisor
+
+    executor = Executor(Supervisor(), middleware)
+    executor.start()
+
+Then call, always from one thread, `executor.tick()` once a period, `executor.receive(identifier, message)` when
+the robot sends a message, `on_reply`, `on_goal_ended` and so on when it answers, and `executor.stop(why)` at the end.
+What `middleware` must offer is the protocol `Middleware` in `{package}.runtime.protocol`; settings of the deployment
+are in `{package}.runtime.settings`, files for the event log in `{package}.runtime.event_log`.
+"""
+''',
+    Deployment.LAYER: '''\
+"""The supervisor of the robot {robot} and its executor, as a supervision layer before an existing controller.
+
+    from {package}.runtime.layer import Layer
+    from {package}.supervisor import Supervisor
+
+    layer = Layer(Supervisor(), robot, caller)
+    layer.start()
+
+Then call, always from one thread, `layer.on_request(identifier, message)`, `on_call`, `on_goal` and `on_cancel`
+when the existing controller sends something; `layer.receive(identifier, message)`, `on_reply`, `on_goal_ended` and so
+on when the robot does; `layer.tick()` once a period, so that time is noticed; and `layer.stop(why)` at the end. What
+is let through goes to `robot`, what the existing controller is told to `caller`: they offer the protocols `RobotSide`
+and `LayerMiddleware` in `{package}.runtime.protocol`. Settings of the deployment are in `{package}.runtime.settings`,
+files for the event log in `{package}.runtime.event_log`.
+"""
+''',
+}
+"""What stands in a package's `__init__.py`."""
 
 _NOT_COPIED = frozenset({"__init__.py"})
 _MAXIMUM_NAME = 100
@@ -41,6 +78,8 @@ def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles
     """The files of the target `python`, below a folder with the package's name."""
     name = package_name(supervisor, options, "supervisor")
     files = {f"{name}/{path}": text for path, text in python_files(supervisor).items()}
+    usage = _USAGE[supervisor.deployment].format(robot=supervisor.model.name, package=name)
+    files[f"{name}/__init__.py"] = header(supervisor) + usage
     return GeneratedFiles(files)
 
 

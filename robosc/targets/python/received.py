@@ -127,6 +127,16 @@ class Reader:
         lines, self._lines = self._lines, []
         return lines
 
+    @property
+    def all_words(self) -> str:
+        """Text of a tuple with everything that was unknown."""
+        return " + ".join(self.words) or "()"
+
+    @property
+    def all_flags(self) -> str:
+        """Text of whether any enum fell to its default past an unknown rule."""
+        return " or ".join(self.enum_flags) or "False"
+
     def _local(self, path: Path, suffix: str = "") -> str:
         return self._namer.name("_".join(["value", *map(str, path)]) + suffix)
 
@@ -237,7 +247,7 @@ class Reader:
 def converter(layout: Layout, enum: EnumDefinition, used: set[str]) -> list[str]:
     """The function that makes an enum out of received data, as a readable chain of conditions."""
     reader = Reader(layout, enum.source, used)
-    scope = Scope(_no_variable, _no_location, reader.read, used.add, reader.type_at, reader.type_below)
+    scope = Scope(no_variable, no_location, reader.read, used.add, reader.type_at, reader.type_below)
     used.add("ABSENT")
     body = ["if data is ABSENT:", "    return None, (), False"]
     all_false = TRUE_CODE
@@ -247,27 +257,19 @@ def converter(layout: Layout, enum: EnumDefinition, used: set[str]) -> list[str]
         # What only a later rule needs is not read before that rule's turn.
         body += reader.take_lines()
         body += comment(f"{expression_text(rule.condition)} -> {rule.value}")
-        body += [f"if {fires.text}:", f"    return {rule.value!r}, {_words(reader)}, {_flags(reader)}"]
+        body += [f"if {fires.text}:", f"    return {rule.value!r}, {reader.all_words}, {reader.all_flags}"]
     body += comment(f"default -> {enum.default}")
     if _may_be_unknown([rule.condition for rule in enum.rules]):
         words = f"path + {f' is {enum.default} by default: an earlier rule is unknown'!r}"
         earlier = [*reader.words, f"({words},)"]
         body.append(f"if not ({all_false.text}):")
         body.append(f"    return {enum.default!r}, {' + '.join(earlier)}, True")
-    body.append(f"return {enum.default!r}, {_words(reader)}, {_flags(reader)}")
+    body.append(f"return {enum.default!r}, {reader.all_words}, {reader.all_flags}")
     return [
         f"def {layout.converters[enum.name]}(data, path):",
         f'    """{enum.name} from received data; in words what was unknown; whether that decided an enum."""',
         *indent(body),
     ]
-
-
-def _words(reader: Reader) -> str:
-    return " + ".join(reader.words) or "()"
-
-
-def _flags(reader: Reader) -> str:
-    return " or ".join(reader.enum_flags) or "False"
 
 
 _ARITHMETIC = frozenset({"+", "-", "*", "/"})
@@ -284,12 +286,23 @@ def _may_be_unknown(conditions: list[Expression]) -> bool:
     return False
 
 
-def _no_variable(component: str, variable: str) -> tuple[str, Type]:
-    raise InternalError(f"an enum rule reads the variable {component}.{variable}")
+def no_variable(component: str, variable: str) -> tuple[str, Type]:
+    """The scope of a condition on received data has no variables."""
+    raise InternalError(f"a condition on received data reads the variable {component}.{variable}")
 
 
-def _no_location(automaton: str) -> str:
-    raise InternalError(f"an enum rule reads the state of {automaton}")
+def no_location(automaton: str) -> str:
+    """Nor states."""
+    raise InternalError(f"a condition on received data reads the state of {automaton}")
 
 
-__all__ = ["Path", "Reader", "converter", "path_text", "path_type", "received_unknown"]
+__all__ = [
+    "Path",
+    "Reader",
+    "converter",
+    "no_location",
+    "no_variable",
+    "path_text",
+    "path_type",
+    "received_unknown",
+]

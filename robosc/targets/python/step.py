@@ -45,12 +45,11 @@ def read_method(writer: Writer, event: str) -> list[str]:
     codes = [reader.read(path) for path in paths]
     entries = ", ".join(f"{path_text(path)!r}: {reader.seen(path)}" for path in paths if not _is_array(reader, path))
     values = "".join(f"{code.text}, " for code in codes).strip()
-    words, flags = " + ".join(reader.words) or "()", " or ".join(reader.enum_flags) or "False"
     return [
         *head,
         f"    {docstring(f'Convert the data of {event}.')}",
         *indent(reader.take_lines()),
-        f"    return Reading(({values}), {{{entries}}}, {words}, {flags})",
+        f"    return Reading(({values}), {{{entries}}}, {reader.all_words}, {reader.all_flags})",
     ]
 
 

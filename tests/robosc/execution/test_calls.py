@@ -2,8 +2,8 @@
 
 import pytest
 
-from robosc.execution.executor import DeploymentError, Status
 from robosc.execution.interpreter import InterpretedSystem
+from robosc.execution.runner import DeploymentError, Status
 from robosc.model.structure import Deployment
 from robosc.supervisor.structure import AddedCondition, DecisionDiagram, DecisionNode
 from support.execution import Bench, Sent, bench, example_system, supervisor_of, system_of
@@ -436,3 +436,31 @@ def test_several_cancels_go_out_in_source_order() -> None:
     assert [sent[1] for sent in b.tick(2)] == ["second", "first"]
     b.receive("alarm")
     assert b.events[-2:] == ["first.cancel", "second.cancel"]
+
+
+def test_a_goal_that_anothers_timeout_has_cancelled_does_not_time_out_as_well() -> None:
+    b = bench(
+        """
+        robot Two {
+          interface navigate use NavigateToPose from nav2_msgs
+          datatype object Empty { }
+          component First {
+            action lead with request: Empty, response: Empty, feedback: Empty links navigate
+            behaviour {
+              initial marked state fine { on error from lead goto broken }
+              marked state broken { }
+            }
+          }
+          component Second { action follow with request: Empty, response: Empty, feedback: Empty links navigate }
+          requirement follow needs First.fine
+        }
+        """,
+        action_timeout_s=1.0,
+        policy="priority",
+        priority=("lead", "follow"),
+    )
+    assert [sent[1] for sent in b.tick(2)] == ["lead", "follow"]
+    b.clock.advance(5.0)
+    b.executor.watch()
+    assert b.events[2:] == ["lead.error", "follow.cancel", "lead.reset"]
+    assert b.executor.counters.unexpected == 0

@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 
-from robosc.execution.executor import Status
 from robosc.execution.protocol import Reading
+from robosc.execution.runner import Status
 from robosc.execution.silent import EndlessRun, RunWatch
 from support.execution import Bench, bench, system_of
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from robosc.execution.executor import Status
+from robosc.execution.runner import Status
 from support.execution import Bench, Sent, bench, system_of
 
 ROBOT = """

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from robosc.execution.executor import Status
 from robosc.execution.interpreter import InterpretedSystem
+from robosc.execution.runner import Status
 from robosc.expressions import Binary, EnumValue, Received
 from robosc.model.structure import EnumRule
 from support.execution import Bench, bench, example_system, supervisor_of, system_of

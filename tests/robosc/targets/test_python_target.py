@@ -3,6 +3,7 @@
 import ast
 import itertools
 import re
+import textwrap
 from collections import Counter
 from pathlib import Path
 from random import Random
@@ -34,6 +35,7 @@ from robosc.supervisor.structure import Supervisor
 from robosc.targets import GenerateOptions, generate
 from robosc.targets.python.layout import events, is_controllable
 from support.generated import example_supervisor, imported, load_system, python_text, same
+from support.layers import BothSides
 from support.models import EXAMPLE_DEPLOYMENTS, EXAMPLE_NAMES, model_of
 from support.random_models import random_bundle
 from support.random_supervisors import CERTIFICATE, random_data, random_supervisor
@@ -66,6 +68,15 @@ class Twins:
                     assert same(*answers), (question, item.name, answers)
             if item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION):
                 assert self.generated.location(item.name) == self.interpreted.location(item.name)
+
+    def match(self, data: Any) -> None:
+        """Which incoming messages a message could be."""
+        for item in self.model.communications:
+            if item.kind is CommunicationKind.INCOMING_MESSAGE:
+                generated, interpreted = (s.matches(item.name, data) for s in (self.generated, self.interpreted))
+                assert tuple(generated) == tuple(interpreted), (item.name, data)
+                self.seen["match" if interpreted.holds else "no match"] += item.when is not None
+                self.seen["unknown in a condition"] += bool(interpreted.unknown)
 
     def step(self, event: str, data: Any = None) -> tuple[str, ...] | None:
         """Take an event, with data if it is one of the environment."""
@@ -101,6 +112,7 @@ class Twins:
                 enabled = [name for name in names if is_controllable(name) and self.interpreted.enabled(name)]
                 event = dice.choice(enabled) if enabled else event
             self.step(event, random_data(dice))
+            self.match(random_data(dice))
         self.compare()
         self.generated.restart()
         self.interpreted.restart()
@@ -135,6 +147,7 @@ def test_the_random_supervisors_show_everything() -> None:
         total[what] > least
         for what, least in {"enabled": 500, "disabled": 500, "unknown": 10, "unknown enum": 10, "skipped": 30}.items()
     )
+    assert total["match"] > 100 and total["no match"] > 100 and total["unknown in a condition"] > 10
 
 
 @pytest.mark.parametrize(("name", "deployment"), EXAMPLE_DEPLOYMENTS)
@@ -255,6 +268,47 @@ def test_the_package_drives_an_executor_of_its_own(tmp_path: Path) -> None:
     assert sent[1][1] == {"linear": {"x": 0.15}, "angular": {"z": 0.5}}
     happened = [entry["event"] for entry in log.entries if entry["kind"] == "event"]
     assert happened == ["halt.request", "correction.response", "scan.response", "LidarSensor.tau_1", "move.request"]
+
+
+def test_the_package_of_a_layer_holds_back_what_is_not_allowed(tmp_path: Path) -> None:
+    """As its own text says it is used."""
+    supervisor = example_supervisor("line_follower/line_follower_layer", Deployment.LAYER)
+    files = generate(supervisor, "python", GenerateOptions(package="follower_layer"))
+    sides = BothSides()
+    with imported(files, tmp_path, "follower_layer") as package:
+        names: dict[str, Any] = {"robot": sides, "caller": sides}
+        (code,) = re.findall(r"(?:^    .*\n|^\n(?=    ))+", package.__doc__, re.MULTILINE)
+        exec(textwrap.dedent(code), names)
+        layer = names["layer"]
+        assert type(layer).__module__ == "follower_layer.runtime.layer"
+        fast = {"linear": {"x": 0.2}}
+        layer.on_request("/cmd_vel", fast)
+        layer.receive("/line/correction", 0.5)
+        layer.receive("/scan", FULL_SCAN)
+        layer.on_request("/cmd_vel", {"linear": {"x": float("nan")}})
+        layer.on_request("/cmd_vel", fast)
+        layer.receive("/emergency_stop/stop", None)
+        layer.stop("test")
+    assert [sent[:2] for sent in sides.sent] == [
+        ("blocked", "/cmd_vel"),
+        ("pass", "/line/correction"),
+        ("pass", "/scan"),
+        ("blocked", "/cmd_vel"),
+        ("publish", "move"),
+        ("default", "/cmd_vel"),
+        ("pass", "/emergency_stop/stop"),
+        ("default", "/cmd_vel"),
+    ]
+
+
+def test_the_text_of_a_controllers_package_says_how_it_is_used(tmp_path: Path) -> None:
+    files = generate(example_supervisor("maze_solver/maze_solver"), "python", GenerateOptions(package="maze"))
+    with imported(files, tmp_path, "maze") as package:
+        names: dict[str, Any] = {"middleware": BothSides()}
+        (code,) = re.findall(r"(?:^    .*\n|^\n(?=    ))+", package.__doc__, re.MULTILINE)
+        exec(textwrap.dedent(code), names)
+        names["executor"].tick()
+    assert [sent[:2] for sent in names["middleware"].sent] == [("publish", "rotate_left")]
 
 
 def test_a_package_may_be_called_as_one_likes() -> None:

@@ -1,0 +1,106 @@
+"""Calls and goals that a supervision layer let through, and whose they are (semantics 3.7)."""
+
+from __future__ import annotations
+
+from typing import Any, Dict, List, NamedTuple, Optional
+
+from robosc.execution.calls import Calls, Goals
+
+
+class CallerCall(NamedTuple):
+    """A service call that waits for its answer.
+
+    Attributes:
+        service: Its service.
+        call_id: How the caller's side knows it.
+    """
+
+    service: str
+    call_id: Any
+
+
+class CallerGoal:
+    """A goal that has not ended for its caller.
+
+    Attributes:
+        number: How the robot's side knows it.
+        action: Its action.
+        goal_id: How the caller's side knows it.
+        is_cancelled: Whether its caller asked to cancel it: it then ends as its server ends it.
+    """
+
+    __slots__ = ("action", "goal_id", "is_cancelled", "number")
+
+    def __init__(self, number: int, action: str, goal_id: Any) -> None:
+        self.number = number
+        self.action = action
+        self.goal_id = goal_id
+        self.is_cancelled = False
+
+    def outcome(self, outcome: str) -> str:
+        """How it ends for its caller.
+
+        Args:
+            outcome: How its server ended it, or `rejected` or `lost`.
+        """
+        if outcome == "succeeded" or (self.is_cancelled and outcome == "cancelled"):
+            return outcome
+        return "aborted"
+
+
+class Callers:
+    """What the existing controller waits for. An id of the robot's side never meets one of the caller's side.
+
+    Args:
+        calls: Service calls under way on the robot's side.
+        goals: Goals under way there.
+    """
+
+    __slots__ = ("_calls", "_goals", "_waiting_calls", "_waiting_goals")
+
+    def __init__(self, calls: Calls, goals: Goals) -> None:
+        self._calls = calls
+        self._goals = goals
+        self._waiting_calls: Dict[int, CallerCall] = {}
+        self._waiting_goals: Dict[int, CallerGoal] = {}
+
+    def open_call(self, number: int, service: str, call_id: Any) -> None:
+        """A call went through under a number of the robot's side."""
+        self._waiting_calls[number] = CallerCall(service, call_id)
+
+    def open_goal(self, number: int, action: str, goal_id: Any) -> None:
+        """A goal went through under a number of the robot's side."""
+        self._waiting_goals[number] = CallerGoal(number, action, goal_id)
+
+    def close_call(self, number: int) -> Optional[CallerCall]:
+        """A call is about to be answered: the call, or None if nobody waits for it."""
+        return self._waiting_calls.pop(number, None)
+
+    def close_goal(self, number: int) -> Optional[CallerGoal]:
+        """A goal is about to end for its caller: the goal, or None if nobody waits for it."""
+        return self._waiting_goals.pop(number, None)
+
+    def goal(self, number: int) -> Optional[CallerGoal]:
+        """The goal with a number of the robot's side, if somebody waits for it."""
+        return self._waiting_goals.get(number)
+
+    def find_goal(self, action: str, goal_id: Any) -> Optional[CallerGoal]:
+        """The goal of an action with an id of the caller's side, if it has not ended for its caller."""
+        for goal in self._waiting_goals.values():
+            if goal.action == action and goal.goal_id == goal_id:
+                return goal
+        return None
+
+    def close_failed_calls(self) -> List[CallerCall]:
+        """Calls that are no longer under way and were not answered: they ended in `error`, or before a restart."""
+        failed = [number for number in self._waiting_calls if not self._calls.is_open(number)]
+        return [self._waiting_calls.pop(number) for number in failed]
+
+    def close_failed_goals(self) -> List[CallerGoal]:
+        """Goals that the model no longer executes, though neither their server nor their caller ended them."""
+        failed = [number for number, goal in self._waiting_goals.items() if self._has_failed(goal)]
+        return [self._waiting_goals.pop(number) for number in failed]
+
+    def _has_failed(self, goal: CallerGoal) -> bool:
+        own = self._goals.find(goal.number)
+        return own is None or not (own.is_running or goal.is_cancelled)

@@ -1,0 +1,36 @@
+"""When something came last from the existing controller of a supervision layer (semantics 3.7)."""
+
+from __future__ import annotations
+
+from typing import Dict, List
+
+from robosc.execution.calls import FOREVER
+from robosc.execution.release import Releases
+
+
+class Commands:
+    """Tells on which release identifiers the existing controller has fallen silent while its last message acts.
+
+    Args:
+        releases: Messages that keep acting.
+        timeout_s: Seconds after which it counts as silent; 0: never.
+    """
+
+    __slots__ = ("_arrived_s", "_releases", "_timeout_s")
+
+    def __init__(self, releases: Releases, timeout_s: float) -> None:
+        self._releases = releases
+        self._timeout_s = timeout_s or FOREVER
+        self._arrived_s: Dict[str, float] = {}
+
+    def arrived(self, identifier: str, now_s: float) -> None:
+        """Something came on an identifier, whether it is let through or not."""
+        self._arrived_s[identifier] = now_s
+
+    def silent(self, now_s: float) -> List[str]:
+        """Identifiers whose last message acts although nothing has come there for the time."""
+        return [item for item in self._releases.acting() if now_s >= self._arrived_s[item] + self._timeout_s]
+
+    def deadline_s(self) -> float:
+        """When the next of them is over its time."""
+        return min((self._arrived_s[item] + self._timeout_s for item in self._releases.acting()), default=FOREVER)

@@ -1,0 +1,332 @@
+"""The executor of a supervision layer: it lets an existing controller's requests through or not (semantics 3.7).
+
+The existing controller, the caller, speaks to the layer instead of the robot. What it sends comes in through
+`on_request`, `on_call`, `on_goal` and `on_cancel`; what it receives goes out through a `LayerMiddleware`.
+Everything else is as in a controller, but nothing is decided here: a period only lets time pass.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Callable, Dict, Optional, Sequence, Tuple
+
+from robosc.execution.callers import Callers
+from robosc.execution.clock import Clock
+from robosc.execution.commands import Commands
+from robosc.execution.event_log import EventLog
+from robosc.execution.foreign import is_finite
+from robosc.execution.protocol import CommunicationInfo, ControlledSystem, LayerMiddleware, RobotSide
+from robosc.execution.requests import Request
+from robosc.execution.rest import describe_error, request_cancel
+from robosc.execution.runner import DeploymentError, Runner, Status, guarded
+from robosc.execution.settings import Settings
+from robosc.execution.steps import ExecutionError
+
+_MESSAGE = "incoming message"
+
+_FAULT = "a fault"
+_NOT_ALLOWED = "not allowed now"
+_NOT_FINITE = "a NaN or an infinity"
+_NOT_KNOWN = "no message of the model"
+_STILL_RUNNING = "its last goal may still be under way"
+_AT_REST = {
+    Status.NEW: "not started",
+    Status.WAITING: "waiting for sensors",
+    Status.STOPPING: "stopped",
+    Status.STOPPED: "stopped",
+}
+
+
+class Layer(Runner):
+    """Makes a controlled system run as a supervision layer.
+
+    Args:
+        system: Plants, requirements and supervisor with their state.
+        robot: The robot's side of the middleware.
+        caller: The existing controller's side.
+        settings: What the deployment chose; the defaults if None.
+        clock: The only source of time; the computer's if None.
+        log: The event log; none if None.
+
+    Raises:
+        DeploymentError: The model has actions and the supervisor was made for a controller, or the model does not
+            tell its incoming messages on one identifier apart.
+        SettingsError: A setting is wrong, or names what the model does not have.
+    """
+
+    def __init__(
+        self,
+        system: ControlledSystem,
+        robot: RobotSide,
+        caller: LayerMiddleware,
+        settings: Optional[Settings] = None,
+        clock: Optional[Clock] = None,
+        log: Optional[EventLog] = None,
+    ) -> None:
+        super().__init__(system, robot, "layer", settings, clock, log)
+        self._caller = caller
+        self._named = {request.name: request for request in self._requests}
+        self._messages = _messages(system.description.communications)
+        self._callers = Callers(self._calls, self._goals)
+        self._commands = Commands(self._releases, self.settings.command_timeout_s)
+
+    # What comes from the existing controller.
+
+    @guarded
+    def on_request(self, identifier: str, message: Any) -> None:
+        """The existing controller sent a message: it goes through unchanged if it is allowed now, else it is held back.
+
+        Args:
+            identifier: Where it is meant to go.
+            message: Mapping or object with the properties, or the plain value of a basic type; None for no data.
+        """
+        names = self._messages.get(identifier)
+        if names is None:
+            self._recorder.unexpected({"what": "a request on {}".format(identifier)})
+            return
+        why: Optional[str] = _FAULT
+        try:
+            self._look_at_clock()
+            self._commands.arrived(identifier, self._now_s)
+            why = self._let_message_through(names, message)
+        finally:
+            if why is not None:
+                self._hold_back(identifier, why)
+
+    @guarded
+    def on_call(self, service: str, call_id: Any, message: Any) -> None:
+        """The existing controller called a service: held back, it is answered at once with a default response.
+
+        Args:
+            service: Name of the service in the model.
+            call_id: How its answer is to be addressed; the executor only hands it back.
+            message: The request.
+        """
+        request = self._request_of(service, "service")
+        if request is None:
+            return
+        why: Optional[str] = _FAULT
+        try:
+            self._look_at_clock()
+            why = self._let_call_through(request, call_id, message)
+        finally:
+            if why is not None:
+                self._tell(self._caller.answer_default, service, call_id)
+                self._hold_back(request.identifier, why)
+
+    @guarded
+    def on_goal(self, action: str, goal_id: Any, message: Any) -> None:
+        """The existing controller sent a goal: held back, it is rejected, else accepted.
+
+        Args:
+            action: Name of the action in the model.
+            goal_id: How the caller's side knows the goal.
+            message: The goal.
+        """
+        request = self._request_of(action, "action")
+        if request is None:
+            return
+        why: Optional[str] = _FAULT
+        try:
+            self._look_at_clock()
+            why = self._let_goal_through(request, goal_id, message)
+        finally:
+            if why is not None:
+                self._tell(self._caller.reject_goal, action, goal_id)
+                self._hold_back(request.identifier, why)
+
+    @guarded
+    def on_cancel(self, action: str, goal_id: Any) -> None:
+        """The existing controller wants to cancel a goal: that is always forwarded, also while the robot is stopped.
+
+        Args:
+            action: Name of the action in the model.
+            goal_id: How the caller's side knows the goal.
+        """
+        self._look_at_clock()
+        waiting = self._callers.find_goal(action, goal_id)
+        goal = None if waiting is None else self._goals.find(waiting.number)
+        if waiting is None or goal is None:
+            self._recorder.unexpected({"what": "a cancel of no goal of {}".format(action)})
+            return
+        if waiting.is_cancelled:
+            return
+        waiting.is_cancelled = True
+        goal.is_running = False
+        try:
+            self._steps.happen(action + ".cancel", None, None)
+            self._end_batch()
+        finally:
+            request_cancel(self._robot, goal)
+
+    # What comes from the robot, and time.
+
+    def receive(self, identifier: str, data: Any) -> None:
+        """A message of the robot came: one batch; then it is passed on."""
+        super().receive(identifier, data)
+        self._finish()
+        if self._is_started and identifier in self._batches:
+            self._tell(self._caller.pass_on, identifier, data)
+
+    def tick(self) -> None:
+        """A period has passed: nothing is decided in a layer, so this is `watch`."""
+        self.watch()
+
+    def watch(self) -> None:
+        """Time has passed: stale sensors, a caller that fell silent, replies that did not come, what is still owed."""
+        super().watch()
+        self._finish()
+
+    def _next_deadline(self, now: float) -> float:
+        return min(super()._next_deadline(now), self._commands.deadline_s())
+
+    def _check_time(self, now: float) -> None:
+        for identifier in self._commands.silent(now):
+            self._steps.release(identifier)
+        super()._check_time(now)
+        # What is over ends for the caller before anything that comes at the same moment.
+        self._finish()
+
+    def _take_reply(self, request_id: int, data: Any) -> None:
+        waiting = self._callers.close_call(request_id)
+        try:
+            super()._take_reply(request_id, data)
+        finally:
+            if waiting is not None:
+                self._tell(self._caller.answer, waiting.service, waiting.call_id, data)
+
+    def _take_feedback(self, goal_id: int, data: Any) -> None:
+        waiting = self._callers.goal(goal_id)
+        try:
+            super()._take_feedback(goal_id, data)
+        finally:
+            if waiting is not None:
+                self._tell(self._caller.pass_feedback, waiting.action, waiting.goal_id, data)
+
+    def _take_end(self, goal_id: int, outcome: str, data: Any) -> None:
+        try:
+            super()._take_end(goal_id, outcome, data)
+        finally:
+            # An end that does not exist is a fault, and ends nothing.
+            waiting = None if self._goals.find(goal_id) else self._callers.close_goal(goal_id)
+            if waiting is not None:
+                end = waiting.outcome(outcome)
+                self._tell(self._caller.end_goal, waiting.action, waiting.goal_id, end, data)
+
+    def _finish(self) -> None:
+        """Tell the caller what has failed, or has turned against its requirements. Never raises."""
+        for call in self._callers.close_failed_calls():
+            self._tell(self._caller.answer_default, call.service, call.call_id)
+        for goal in self._callers.close_failed_goals():
+            self._tell(self._caller.end_goal, goal.action, goal.goal_id, "aborted", None)
+
+    # Requests: why each is held back, or None if it went through.
+
+    def _let_message_through(self, names: Sequence[str], message: Any) -> Optional[str]:
+        why = self._refusal(message)
+        if why is not None:
+            return why
+        request = self._recognized(names, message)
+        if request is None:
+            return _NOT_KNOWN
+        if not self._system.enabled(request.event):
+            return _NOT_ALLOWED
+        is_default = request.keeps_acting and self._robot.is_default(request.name, message)
+        self._take(request, message)
+        if request.keeps_acting:
+            self._releases.sent(request.name, request.identifier, is_default)
+        self._robot.publish(request.name, message)
+        return None
+
+    def _let_call_through(self, request: Request, call_id: Any, message: Any) -> Optional[str]:
+        why = self._refusal(message)
+        if why is not None:
+            return why
+        if not self._system.enabled(request.event):
+            return _NOT_ALLOWED
+        self._take(request, message)
+        number = self._calls.call(self._robot, request.name, message, self._now_s)
+        self._callers.open_call(number, request.name, call_id)
+        return None
+
+    def _let_goal_through(self, request: Request, goal_id: Any, message: Any) -> Optional[str]:
+        why = self._refusal(message)
+        if why is not None:
+            return why
+        if self._goals.is_open(request.name):
+            return _STILL_RUNNING
+        if not self._system.enabled(request.event):
+            return _NOT_ALLOWED
+        self._take(request, message)
+        goal = self._goals.send(self._robot, request.name, message, self._now_s)
+        self._caller.accept_goal(request.name, goal_id)
+        self._callers.open_goal(goal.number, request.name, goal_id)
+        return None
+
+    def _refusal(self, message: Any) -> Optional[str]:
+        """Why no request at all, or none with this message, is let through now."""
+        if not self._may_request:
+            return _AT_REST[self.status]
+        return None if is_finite(message) else _NOT_FINITE
+
+    def _take(self, request: Request, message: Any) -> None:
+        """The request happens, with all that follows from it, before its message goes out."""
+        self._steps.take(request.event, message)
+        self._steps.settle(request.name)
+        # What goes out now may wait for time to pass: looked up as soon as the clock is read again.
+        self._deadline_s = self._now_s
+
+    def _recognized(self, names: Sequence[str], message: Any) -> Optional[Request]:
+        """The request that a message is: the first whose condition is true (language B.13).
+
+        Raises:
+            ExecutionError: An enum of it is unknown, and that is a fault.
+        """
+        for name in names:
+            match = self._system.matches(name, message)
+            if match.unknown:
+                self._recorder.unknown(name + ".request", match.unknown)
+            if match.enum_unknown and self.settings.on_unknown == "fault":
+                raise ExecutionError("unknown at {}: {}".format(name + ".request", ", ".join(match.unknown)))
+            if match.enum_unknown and self.settings.on_unknown == "keep":
+                return None
+            if match.holds:
+                return self._named[name]
+        return None
+
+    def _request_of(self, name: str, kind: str) -> Optional[Request]:
+        request = self._named.get(name)
+        if request is not None and request.kind == kind:
+            return request
+        self._recorder.unexpected({"what": "a request of the {} {}".format(kind, name)})
+        return None
+
+    def _hold_back(self, identifier: str, why: str) -> None:
+        self._recorder.blocked(identifier, why)
+        self._tell(self._caller.blocked, identifier)
+
+    def _tell(self, method: Callable[..., None], *arguments: Any) -> None:
+        """Tell the caller something; what fails is a fault. Never raises."""
+        try:
+            method(*arguments)
+        except Exception as error:
+            self._fail(describe_error(error))
+
+
+def _messages(infos: Sequence[CommunicationInfo]) -> Dict[str, Tuple[str, ...]]:
+    """The incoming messages of each identifier, in source order.
+
+    Raises:
+        DeploymentError: One that has no condition is not the last of its identifier.
+    """
+    found: Dict[str, Tuple[CommunicationInfo, ...]] = {}
+    for info in infos:
+        if info.kind == _MESSAGE:
+            found[info.identifier] = (*found.get(info.identifier, ()), info)
+    for identifier, sharing in found.items():
+        for info in sharing[:-1]:
+            if not info.has_condition:
+                raise DeploymentError(
+                    "a message on '{}' may be '{}' or '{}': a supervision layer needs 'when: CONDITION' in the list of "
+                    "'{}'".format(identifier, info.name, sharing[-1].name, info.name)
+                )
+    return {identifier: tuple(info.name for info in sharing) for identifier, sharing in found.items()}

@@ -38,7 +38,7 @@ class Courier:
 
     def __init__(self, workspace: Path, peer: Peer, host: ServerHost, variables: dict[str, str], folder: Path) -> None:
         self._workspace = workspace
-        self._variables = variables
+        self.variables = variables
         self._folder = folder
         self.peer = peer
         self.host = host
@@ -65,7 +65,7 @@ class Courier:
             for item in ("-p", parameter)
         ]
         command = ["-m", "courier_controller.start", "--ros-args", *arguments]
-        self.node = RosProcess(command, self._variables, self._folder / "run", [self._workspace])
+        self.node = RosProcess(command, self.variables, self._folder / "run", [self._workspace])
         orders = [f"/order/{name}" for name in ("power", "wind", "count", "reach")]
         self.peer.wait_for_peers(["/cmd_vel", "/allowed", "/state", *orders])
 
@@ -120,7 +120,7 @@ class Courier:
     def dying_server(self) -> RosProcess:
         """A process that ends when it is asked for something."""
         file = Path(__file__).parents[1] / "support" / "ros2_dying_server.py"
-        return RosProcess([str(file)], self._variables, self._folder / "server")
+        return RosProcess([str(file)], self.variables, self._folder / "server")
 
     def reasons_of(self, event: str) -> list[Any]:
         """End the node: the data of every such event."""
@@ -372,6 +372,24 @@ def test_the_start_waits_for_the_servers(courier: Courier) -> None:
     courier.reaches("Power", "powered")
     assert courier.value("Power", "failures") == "0"
     assert not any(server.requests for server in servers)
+
+
+def test_a_prefix_moves_services_and_actions(workspace: Path, courier: Courier, tmp_path: Path) -> None:
+    command = ["-m", "courier_controller.node", "--ros-args", "-p", "topic_prefix:=/robot_1"]
+    with RosProcess(command, courier.variables, tmp_path / "run", [workspace]) as node:
+        wanted = {"/robot_1/power", "/robot_1/wind"} | {
+            f"/robot_1/{action}/_action/send_goal" for action in ("count", "arm/reach")
+        }
+
+        def names() -> set[str]:
+            found = courier.peer.node.get_node_names_and_namespaces()
+            if ("courier_controller", "/") not in found:
+                return set()
+            clients = courier.peer.node.get_client_names_and_types_by_node("courier_controller", "/")
+            return {name for name, _ in clients}
+
+        courier.peer.spin_until(lambda: wanted <= names(), LIMIT_S, "the clients", node)
+        assert all(name.startswith("/robot_1/") for name in names())
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

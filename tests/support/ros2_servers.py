@@ -5,7 +5,7 @@ from collections.abc import Callable
 from enum import Enum
 from typing import Any, Self
 
-from support.ros2 import Peer
+from support.ros2 import Peer, wait_until
 
 LIMIT_S = 60.0
 
@@ -27,13 +27,15 @@ class ServerHost:
         self.node = rclpy.create_node("test_servers", context=self._context)
         self.group = ReentrantCallbackGroup()
         self.gates: list[Gate] = []
+        self.action_servers: list[Any] = []
         self._executor = MultiThreadedExecutor(4, context=self._context)
         self._executor.add_node(self.node)
+        self._is_spinning = True
         self._thread = threading.Thread(target=self._spin)
         self._thread.start()
 
     def _spin(self) -> None:
-        while self._context.ok():
+        while self._is_spinning:
             self._executor.spin_once(timeout_sec=0.1)
 
     def gate(self) -> "Gate":
@@ -44,25 +46,31 @@ class ServerHost:
     def __enter__(self) -> Self:
         return self
 
-    def vanish(self) -> None:
-        """Be there no longer, with every server."""
+    def __exit__(self, *_: object) -> None:
         import rclpy
 
-        rclpy.try_shutdown(context=self._context)
-        self._thread.join(LIMIT_S)
         for gate in self.gates:
             gate.open(None)
+        # A server that is still at work would live on, and answer the next test.
+        wait_until(lambda: all(gate.is_over for gate in self.gates), LIMIT_S, "the servers' callbacks to end")
+        self._is_spinning = False
+        self._thread.join(LIMIT_S)
         self._executor.shutdown()
+        for server in self.action_servers:
+            server.destroy()
         self.node.destroy_node()
-
-    def __exit__(self, *_: object) -> None:
-        self.vanish()
+        rclpy.try_shutdown(context=self._context)
 
 
 class Gate:
-    """Waits until a value is there; the first one counts."""
+    """Waits until a value is there; the first one counts.
+
+    Attributes:
+        is_over: Whether what waited for it has done what it does then.
+    """
 
     def __init__(self) -> None:
+        self.is_over = False
         self._event = threading.Event()
         self._value: Any = None
 
@@ -100,7 +108,7 @@ class HeldService:
         self.requests: list[Any] = []
         self._host = host
         self._gates: list[Gate] = []
-        self._service = host.node.create_service(service_class, name, self._handle, callback_group=host.group)
+        host.node.create_service(service_class, name, self._handle, callback_group=host.group)
 
     def _handle(self, request: Any, response: Any) -> Any:
         gate = self._host.gate()
@@ -108,6 +116,7 @@ class HeldService:
         self.requests.append(request)
         for field, value in (gate.wait() or {}).items():
             setattr(response, field, value)
+        gate.is_over = True
         return response
 
     def answer(self, **fields: Any) -> None:
@@ -163,7 +172,7 @@ class HeldAction:
             self.cancels += 1
             return CancelResponse.ACCEPT if cancels else CancelResponse.REJECT
 
-        self._server = ActionServer(
+        server = ActionServer(
             host.node,
             action_class,
             name,
@@ -172,6 +181,7 @@ class HeldAction:
             cancel_callback=cancel,
             callback_group=host.group,
         )
+        host.action_servers.append(server)
 
     def _execute(self, handle: Any) -> Any:
         gate = self._host.gate()
@@ -180,12 +190,9 @@ class HeldAction:
         if self._ends_on_cancel:
             watcher = threading.Thread(target=self._watch, args=(handle, gate))
             watcher.start()
-        found = gate.wait()
-        if found is None:
-            handle.abort()
-            return self._class.Result()
-        end, fields = found
+        end, fields = gate.wait() or (End.ABORT, {})
         getattr(handle, end.value)()
+        gate.is_over = True
         return self._class.Result(**fields)
 
     def _watch(self, handle: Any, gate: Gate) -> None:

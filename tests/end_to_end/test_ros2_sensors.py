@@ -137,14 +137,13 @@ def test_270_degrees_is_on_the_right_of_every_lidar(start: Callable[..., RosProc
     node = start("resample_scans:=true")
     lidars = ((360, 0.0, 1.0, 0.5), (720, -180.0, 0.5, 0.25), (1440, 180.0, -0.25, 0.375))
     for count, first_deg, step_deg, near in lidars:
-        right, ahead = {"distance": str(near), "count": "360"}, {"distance": "0.75", "start": "0.0"}
-        peer.spin_until(
-            lambda right=right, ahead=ahead: (watched.values("Right"), watched.values("Ahead")) == (right, ahead),
-            LIMIT_S,
-            f"the LiDAR of {count} beams to be understood",
-            node,
-            send(peer, scan(count, first_deg, step_deg, near)),
-        )
+        expected = ({"distance": str(near), "count": "360"}, {"distance": "0.75", "start": "0.0"})
+
+        def is_understood(expected: tuple[dict[str, str], dict[str, str]] = expected) -> bool:
+            return (watched.values("Right"), watched.values("Ahead")) == expected
+
+        see = send(peer, scan(count, first_deg, step_deg, near))
+        peer.spin_until(is_understood, LIMIT_S, f"the LiDAR of {count} beams to be understood", node, see)
 
 
 def test_scans_are_left_alone_unless_asked_for(start: Callable[..., RosProcess], peer: Peer) -> None:

@@ -390,6 +390,9 @@ def test_a_prefix_moves_services_and_actions(workspace: Path, courier: Courier, 
 
         courier.peer.spin_until(lambda: wanted <= names(), LIMIT_S, "the clients", node)
         assert all(name.startswith("/robot_1/") for name in names())
+        # It is still waiting for servers.
+        node.signal(signal.SIGTERM)
+        assert node.wait() == 0
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -319,6 +319,11 @@ MISFITS = {
         "component C { service s with request: none, response: S links i }",
         "response of service s: std_srvs/srv/SetBool_Response has no field 'succes'; it has success, message",
     ),
+    "a stamped goal without a header": (
+        "interface i use Fibonacci from test_msgs component C {"
+        '  action a with request: none, response: none, feedback: none, stamped: "map" links i }',
+        "action a: it is stamped, but neither test_msgs/action/Fibonacci_Goal nor a field has a header",
+    ),
     "a property of another type in a request": (
         "interface i use SetBool from std_srvs datatype object S { data: integer }"
         "component C { service s with request: S, response: none links i }",

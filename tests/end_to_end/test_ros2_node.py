@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -274,6 +275,22 @@ def test_a_wrong_parameter_is_one_line_and_exit_status_2(start: StartNode, param
     assert all(other.startswith("[ERROR]") for other in others)
 
 
+def test_the_starter_needs_no_launch_and_reads_the_parameter_file(workspace: Path, domain: int, tmp_path: Path) -> None:
+    package = tmp_path / "package"
+    shutil.copytree(workspace, package)
+    file = package / "config/parameters.yaml"
+    file.write_text(file.read_text().replace("period: 0.1", "period: -1.0"))
+    command = ["-m", f"{PACKAGE}.start"]
+    for arguments, complaint in (
+        ([], "parameter 'period' is -1.0; it must be"),
+        (["--ros-args", "-p", "period:=-2.0"], "parameter 'period' is -2.0; it must be"),
+    ):
+        run = tmp_path / str(len(arguments))
+        with RosProcess([*command, *arguments], environment(domain, tmp_path), run, [package]) as node:
+            assert node.wait() == 2
+            assert node.stderr.startswith(f"{PACKAGE}: {complaint}")
+
+
 MISFITS = {
     "a type that is not installed": (
         "interface i use Pose from no_such_msgs component C { outgoing message m with type: none links i }",
@@ -287,6 +304,30 @@ MISFITS = {
     "a basic type for a message of many fields": (
         "interface i use Range from sensor_msgs component C { outgoing message m with type: double links i }",
         "the message sensor_msgs/msg/Range has the fields header, radiation_type,",
+    ),
+    "a service type that is not installed": (
+        "interface i use Fly from no_such_srvs component C { service s with request: none, response: none links i }",
+        "the service type no_such_srvs/srv/Fly is not installed; build no_such_srvs and source its workspace",
+    ),
+    "an action type that is not installed": (
+        "interface i use Trigger from std_srvs component C {"
+        "  action a with request: none, response: none, feedback: none links i }",
+        "the action type std_srvs/action/Trigger is not installed; build std_srvs and source its workspace",
+    ),
+    "a property that a service's response does not have": (
+        "interface i use SetBool from std_srvs datatype object S { succes: boolean }"
+        "component C { service s with request: none, response: S links i }",
+        "response of service s: std_srvs/srv/SetBool_Response has no field 'succes'; it has success, message",
+    ),
+    "a stamped goal without a header": (
+        "interface i use Fibonacci from test_msgs component C {"
+        '  action a with request: none, response: none, feedback: none, stamped: "map" links i }',
+        "action a: it is stamped, but neither test_msgs/action/Fibonacci_Goal nor a field has a header",
+    ),
+    "a property of another type in a request": (
+        "interface i use SetBool from std_srvs datatype object S { data: integer }"
+        "component C { service s with request: S, response: none links i }",
+        "request of service s: the field 'data' of std_srvs/srv/SetBool_Request is boolean, in the model it is integer",
     ),
 }
 

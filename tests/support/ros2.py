@@ -2,6 +2,7 @@
 
 import contextlib
 import fcntl
+import itertools
 import os
 import signal
 import subprocess
@@ -21,6 +22,8 @@ ORDERLY_END_S = 3.0
 LAST_DOMAIN = 101
 """Above it, ROS 2 would use ports that the system hands out."""
 
+_used = itertools.count()
+
 _PROFILE = """<?xml version="1.0" encoding="UTF-8"?>
 <profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
   <participant profile_name="fast_discovery" is_default_profile="true"><rtps><builtin><discovery_config>
@@ -36,9 +39,11 @@ def own_domain() -> Iterator[int]:
     """A domain id that no other test of this user has, whichever process it runs in."""
     folder = Path(tempfile.gettempdir()) / f"robosc-ros-domains-{os.getuid()}"
     folder.mkdir(exist_ok=True)
-    # Processes start looking at different places, so that they rarely meet.
+    # Processes start looking at different places, so that they rarely meet. The next test of a process gets the next
+    # domain: what the last one left behind may take a while to go.
+    start = os.getpid() + 7 * next(_used)
     for offset in range(LAST_DOMAIN):
-        domain = 1 + (os.getpid() + offset) % LAST_DOMAIN
+        domain = 1 + (start + offset) % LAST_DOMAIN
         with (folder / str(domain)).open("w") as lock:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

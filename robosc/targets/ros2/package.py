@@ -9,19 +9,32 @@ import jinja2
 
 from robosc._version import __version__
 from robosc.errors import UnsupportedModelError
+from robosc.model.structure import Communication, CommunicationKind, Interface, Model
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.python.allow import requirement_text
 from robosc.targets.python.generate import header
 from robosc.targets.python.layout import make_layout
+from robosc.targets.python.naming import snake_case
 from robosc.targets.python.package import package_name, python_files, with_relative_imports
 from robosc.targets.python.text import printable
 from robosc.targets.registry import GenerateOptions
 from robosc.targets.ros2.runtime.parameters import declarations
 from robosc.targets.ros2.state_topic import state_topic
-from robosc.targets.ros2.topics import Topic, sent_paths, shape_of, topics
+from robosc.targets.ros2.topics import Topic, sent_paths, servers, shapes_of, topics
 
-_OWN_DEPENDENCIES = ("ament_index_python", "launch", "launch_ros", "rcl_interfaces", "rclpy", "std_msgs")
+_OWN_DEPENDENCIES = (
+    "ament_index_python",
+    "diagnostic_msgs",
+    "launch",
+    "launch_ros",
+    "rcl_interfaces",
+    "rclpy",
+    "std_msgs",
+)
+_MAXIMUM_STARTER = 100
+_DIAGNOSTICS = Interface("DiagnosticArray", "diagnostic_msgs")
+_RUNTIME_MODULES = ("clients.py", "health.py", "messages.py", "parameters.py", "scans.py")
 _RELEASED_TYPES = frozenset({"Twist", "TwistStamped"})
 
 # Path of each file from a template: the template's name.
@@ -33,7 +46,10 @@ _TEMPLATES = {
     "setup.cfg": "setup.cfg.j2",
     "setup.py": "setup.py.j2",
     "test/test_supervisor.py": "test_supervisor.py.j2",
+    "{package}/interfaces.py": "interfaces.py.j2",
+    "{package}/middleware.py": "middleware.py.j2",
     "{package}/node.py": "node.py.j2",
+    "{package}/start.py": "start.py.j2",
     "{package}/state_topic.py": "state_topic.py.j2",
 }
 
@@ -45,25 +61,36 @@ def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles
         UnsupportedModelError: The model has something that this version cannot do on ROS 2.
     """
     name = package_name(supervisor, options, "controller")
-    found = topics(supervisor)
-    _require_own_name(name, found)
+    found, asked = topics(supervisor), servers(supervisor.model)
+    _require_own_names(name, found, asked)
     files = {f"{name}/{path}": text for path, text in python_files(supervisor).items()}
-    for module in ("messages.py", "parameters.py"):
+    for module in _RUNTIME_MODULES:
         text = resources.files("robosc.targets.ros2.runtime").joinpath(module).read_text(encoding="utf-8")
         files[f"{name}/runtime/{module}"] = header(supervisor) + with_relative_imports(text)
-    environment, context = _environment(), _context(supervisor, name, found)
+    environment, context = _environment(), _context(supervisor, name, found, asked)
     for path, template in _TEMPLATES.items():
         files[path.format(package=name)] = environment.get_template(template).render(context)
     files[f"resource/{name}"] = ""
     return GeneratedFiles(files)
 
 
-def _require_own_name(package: str, found: tuple[Topic, ...]) -> None:
+def _require_own_names(package: str, found: tuple[Topic, ...], asked: tuple[Communication, ...]) -> None:
+    """Do nothing if neither the package nor the topics that it has anyway are called like something of the model's."""
+    if package in _packages(found, asked):
+        raise UnsupportedModelError(
+            f"target ros2: the generated package would be called {package}, like a package whose types it uses"
+        )
     for topic in found:
-        if topic.interface.package == package:
+        if topic.identifier.lstrip("/") == "diagnostics" and topic.interface != _DIAGNOSTICS:
             raise UnsupportedModelError(
-                f"target ros2: the generated package would be called {package}, like a package whose messages it uses"
+                f"target ros2: the topic {topic.identifier} is of the type {topic.interface.package}/"
+                f"{topic.interface.type}, but every generated node publishes diagnostic_msgs/DiagnosticArray there"
             )
+
+
+def _packages(found: tuple[Topic, ...], asked: tuple[Communication, ...]) -> set[str]:
+    """The packages of all types."""
+    return {topic.interface.package for topic in found} | {item.interface.package for item in asked if item.interface}
 
 
 def release_identifiers(found: tuple[Topic, ...]) -> tuple[str, ...]:
@@ -75,13 +102,14 @@ def release_identifiers(found: tuple[Topic, ...]) -> tuple[str, ...]:
     )
 
 
-def _context(supervisor: Supervisor, package: str, found: tuple[Topic, ...]) -> dict[str, object]:
+def _context(
+    supervisor: Supervisor, package: str, found: tuple[Topic, ...], asked: tuple[Communication, ...]
+) -> dict[str, object]:
     """What the templates speak of."""
     model = supervisor.model
     layout = make_layout(supervisor)
     tables = state_topic(model)
-    published = [item for topic in found for item in topic.published]
-    dependencies = {*_OWN_DEPENDENCIES, *(topic.interface.package for topic in found)}
+    requested = [item for item in model.communications if item.kind is not CommunicationKind.OUTGOING_MESSAGE]
     return {
         "version": __version__,
         "model": model.name,
@@ -96,15 +124,21 @@ def _context(supervisor: Supervisor, package: str, found: tuple[Topic, ...]) -> 
         "topics": found,
         "parameters": declarations(release_identifiers(found)),
         "release_identifiers": release_identifiers(found),
-        "dependencies": sorted(dependencies),
-        "shapes": {item.name: shape_of(model, item) for topic in found for item in (*topic.published, *topic.received)},
-        "sent": {item.name: sent_paths(model, item) for item in published},
-        "requests": tuple(f"{item.name}.request" for item in published),
+        "dependencies": sorted({*_OWN_DEPENDENCIES, *_packages(found, asked)}),
+        "servers": asked,
+        "shapes": _shapes(model),
+        "sent": {item.name: sent_paths(model, item) for item in requested},
+        "starter": f"start_{snake_case(model.name)[:_MAXIMUM_STARTER]}",
+        "requests": tuple(f"{item.name}.request" for item in requested),
         "controllable": layout.controllable,
         "uncontrollable": layout.uncontrollable,
         "definition": tables.definition,
         "transitions": tables.transitions,
     }
+
+
+def _shapes(model: Model) -> dict[str, object]:
+    return {event: shape for item in model.communications for event, shape in shapes_of(model, item).items()}
 
 
 def _environment() -> jinja2.Environment:

@@ -1,4 +1,4 @@
-"""What a model means on ROS 2 topics, and what of it this target cannot do."""
+"""What a model means on ROS 2 topics, services and actions, and what of it this target cannot do."""
 
 import re
 from dataclasses import dataclass
@@ -45,6 +45,16 @@ _BASIC_SHAPES: dict[type[Type], str] = {
     IntegerType: "integer",
     DoubleType: "double",
 }
+
+_SERVER_KINDS = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
+
+_PARTS: dict[CommunicationKind, tuple[str, ...]] = {
+    CommunicationKind.INCOMING_MESSAGE: ("request",),
+    CommunicationKind.OUTGOING_MESSAGE: ("response",),
+    CommunicationKind.SERVICE: ("request", "response"),
+    CommunicationKind.ACTION: ("request", "response", "feedback"),
+}
+"""The events of each that carry data."""
 
 _TOPIC = re.compile(r"(~/|/)?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*\Z")
 _MAXIMUM_TOPIC = 200  # rmw takes 247 characters; the rest is left for a namespace.
@@ -99,8 +109,30 @@ def topics(supervisor: Supervisor) -> tuple[Topic, ...]:
     by_identifier: dict[str, list[Communication]] = {}
     for communication in model.communications:
         _require_valid(communication)
-        by_identifier.setdefault(communication.identifier, []).append(communication)
+        if communication.kind not in _SERVER_KINDS:
+            by_identifier.setdefault(communication.identifier, []).append(communication)
     return tuple(_topic(model, identifier, items) for identifier, items in by_identifier.items())
+
+
+def servers(model: Model) -> tuple[Communication, ...]:
+    """Every service and action, in source order.
+
+    Raises:
+        UnsupportedModelError: One has no link to a type, or two types share a name.
+    """
+    found: dict[tuple[CommunicationKind, str], Communication] = {}
+    asked = tuple(item for item in model.communications if item.kind in _SERVER_KINDS)
+    for item in asked:
+        if item.interface is None:
+            raise UnsupportedModelError(f"target ros2: '{item.name}' needs a link to the type of its {item.kind}")
+        first = found.setdefault((item.kind, item.identifier), item)
+        if first.interface is not None and first.interface != item.interface:
+            raise UnsupportedModelError(
+                f"target ros2: the {item.kind} {item.identifier} has two types: "
+                f"{first.interface.package}/{first.interface.type} for '{first.name}' and "
+                f"{item.interface.package}/{item.interface.type} for '{item.name}'"
+            )
+    return asked
 
 
 def _require_supported(supervisor: Supervisor) -> None:
@@ -109,29 +141,19 @@ def _require_supported(supervisor: Supervisor) -> None:
             f"target ros2: the supervisor of {supervisor.model.name} was made for the deployment "
             f"'{supervisor.deployment}', and this version generates controllers only"
         )
-    for communication in supervisor.model.communications:
-        if communication.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION):
-            raise UnsupportedModelError(
-                f"target ros2: '{communication.name}' of {communication.component} is {_article(communication.kind)} "
-                f"{communication.kind}, and this version generates messages only"
-            )
-
-
-def _article(kind: str) -> str:
-    return "an" if kind[0] in "aeiou" else "a"
 
 
 def _require_valid(communication: Communication) -> None:
     identifier, interface = communication.identifier, communication.interface
     if not _TOPIC.match(identifier) or len(identifier) > _MAXIMUM_TOPIC:
         raise UnsupportedModelError(
-            f"target ros2: the identifier {_quoted(identifier)} of '{communication.name}' is no ROS 2 topic name: "
+            f"target ros2: the identifier {_quoted(identifier)} of '{communication.name}' is no ROS 2 name: "
             "letters, digits and underscores between slashes, no part starting with a digit"
         )
     if interface and not (_PACKAGE.match(interface.package) and _MESSAGE.match(interface.type)):
         raise UnsupportedModelError(
             f"target ros2: {interface.type} from {interface.package}, linked by '{communication.name}', is no name of "
-            "a ROS 2 message type such as Twist from geometry_msgs"
+            "a ROS 2 type such as Twist from geometry_msgs"
         )
 
 
@@ -192,14 +214,18 @@ def _require_one_quality(identifier: str, items: list[Communication]) -> None:
             )
 
 
-def shape_of(model: Model, communication: Communication) -> Shape:
-    """What the model says about a message's data: every property that its types declare.
+def shapes_of(model: Model, communication: Communication) -> dict[str, Shape]:
+    """What the model says about data, by the event that carries it: every property that its types declare.
 
     Raises:
-        UnsupportedModelError: It sends an enum, or an object type contains itself.
+        UnsupportedModelError: A request sends an enum, or an object type contains itself.
     """
-    sends = communication.kind is CommunicationKind.INCOMING_MESSAGE
-    return _shape(model, communication, message_data_type(communication), (), sends)
+    return {
+        f"{communication.name}.{part}": _shape(
+            model, communication, getattr(communication, part) or NoneType(), (), part == "request"
+        )
+        for part in _PARTS[communication.kind]
+    }
 
 
 def _shape(model: Model, communication: Communication, type_: Type, inside: tuple[str, ...], sends: bool) -> Shape:

@@ -12,6 +12,7 @@ from robosc.targets.ros2.runtime.messages import (
     basic_field,
     check_shape,
     converter,
+    headers_of,
     load_message,
     received_field,
 )
@@ -186,3 +187,15 @@ def test_the_field_that_holds_a_received_datum() -> None:
     assert received_field(message("std_msgs", "Empty"), None, "message m") is None
     with pytest.raises(SetupError, match="a basic type can stand for none of them"):
         received_field(scan, "double", "message m")
+
+
+def test_the_headers_of_a_request_are_its_own_or_those_of_its_fields() -> None:
+    goal = message("geometry_msgs", "PoseStamped")()
+    assert headers_of(goal, "action a") == [goal.header]
+    services = pytest.importorskip("nav_msgs.srv", reason="nav_msgs is not installed")
+    plan = services.GetPlan.Request()
+    (first, second) = headers_of(plan, "action a")
+    assert first is plan.start.header
+    assert second is plan.goal.header
+    with pytest.raises(SetupError, match="action a: it is stamped, but neither geometry_msgs/msg/Twist nor a field"):
+        headers_of(message("geometry_msgs", "Twist")(), "action a")

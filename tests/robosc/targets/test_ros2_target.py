@@ -1,13 +1,11 @@
 """The generated ROS 2 package: its files are what colcon, launch and a reader expect; what is refused is named."""
 
 import ast
-import importlib.util
 import re
 import subprocess
 import sys
 import types
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +19,7 @@ from robosc.targets import GeneratedFiles, GenerateOptions, generate, write_file
 from robosc.targets.ros2.runtime.parameters import ParameterError, declarations, prefixed, validate
 from robosc.targets.ros2.state_topic import state_topic
 from support.generated import example_supervisor, imported
+from support.launch_stub import launch_actions
 from support.models import model_of
 from support.random_supervisors import CERTIFICATE
 
@@ -29,6 +28,7 @@ yaml = pytest.importorskip("yaml", reason="PyYAML, a part of ROS 2, is not insta
 PACKAGE = "line_follower_controller"
 FOLLOWER = "line_follower/line_follower"
 MAZE = "maze_solver/maze_solver"
+NAVIGATION = "navigation/navigation"
 
 
 def supervisor_of(text: str) -> Supervisor:
@@ -62,13 +62,16 @@ def test_everything_that_a_package_needs_is_there(files: GeneratedFiles) -> None
         "setup.py",
         "test/test_supervisor.py",
         f"{PACKAGE}/__init__.py",
+        f"{PACKAGE}/interfaces.py",
+        f"{PACKAGE}/middleware.py",
         f"{PACKAGE}/node.py",
+        f"{PACKAGE}/start.py",
         f"{PACKAGE}/supervisor.py",
         f"{PACKAGE}/runtime/executor.py",
     } <= set(files)
 
 
-@pytest.mark.parametrize("name", [FOLLOWER, MAZE])
+@pytest.mark.parametrize("name", [FOLLOWER, MAZE, NAVIGATION])
 def test_python_files_run_on_3_8_and_name_nothing_undefined(name: str, tmp_path: Path) -> None:
     package = generate(example_supervisor(name), "ros2")
     write_files(package, tmp_path)
@@ -106,58 +109,25 @@ def test_setup_py_installs_what_is_there(folder: Path, monkeypatch: pytest.Monke
     found = [str(path.parent.relative_to(folder)).replace("/", ".") for path in folder.rglob("__init__.py")]
     assert given["packages"] == sorted(found) == [PACKAGE, f"{PACKAGE}.runtime"]
     assert given["extras_require"] == {"test": ["pytest"]}
-    assert given["entry_points"] == {"console_scripts": [f"controller = {PACKAGE}.node:main"]}
+    scripts = [f"controller = {PACKAGE}.node:main", f"start_line_follower = {PACKAGE}.start:main"]
+    assert given["entry_points"] == {"console_scripts": scripts}
     installed = [path for _, paths in given["data_files"] for path in paths]
     assert all((folder / path).is_file() for path in installed)
     assert {"package.xml", "launch/controller.launch.py", "config/parameters.yaml"} <= set(installed)
     assert f"script_dir=$base/lib/{PACKAGE}" in (folder / "setup.cfg").read_text()
 
 
-class Recorded:
-    """Stands for a class of `launch` or `launch_ros`: keeps what it was called with."""
-
-    def __init__(self, *positional: Any, **named: Any) -> None:
-        self.positional = positional
-        self.named = named
-
-
-@pytest.fixture
-def launch_stub(monkeypatch: pytest.MonkeyPatch, folder: Path) -> Iterator[None]:
-    """`launch` is in no package index: a stub that records is the most that can be had here."""
-    modules = {
-        "launch": ["LaunchDescription"],
-        "launch.actions": ["DeclareLaunchArgument"],
-        "launch.substitutions": ["LaunchConfiguration"],
-        "launch_ros": [],
-        "launch_ros.actions": ["Node"],
-        "ament_index_python": [],
-        "ament_index_python.packages": [],
-    }
-    for name, classes in modules.items():
-        module = types.ModuleType(name)
-        for item in classes:
-            setattr(module, item, type(item, (Recorded,), {}))
-        monkeypatch.setitem(sys.modules, name, module)
-    packages = sys.modules["ament_index_python.packages"]
-    packages.get_package_share_directory = lambda package: str(folder)  # type: ignore[attr-defined]
-    yield
-
-
-@pytest.mark.usefixtures("launch_stub")
 def test_the_launch_file_starts_the_node_with_its_parameters(folder: Path) -> None:
-    spec = importlib.util.spec_from_file_location("launch_file", folder / "launch/controller.launch.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    (actions,) = module.generate_launch_description().positional
-    arguments = {item.positional[0]: item.named for item in actions if type(item).__name__ == "DeclareLaunchArgument"}
+    found = launch_actions(folder / "launch/controller.launch.py", folder)
+    arguments = {item.positional[0]: item.named for item in found["DeclareLaunchArgument"]}
     assert set(arguments) == {"parameters", "log_level"}
-    assert Path(arguments["parameters"]["default_value"]).is_file()
-    (node,) = (item for item in actions if type(item).__name__ == "Node")
+    assert Path(arguments["parameters"]["default_value"]) == folder / "config/parameters.yaml"
+    (node,) = found["Node"]
     assert node.named["package"] == PACKAGE
     assert node.named["executable"] == "controller"
     (parameters,) = node.named["parameters"]
     assert parameters.positional == ("parameters",)
+    assert set(found) == {"DeclareLaunchArgument", "Node"}
 
 
 def test_the_parameter_file_holds_every_default(files: GeneratedFiles) -> None:
@@ -199,7 +169,17 @@ def test_the_readme_tells_how_messages_travel() -> None:
     assert "\n- `scan` on `/scan` is stale after 30.0 s without a message" in readme
 
 
-@pytest.mark.parametrize("name", [FOLLOWER, MAZE])
+def test_services_and_actions_stand_in_the_package() -> None:
+    files = generate(example_supervisor(NAVIGATION), "ros2")
+    readme = files["README.md"]
+    assert "| `/calibrate` | `std_srvs/srv/Trigger` | service | calibrate |" in readme
+    assert "| `/navigate_to_pose` | `nav2_msgs/action/NavigateToPose` | action | navigate |" in readme
+    dependencies = {item.text for item in ElementTree.fromstring(files["package.xml"]).findall("exec_depend")}
+    assert {"std_srvs", "nav2_msgs", "diagnostic_msgs"} <= dependencies
+    assert "start_navigation = " in files["setup.py"]
+
+
+@pytest.mark.parametrize("name", [FOLLOWER, MAZE, NAVIGATION])
 def test_the_packages_own_tests_pass_without_ros(name: str, tmp_path: Path) -> None:
     write_files(generate(example_supervisor(name), "ros2"), tmp_path)
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test"]
@@ -250,24 +230,15 @@ def test_a_package_may_be_called_as_one_likes() -> None:
     ("body", "problem"),
     [
         (
-            "interface t use T from x_srvs component C { service s with request: none, response: none links t }",
-            "'s' of C is a service, and this version generates messages only",
-        ),
-        (
-            "interface t use Go from x_msgs component C {"
-            "  action a with request: none, response: none, feedback: none links t }",
-            "'a' of C is an action, and this version generates messages only",
-        ),
-        (
             'component C { outgoing message m with identifier: "/a b", type: none }',
-            "the identifier '/a b' of 'm' is no ROS 2 topic name",
+            "the identifier '/a b' of 'm' is no ROS 2 name",
         ),
         ('component C { outgoing message m with identifier: "/1", type: none }', "identifier '/1' of 'm'"),
         ('component C { outgoing message m with identifier: "/a/", type: none }', "identifier '/a/' of 'm'"),
         ('component C { outgoing message m with identifier: "/a//b", type: none }', "identifier '/a//b' of 'm'"),
         ('component C { outgoing message m with identifier: "/a\\n", type: none }', "identifier '/a\\n' of 'm'"),
         ('component C { outgoing message m with identifier: "{x}", type: none }', "identifier '{x}' of 'm'"),
-        ('component C { outgoing message m with identifier: "/' + "x" * 220 + '", type: none }', "no ROS 2 topic name"),
+        ('component C { outgoing message m with identifier: "/' + "x" * 220 + '", type: none }', "no ROS 2 name"),
         (
             'component C { outgoing message m with identifier: "/t", type: none'
             '              outgoing message n with identifier: "/t", type: double }',
@@ -281,7 +252,7 @@ def test_a_package_may_be_called_as_one_likes() -> None:
         ),
         (
             "interface i use twist from geometry_msgs component C { outgoing message m with type: none links i }",
-            "twist from geometry_msgs, linked by 'm', is no name of a ROS 2 message type",
+            "twist from geometry_msgs, linked by 'm', is no name of a ROS 2 type",
         ),
         (
             "interface i use Twist from Geometry_Msgs component C { outgoing message m with type: none links i }",
@@ -293,8 +264,34 @@ def test_a_package_may_be_called_as_one_likes() -> None:
             "'m' sends the enum E, which is made from received data",
         ),
         (
+            "interface s use S from x_srvs interface t use T from x_srvs component C {"
+            '  service a with identifier: "/s", request: none, response: none links s'
+            '  service b with identifier: "/s", request: none, response: none links t }',
+            "the service /s has two types: x_srvs/S for 'a' and x_srvs/T for 'b'",
+        ),
+        (
+            "interface i use Go from x_msgs component C {"
+            '  action a with identifier: "/a b", request: none, response: none, feedback: none links i }',
+            "the identifier '/a b' of 'a' is no ROS 2 name",
+        ),
+        (
+            "datatype enum E from double to { value > 1.0 -> a default -> b } datatype object O { e: E }"
+            "interface i use Go from x_msgs component C {"
+            "  action go with request: O, response: none, feedback: none links i }",
+            "'go' sends the enum E, which is made from received data",
+        ),
+        (
+            'component C { outgoing message m with identifier: "/diagnostics", type: string }',
+            "the topic /diagnostics is of the type std_msgs/String, but every generated node publishes",
+        ),
+        (
+            "interface i use X from robot_controller component C {"
+            "  service s with request: none, response: none links i }",
+            "the generated package would be called robot_controller, like a package whose types it uses",
+        ),
+        (
             "interface i use X from robot_controller component C { outgoing message m with type: none links i }",
-            "the generated package would be called robot_controller, like a package whose messages it uses",
+            "the generated package would be called robot_controller, like a package whose types it uses",
         ),
     ],
 )
@@ -305,11 +302,6 @@ def test_what_it_cannot_do_is_refused_with_its_name(body: str, problem: str) -> 
     assert message.startswith("target ros2: ")
     assert problem in message
     assert "\n" not in message
-
-
-def test_services_and_actions_of_the_example_are_refused() -> None:
-    with pytest.raises(UnsupportedModelError, match="'calibrate' of Localisation is a service"):
-        generate(example_supervisor("navigation/navigation"), "ros2")
 
 
 def test_a_layer_is_refused() -> None:
@@ -386,6 +378,13 @@ def given(**changes: Any) -> dict[str, Any]:
         ({"max_age": ["/scan=0"]}, "parameter 'max_age of /scan' is 0.0"),
         ({"max_age": ["/cmd_vel=1"]}, "parameter 'max_age': '/cmd_vel' is not"),
         ({"on_unknown": "panic"}, "parameter 'on_unknown' is 'panic'; it must be one of default, keep, fault"),
+        ({"service_timeout": -1.0}, "parameter 'service_timeout' is -1.0; it must be a number of seconds, 0 or more"),
+        ({"service_timeout": True}, "parameter 'service_timeout' is True; it must be a number of seconds"),
+        ({"action_timeout": "long"}, "parameter 'action_timeout' is 'long'; it must be a number of seconds"),
+        ({"action_timeout": float("nan")}, "parameter 'action_timeout' is nan; it must be a number of seconds"),
+        ({"server_wait": float("inf")}, "parameter 'server_wait' is inf; it must be a number of seconds"),
+        ({"resample_scans": "yes"}, "parameter 'resample_scans' is 'yes'; it must be true or false"),
+        ({"use_sim_time": 1}, "parameter 'use_sim_time' is 1; it must be true or false"),
         ({"topic_prefix": "a b"}, "parameter 'topic_prefix' is 'a b'; it must be empty or"),
         ({"topic_prefix": "robot"}, "parameter 'topic_prefix' is 'robot'"),
         ({"log_folder": 3}, "parameter 'log_folder' is 3; it must be a string"),
@@ -400,14 +399,33 @@ def test_a_wrong_parameter_is_one_clear_error(changes: dict[str, Any], complaint
 
 def test_parameters_become_settings() -> None:
     checked = validate(
-        given(period=1, priority=["halt", ""], release_identifiers=[""], max_age=["/scan=0.5"], topic_prefix="/a/b/"),
+        given(
+            period=1,
+            priority=["halt", ""],
+            release_identifiers=[""],
+            max_age=["/scan=0.5"],
+            service_timeout=3,
+            action_timeout=2.5,
+            server_wait=0,
+            resample_scans=True,
+            topic_prefix="/a/b/",
+        ),
         describe(example_supervisor(FOLLOWER)),
     )
     assert checked.settings.period_s == 1.0
     assert checked.settings.priority == ("halt",)
     assert checked.settings.release_identifiers == ()
     assert checked.settings.max_age_s == {"/scan": 0.5}
+    assert (checked.settings.service_timeout_s, checked.settings.action_timeout_s) == (3.0, 2.5)
+    assert (checked.server_wait_s, checked.resample_scans) == (0.0, True)
     assert checked.topic_prefix == "/a/b"
+
+
+def test_zero_is_no_timeout() -> None:
+    checked = validate(given(service_timeout=0, action_timeout=0.0), describe(example_supervisor(FOLLOWER)))
+    assert (checked.settings.service_timeout_s, checked.settings.action_timeout_s) == (None, None)
+    default = validate(given(), describe(example_supervisor(FOLLOWER)))
+    assert (default.settings.service_timeout_s, default.settings.action_timeout_s) == (10.0, None)
 
 
 def test_prefixes() -> None:

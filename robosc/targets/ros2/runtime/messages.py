@@ -18,12 +18,11 @@ from typing import Any, NamedTuple
 
 from robosc.execution.protocol import DataDoesNotFit
 
-Path = tuple[str, ...]
-
 MAXIMUM_FLOAT32 = 3.4028234663852886e38
 _INFINITY = float("inf")
 _INTEGER = re.compile(r"(u?)int(8|16|32|64)\Z")
 _SEQUENCE = re.compile(r"sequence<(?P<element>.+?)(, [0-9]+)?>\Z|(?P<fixed>.+)\[[0-9]+\]\Z")
+_NESTED = re.compile(r"[a-z0-9_]+/[A-Za-z0-9]+\Z")
 _STRING = re.compile(r"w?string(<(?P<bound>[0-9]+)>)?\Z")
 
 
@@ -51,6 +50,31 @@ class Topic(NamedTuple):
     frames: dict[str, str]
 
 
+class Server(NamedTuple):
+    """A service or an action that the node asks.
+
+    Attributes:
+        name: Its name in the model.
+        is_action: Which of the two it is.
+        identifier: Service or action name in the model.
+        package: Package of its type.
+        type: Name of its type.
+        frame: Frame of the header of its requests, or None.
+    """
+
+    name: str
+    is_action: bool
+    identifier: str
+    package: str
+    type: str
+    frame: str | None
+
+    @property
+    def subject(self) -> str:
+        """It in words."""
+        return "{} {}".format("action" if self.is_action else "service", self.name)
+
+
 class SetupError(Exception):
     """The model and the installed message types do not fit together; says what and where."""
 
@@ -61,11 +85,26 @@ def load_message(package: str, name: str) -> Any:
     Raises:
         SetupError: It cannot be imported.
     """
+    return _load(package, "msg", "message", name)
+
+
+def load_server(server: Server) -> Any:
+    """The class of a service's or action's type.
+
+    Raises:
+        SetupError: It cannot be imported.
+    """
+    if server.is_action:
+        return _load(server.package, "action", "action", server.type)
+    return _load(server.package, "srv", "service", server.type)
+
+
+def _load(package: str, folder: str, kind: str, name: str) -> Any:
     try:
-        return getattr(importlib.import_module(package + ".msg"), name)
+        return getattr(importlib.import_module(f"{package}.{folder}"), name)
     except (ImportError, AttributeError) as error:
         raise SetupError(
-            f"the message type {package}/msg/{name} is not installed; build {package} and source its workspace"
+            f"the {kind} type {package}/{folder}/{name} is not installed; build {package} and source its workspace"
         ) from error
 
 
@@ -81,9 +120,31 @@ def require_header(message_class: Any, subject: str) -> None:
         )
 
 
+def headers_of(message: Any, subject: str) -> list[Any]:
+    """The headers to be stamped in the request of an action: its own, else those of its fields.
+
+    Raises:
+        SetupError: There is none.
+    """
+    fields = message.get_fields_and_field_types()
+    if fields.get("header") == "std_msgs/Header":
+        return [message.header]
+    found = []
+    for name, field_type in fields.items():
+        inner = getattr(message, name)
+        if _NESTED.match(field_type) and inner.get_fields_and_field_types().get("header") == "std_msgs/Header":
+            found.append(inner.header)
+    if not found:
+        raise SetupError(
+            f"{subject}: it is stamped, but neither {message_name(type(message))} nor a field has a header"
+        )
+    return found
+
+
 def message_name(message_class: Any) -> str:
-    """A message class as ROS names it: `geometry_msgs/msg/Twist`."""
-    return "{}/msg/{}".format(message_class.__module__.split(".")[0], message_class.__name__)
+    """A message class as ROS names it: `geometry_msgs/msg/Twist`, `std_srvs/srv/SetBool_Request`."""
+    package, folder = message_class.__module__.split(".")[:2]
+    return f"{package}/{folder}/{message_class.__name__}"
 
 
 def basic_field(message_class: Any) -> str:
@@ -123,7 +184,7 @@ def check_shape(message_class: Any, shape: Any, subject: str) -> None:
         _check_field(field_type, shape, subject, message_class, (name,))
 
 
-def _check_object(message_class: Any, shape: dict[str, Any], subject: str, path: Path) -> None:
+def _check_object(message_class: Any, shape: dict[str, Any], subject: str, path: tuple[str, ...]) -> None:
     fields = message_class.get_fields_and_field_types()
     for name, inner in shape.items():
         if name not in fields:
@@ -135,7 +196,7 @@ def _check_object(message_class: Any, shape: dict[str, Any], subject: str, path:
         _check_field(fields[name], inner, subject, message_class, (*path, name))
 
 
-def _check_field(field_type: str, shape: Any, subject: str, message_class: Any, path: Path) -> None:
+def _check_field(field_type: str, shape: Any, subject: str, message_class: Any, path: tuple[str, ...]) -> None:
     array = _SEQUENCE.match(field_type)
     if isinstance(shape, list):
         if array is None:
@@ -149,7 +210,7 @@ def _check_field(field_type: str, shape: Any, subject: str, message_class: Any, 
         raise _misfit(field_type, shape, subject, message_class, path)
 
 
-def _misfit(field_type: str, shape: str, subject: str, message_class: Any, path: Path) -> SetupError:
+def _misfit(field_type: str, shape: str, subject: str, message_class: Any, path: tuple[str, ...]) -> SetupError:
     return SetupError(
         "{}: the field '{}' of {} is {}, in the model it is {}".format(
             subject, ".".join(path), message_name(message_class), field_type, shape
@@ -242,7 +303,7 @@ def _to_integer(low: int, high: int) -> Callable[[Any], int]:
 class _Slot(NamedTuple):
     """A field that requests set: where it is, how a value gets there, and its default."""
 
-    path: Path
+    path: tuple[str, ...]
     owner: Any
     field: str
     convert: Callable[[Any], Any]
@@ -266,7 +327,7 @@ class Sender:
         SetupError: The message does not fit the model.
     """
 
-    def __init__(self, message_class: Any, shape: Any, paths: tuple[Path, ...], subject: str) -> None:
+    def __init__(self, message_class: Any, shape: Any, paths: tuple[tuple[str, ...], ...], subject: str) -> None:
         check_shape(message_class, shape, subject)
         self.message = message_class()
         self.is_default = True
@@ -293,7 +354,7 @@ class Sender:
         self.is_default = is_default
 
 
-def _part(data: Any, path: Path) -> Any:
+def _part(data: Any, path: tuple[str, ...]) -> Any:
     """The part of nested data at a path; None where it is not given."""
     for name in path:
         if data is None:
@@ -302,7 +363,7 @@ def _part(data: Any, path: Path) -> Any:
     return data
 
 
-def _slot(message: Any, shape: Any, path: Path) -> _Slot:
+def _slot(message: Any, shape: Any, path: tuple[str, ...]) -> _Slot:
     owner = message
     names = path or (basic_field(type(message)),)
     for name in names[:-1]:

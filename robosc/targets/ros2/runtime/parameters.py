@@ -5,6 +5,7 @@ A copy of this module stands in generated packages, which run on Python 3.8 and 
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -15,6 +16,9 @@ from robosc.execution.settings import Settings, SettingsError, settings_for
 _PREFIX = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+\Z")
 
 MAXIMUM_PERIOD_S = 3600.0
+
+USE_SIM_TIME = "use_sim_time"
+"""Every ROS node has this parameter by itself."""
 
 # Settings that have another name as parameters.
 _SETTING_NAMES = {"period": "period_s", "max_age": "max_age_s"}
@@ -40,12 +44,16 @@ class Parameters(NamedTuple):
         topic_prefix: What is put before every topic name.
         log_folder: Folder of the event log; empty for none.
         publish_state: Whether the state is published on `/state`.
+        server_wait_s: How long the start waits for servers.
+        resample_scans: Whether laser scans are brought to 360 ranges.
     """
 
     settings: Settings
     topic_prefix: str
     log_folder: str
     publish_state: bool
+    server_wait_s: float
+    resample_scans: bool
 
 
 def declarations(release_identifiers: Sequence[str]) -> tuple[Parameter, ...]:
@@ -74,9 +82,42 @@ def declarations(release_identifiers: Sequence[str]) -> tuple[Parameter, ...]:
             "What happens when received data leaves an enum unknown: default (it takes its default value), keep (as if "
             "nothing had come), fault (stop).",
         ),
-        Parameter("topic_prefix", "", 'Put before every topic name, such as "/robot1".'),
+        Parameter(
+            "service_timeout",
+            10.0,
+            "Seconds after which a service call without a reply has failed, also if its server was lost; 0 for never.",
+        ),
+        Parameter(
+            "action_timeout",
+            0.0,
+            "Seconds after which a goal without a result has failed and is cancelled; 0 for never.",
+        ),
+        Parameter(
+            "server_wait",
+            5.0,
+            "Seconds that the start waits for the servers of all services and actions; the controller then starts "
+            "without those that are missing, and their requests fail until they are there.",
+        ),
+        Parameter(
+            "resample_scans",
+            False,
+            "Whether every received sensor_msgs/LaserScan is brought to 360 ranges, one for each degree "
+            "counter-clockwise from straight ahead (the smallest valid one, NaN if there is none), so that ranges[270] "
+            "is what stands at 270 degrees whatever the LiDAR.",
+        ),
+        Parameter(
+            "topic_prefix",
+            "",
+            'Put before every topic, service and action name of the model and before /state, such as "/robot1".',
+        ),
         Parameter("log_folder", "", "Folder for the event log (JSON Lines); empty for none."),
         Parameter("publish_state", False, "Whether state and transitions are published on /state each period."),
+        Parameter(
+            USE_SIM_TIME,
+            False,
+            "Whether the time in headers is that of /clock; periods, ages and timeouts always follow the computer's "
+            "steady clock.",
+        ),
     )
 
 
@@ -98,6 +139,8 @@ def validate(given: Mapping[str, Any], description: Description) -> Parameters:
         every=given["every"],
         release_identifiers=_texts(given, "release_identifiers"),
         max_age_s=_ages(given),
+        service_timeout_s=_seconds(given, "service_timeout") or None,
+        action_timeout_s=_seconds(given, "action_timeout") or None,
         on_unknown=given["on_unknown"],
     )
     try:
@@ -106,7 +149,15 @@ def validate(given: Mapping[str, Any], description: Description) -> Parameters:
         raise ParameterError(_in_words_of_parameters(str(error))) from error
     if checked.period_s > MAXIMUM_PERIOD_S:
         raise _wrong("period", checked.period_s, f"at most {MAXIMUM_PERIOD_S:g} seconds")
-    return Parameters(checked, _prefix(given), _text(given, "log_folder"), _boolean(given, "publish_state"))
+    _boolean(given, USE_SIM_TIME)
+    return Parameters(
+        settings=checked,
+        topic_prefix=_prefix(given),
+        log_folder=_text(given, "log_folder"),
+        publish_state=_boolean(given, "publish_state"),
+        server_wait_s=_seconds(given, "server_wait"),
+        resample_scans=_boolean(given, "resample_scans"),
+    )
 
 
 def _in_words_of_parameters(text: str) -> str:
@@ -124,6 +175,13 @@ def _boolean(given: Mapping[str, Any], name: str) -> bool:
     if not isinstance(value, bool):
         raise _wrong(name, value, "true or false")
     return value
+
+
+def _seconds(given: Mapping[str, Any], name: str) -> float:
+    value = given[name]
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value < math.inf:
+        raise _wrong(name, value, "a number of seconds, 0 or more")
+    return float(value)
 
 
 def _text(given: Mapping[str, Any], name: str) -> str:
@@ -168,7 +226,7 @@ def _prefix(given: Mapping[str, Any]) -> str:
 
 
 def prefixed(prefix: str, identifier: str) -> str:
-    """A topic's name on the wire; private names (`~/x`) already belong to the node and get no prefix."""
+    """A topic's, service's or action's name on the wire; private ones (`~/x`) belong to the node and get no prefix."""
     if not prefix or identifier.startswith("~"):
         return identifier
     return prefix + "/" + identifier.lstrip("/")

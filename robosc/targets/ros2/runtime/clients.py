@@ -1,0 +1,269 @@
+"""Service calls and goals through clients of ROS 2: nothing waits, and every end is told to the executor.
+
+The clients are handed in; what they must do is what rclpy's `Client` and `ActionClient` do. Everything runs in the
+node's one thread. What comes back is kept in `Reports` until the node's loop hands it on: the executor must not be
+called from within itself, as it would be where a server is missing at the moment of a request.
+
+A copy of this module stands in generated packages, which run on Python 3.8 and later.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from robosc.execution.executor import Executor
+
+LOST_S = 1.0
+"""A server that was not seen for so long is lost; discovery may lose sight of it for a moment."""
+
+REFUSAL_S = 0.25
+"""How long after a refused cancel the goal's end may still be on its way."""
+
+MAXIMUM_PENDING = 16
+"""Calls of one service whose reply is still listened for, so that a late one is noticed."""
+
+# action_msgs/msg/GoalStatus.
+_OUTCOMES = {4: "succeeded", 5: "cancelled", 6: "aborted"}
+
+# action_msgs/srv/CancelGoal: why a cancel was refused. The others are REJECTED, and NONE for no goal, which rclpy's
+# own server answers instead.
+_UNKNOWN_GOAL = 2
+_GOAL_TERMINATED = 3
+
+
+class Reports:
+    """What became of calls and goals, kept until the executor may be told."""
+
+    def __init__(self) -> None:
+        self._waiting: deque[Callable[[Executor], None]] = deque()
+
+    def add(self, report: Callable[[Executor], None]) -> None:
+        """Keep a report for the executor."""
+        self._waiting.append(report)
+
+    def deliver(self, executor: Executor) -> bool:
+        """Tell what was kept until now; what that brings about waits for the next time. Whether there was anything."""
+        count = len(self._waiting)
+        for _ in range(count):
+            self._waiting.popleft()(executor)
+        return count > 0
+
+
+class _Presence:
+    """Tells when a server is lost."""
+
+    def __init__(self, is_ready: Callable[[], bool]) -> None:
+        self._is_ready = is_ready
+        self._missed_since_s: float | None = None
+
+    def is_lost(self, now_s: float) -> bool:
+        """Whether it has not been seen for `LOST_S`, asked again and again."""
+        if self._is_ready():
+            self._missed_since_s = None
+            return False
+        if self._missed_since_s is None:
+            self._missed_since_s = now_s
+        return now_s >= self._missed_since_s + LOST_S
+
+    def forget(self) -> None:
+        """Nobody asks any more."""
+        self._missed_since_s = None
+
+
+class _Call:
+    """A call without a reply so far: its future, and when the executor no longer waits for it."""
+
+    __slots__ = ("deadline_s", "future")
+
+    def __init__(self, future: Any, deadline_s: float) -> None:
+        self.future = future
+        self.deadline_s = deadline_s
+
+
+class ServiceCalls:
+    """The calls of one service.
+
+    Args:
+        client: Has `service_is_ready`, `call_async` and `remove_pending_request`.
+        name: The service's name on ROS.
+        reports: Where replies go.
+        monotonic: The clock.
+        timeout_s: After which the executor itself counts a call as failed, or None.
+    """
+
+    def __init__(
+        self, client: Any, name: str, reports: Reports, monotonic: Callable[[], float], timeout_s: float | None
+    ) -> None:
+        self.name = name
+        self._client = client
+        self._reports = reports
+        self._monotonic = monotonic
+        self._timeout_s = float("inf") if timeout_s is None else timeout_s
+        self._presence = _Presence(client.service_is_ready)
+        self._calls: dict[int, _Call] = {}
+
+    def is_ready(self) -> bool:
+        """Whether there is a server."""
+        return bool(self._client.service_is_ready())
+
+    def call(self, request_id: int, message: Any) -> None:
+        """Call it without waiting."""
+        if not self.is_ready():
+            self._fail(request_id, f"there is no server of {self.name}")
+            return
+        future = self._client.call_async(message)
+        self._calls[request_id] = _Call(future, self._monotonic() + self._timeout_s)
+        future.add_done_callback(lambda done: self._answered(request_id, done))
+        if len(self._calls) > MAXIMUM_PENDING:
+            self._forget(next(iter(self._calls)))
+
+    def check(self, now_s: float) -> None:
+        """Notice a lost server: every call under way has failed."""
+        if not self._calls:
+            self._presence.forget()
+        elif self._presence.is_lost(now_s):
+            for request_id, call in list(self._calls.items()):
+                self._forget(request_id)
+                if now_s < call.deadline_s:
+                    self._fail(request_id, f"the server of {self.name} is lost")
+
+    def _forget(self, request_id: int) -> None:
+        self._client.remove_pending_request(self._calls.pop(request_id).future)
+
+    def _fail(self, request_id: int, reason: str) -> None:
+        self._reports.add(lambda executor: executor.on_call_failed(request_id, reason))
+
+    def _answered(self, request_id: int, future: Any) -> None:
+        self._calls.pop(request_id, None)
+        error = future.exception()
+        if error is not None:
+            self._fail(request_id, f"the call of {self.name} failed: {error}")
+            return
+        reply = future.result()
+        self._reports.add(lambda executor: executor.on_reply(request_id, reply))
+
+
+class _Goal:
+    """A goal whose end is not known.
+
+    Attributes:
+        handle: What rclpy calls it by, once it was accepted.
+        refused_s: When its cancel was refused although it may be running, or None.
+    """
+
+    __slots__ = ("handle", "refused_s")
+
+    def __init__(self) -> None:
+        self.handle: Any = None
+        self.refused_s: float | None = None
+
+
+class ActionGoals:
+    """The goals of one action.
+
+    Args:
+        client: Has `server_is_ready` and `send_goal_async`.
+        name: The action's name on ROS.
+        reports: Where what is heard of goals goes.
+        monotonic: The clock.
+    """
+
+    def __init__(self, client: Any, name: str, reports: Reports, monotonic: Callable[[], float]) -> None:
+        self.name = name
+        self._client = client
+        self._reports = reports
+        self._monotonic = monotonic
+        self._presence = _Presence(client.server_is_ready)
+        self._goals: dict[int, _Goal] = {}
+
+    def is_ready(self) -> bool:
+        """Whether there is a server."""
+        return bool(self._client.server_is_ready())
+
+    def send(self, goal_id: int, message: Any) -> None:
+        """Send a goal without waiting."""
+        if not self.is_ready():
+            self._end(goal_id, "lost")
+            return
+        future = self._client.send_goal_async(message, feedback_callback=self._feedback(goal_id))
+        self._goals[goal_id] = _Goal()
+        future.add_done_callback(lambda done: self._answered(goal_id, done))
+
+    def cancel(self, goal_id: int) -> None:
+        """Ask for the cancel of an accepted goal without waiting."""
+        goal = self._goals.get(goal_id)
+        # Its end may be known here and wait to be told.
+        if goal is not None:
+            future = goal.handle.cancel_goal_async()
+            future.add_done_callback(lambda done: self._cancel_answered(goal_id, done))
+
+    def check(self, now_s: float) -> None:
+        """Notice a lost server, and refused cancels of goals that do not end."""
+        if not self._goals:
+            self._presence.forget()
+        elif self._presence.is_lost(now_s):
+            for goal_id in list(self._goals):
+                self._end(goal_id, "lost")
+        for goal_id, goal in self._goals.items():
+            if goal.refused_s is not None and now_s >= goal.refused_s + REFUSAL_S:
+                goal.refused_s = None
+                self._refuse(goal_id, is_ended=False)
+
+    def _feedback(self, goal_id: int) -> Callable[[Any], None]:
+        def receive(message: Any) -> None:
+            data = message.feedback
+            self._reports.add(lambda executor: executor.on_feedback(goal_id, data))
+
+        return receive
+
+    def _answered(self, goal_id: int, future: Any) -> None:
+        """The server accepted or rejected a goal."""
+        if future.exception() is not None:
+            self._end(goal_id, "lost")
+            return
+        handle = future.result()
+        if not handle.accepted:
+            # rclpy keeps the callback of a rejected goal for ever.
+            getattr(self._client, "_feedback_callbacks", {}).pop(bytes(handle.goal_id.uuid), None)
+            self._end(goal_id, "rejected")
+            return
+        goal = self._goals.get(goal_id)
+        if goal is None:
+            # Its server counted as lost: nobody would ever stop this one.
+            handle.cancel_goal_async()
+            return
+        goal.handle = handle
+        self._reports.add(lambda executor: executor.on_goal_accepted(goal_id))
+        handle.get_result_async().add_done_callback(lambda done: self._result_came(goal_id, done))
+
+    def _result_came(self, goal_id: int, future: Any) -> None:
+        if future.exception() is not None:
+            self._end(goal_id, "lost")
+            return
+        answer = future.result()
+        # Any other status means that the server does not know the goal: it was started anew.
+        outcome = _OUTCOMES.get(answer.status, "lost")
+        self._end(goal_id, outcome, answer.result if outcome == "succeeded" else None)
+
+    def _cancel_answered(self, goal_id: int, future: Any) -> None:
+        if goal_id not in self._goals or future.exception() is not None:
+            return  # Ended, or its server is about to be noticed as lost.
+        answer = future.result()
+        if answer.goals_canceling:
+            return
+        if answer.return_code == _GOAL_TERMINATED:
+            self._refuse(goal_id, is_ended=True)
+        elif answer.return_code == _UNKNOWN_GOAL:
+            self._end(goal_id, "lost")
+        else:
+            # The server may say so because the goal has just ended.
+            self._goals[goal_id].refused_s = self._monotonic()
+
+    def _refuse(self, goal_id: int, is_ended: bool) -> None:
+        self._reports.add(lambda executor: executor.on_cancel_refused(goal_id, is_ended))
+
+    def _end(self, goal_id: int, outcome: str, result: Any = None) -> None:
+        self._goals.pop(goal_id, None)
+        self._reports.add(lambda executor: executor.on_goal_ended(goal_id, outcome, result))

@@ -1,0 +1,89 @@
+"""What `/diagnostics` says about a controller.
+
+A copy of this module stands in generated packages, which run on Python 3.8 and later.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+from robosc.execution.executor import Executor, Status
+from robosc.execution.recorder import Counters
+
+
+class Level(IntEnum):
+    """The levels of diagnostic_msgs/msg/DiagnosticStatus."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+
+
+class Health(NamedTuple):
+    """One report.
+
+    Attributes:
+        level: How grave it is.
+        message: Why, in words.
+        values: More, by name.
+    """
+
+    level: Level
+    message: str
+    values: dict[str, str]
+
+
+class HealthMonitor:
+    """Judges an executor.
+
+    Args:
+        executor: The executor.
+
+    Attributes:
+        missing_servers: Servers that the start waits for.
+    """
+
+    def __init__(self, executor: Executor) -> None:
+        self._executor = executor
+        self._before = executor.counters
+        self._decision_us: float | None = None
+        self.missing_servers: tuple[str, ...] = ()
+
+    def decided(self, took_s: float) -> None:
+        """A decision took so long."""
+        self._decision_us = took_s * 1e6
+
+    def next_interval(self) -> None:
+        """From now on only what goes wrong later is worth a warning."""
+        self._before = self._executor.counters
+
+    def report(self) -> Health:
+        """How it is."""
+        executor = self._executor
+        counters, status = executor.counters, executor.status
+        values = {"status": status.value, "reason": "; ".join(executor.reasons)}
+        values.update((name, str(number)) for name, number in counters._asdict().items())
+        values["last decision (us)"] = "" if self._decision_us is None else f"{self._decision_us:.1f}"
+        level, message = self._judge(status, counters)
+        return Health(level, message, values)
+
+    def _judge(self, status: Status, counters: Counters) -> tuple[Level, str]:
+        reasons = self._executor.reasons
+        if reasons:
+            return Level.ERROR, "stopped: " + "; ".join(reasons)
+        if status is Status.NEW:
+            names = ", ".join(self.missing_servers)
+            return Level.WARN, f"waiting for servers: {names}" if names else "not started"
+        if status is Status.WAITING:
+            return Level.WARN, "waiting for the first message of every sensor with a maximum age"
+        new = [
+            f"{after - before} {name}"
+            for name, before, after in (
+                (name, getattr(self._before, name), getattr(counters, name)) for name in counters._fields
+            )
+            if after > before
+        ]
+        if new:
+            return Level.WARN, "since the last report: " + ", ".join(new)
+        return Level.OK, "running"

@@ -1,0 +1,65 @@
+"""Scans of any LiDAR as 360 ranges, one for each degree, so that `ranges[270]` is what stands at 270 degrees.
+
+Degrees count counter-clockwise from straight ahead, as ROS counts angles (REP 103). A bin is centred on its degree.
+
+A copy of this module stands in generated packages, which run on Python 3.8 and later.
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+from typing import Any
+
+BIN_COUNT = 360
+_BINS_PER_RADIAN = BIN_COUNT / (2.0 * math.pi)
+_NAN = float("nan")
+_INFINITY = float("inf")
+
+
+def bin_numbers(angle_min: float, angle_increment: float, count: int) -> list[int]:
+    """The bin of each beam: its angle, rounded to a degree; empty if the angles are no numbers."""
+    if not (math.isfinite(angle_min) and math.isfinite(angle_increment)):
+        return []
+    first, step = angle_min * _BINS_PER_RADIAN + 0.5, angle_increment * _BINS_PER_RADIAN
+    # A remainder before the floor: angles that are far too large stay numbers of bins.
+    return [int((first + index * step) % BIN_COUNT) % BIN_COUNT for index in range(count)]
+
+
+class Resampler:
+    """Resamples the scans of one topic; the beams' bins are computed anew only when the angles change."""
+
+    def __init__(self) -> None:
+        self._angles: tuple[float, float, int] = (_NAN, _NAN, 0)
+        self._bins: list[int] = []
+
+    def ranges(self, angle_min: float, angle_increment: float, ranges: Any, low: float, high: float) -> array[float]:
+        """The smallest valid range of each bin; NaN where there is none.
+
+        Args:
+            angle_min: Angle of the first beam, in radians.
+            angle_increment: Angle from a beam to the next, in radians.
+            ranges: Range of each beam, in metres.
+            low: The smallest valid range.
+            high: The greatest valid range; an infinity is never one.
+        """
+        angles = (angle_min, angle_increment, len(ranges))
+        if angles != self._angles:
+            self._angles, self._bins = angles, bin_numbers(*angles)
+        smallest = [_INFINITY] * BIN_COUNT
+        # A NaN fails every comparison.
+        for number, distance in zip(self._bins, ranges):  # noqa: B905 - Python 3.8 knows no strict
+            if low <= distance <= high and distance < smallest[number]:
+                smallest[number] = distance
+        return array("f", [_NAN if distance == _INFINITY else distance for distance in smallest])
+
+    def resample(self, scan: Any) -> Any:
+        """The same sensor_msgs/LaserScan, changed to one with 360 ranges from 0 to 359 degrees."""
+        scan.ranges = self.ranges(scan.angle_min, scan.angle_increment, scan.ranges, scan.range_min, scan.range_max)
+        # What belonged to single beams means nothing any more.
+        scan.intensities = array("f")
+        scan.time_increment = 0.0
+        scan.angle_min = 0.0
+        scan.angle_increment = 1.0 / _BINS_PER_RADIAN
+        scan.angle_max = (BIN_COUNT - 1) / _BINS_PER_RADIAN
+        return scan

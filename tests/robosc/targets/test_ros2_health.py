@@ -1,0 +1,85 @@
+"""What the diagnostics say, around a real executor on a clock of its own."""
+
+from typing import Any
+
+import pytest
+
+from robosc.execution.clock import ManualClock
+from robosc.execution.executor import Executor
+from robosc.execution.interpreter import InterpretedSystem
+from robosc.execution.settings import Settings
+from robosc.targets.ros2.runtime.health import HealthMonitor, Level
+from support.generated import example_supervisor
+
+
+class Silent:
+    """A middleware that does nothing."""
+
+    def __getattr__(self, name: str) -> Any:
+        return lambda *arguments: None
+
+
+@pytest.fixture
+def clock() -> ManualClock:
+    return ManualClock()
+
+
+def monitored(clock: ManualClock, **settings: Any) -> tuple[Executor, HealthMonitor]:
+    middleware: Any = Silent()
+    system = InterpretedSystem(example_supervisor("line_follower/line_follower"))
+    executor = Executor(system, middleware, Settings(**settings), clock)
+    return executor, HealthMonitor(executor)
+
+
+def test_from_the_start_to_a_fault(clock: ManualClock) -> None:
+    executor, monitor = monitored(clock)
+    assert monitor.report()[:2] == (Level.WARN, "not started")
+    monitor.missing_servers = ("/a", "/b")
+    assert monitor.report()[:2] == (Level.WARN, "waiting for servers: /a, /b")
+    executor.start()
+    health = monitor.report()
+    assert health[:2] == (Level.OK, "running")
+    assert health.values == {
+        "status": "running",
+        "reason": "",
+        "unknown": "0",
+        "unexpected": "0",
+        "faults": "0",
+        "dropped": "0",
+        "last decision (us)": "",
+    }
+    monitor.decided(0.0000123)
+    assert monitor.report().values["last decision (us)"] == "12.3"
+    executor.stop("the sky falls", is_fault=True)
+    health = monitor.report()
+    assert health[:2] == (Level.ERROR, "stopped: the sky falls")
+    assert (health.values["status"], health.values["faults"]) == ("stopped", "1")
+    assert health.values["reason"] == "the sky falls"
+
+
+def test_what_goes_wrong_is_a_warning_once(clock: ManualClock) -> None:
+    executor, monitor = monitored(clock)
+    executor.start()
+    executor.receive("/nobody/knows", None)
+    executor.on_reply(5, None)
+    warning = (Level.WARN, "since the last report: 2 unexpected")
+    assert monitor.report()[:2] == warning
+    # A report out of turn takes nothing away from the next one.
+    assert monitor.report()[:2] == warning
+    monitor.next_interval()
+    assert monitor.report()[:2] == (Level.OK, "running")
+    assert monitor.report().values["unexpected"] == "2"
+
+
+def test_a_sensor_that_was_not_seen_or_is_stale(clock: ManualClock) -> None:
+    executor, monitor = monitored(clock, max_age_s={"/scan": 1.0})
+    executor.start()
+    assert monitor.report()[:2] == (
+        Level.WARN,
+        "waiting for the first message of every sensor with a maximum age",
+    )
+    clock.advance(1.5)
+    executor.watch()
+    assert monitor.report()[:2] == (Level.ERROR, "stopped: scan on /scan is stale")
+    executor.receive("/scan", {"ranges": [2.0] * 360})
+    assert monitor.report()[:2] == (Level.OK, "running")

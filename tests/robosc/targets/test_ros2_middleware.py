@@ -1,0 +1,83 @@
+"""Goals with headers: no action in a package index has one, so the action is made of other real messages."""
+
+import sys
+import types
+import warnings
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from robosc.model.structure import Deployment
+from robosc.supervisor.structure import Supervisor
+from robosc.targets import generate
+from support.generated import imported
+from support.models import model_of
+from support.random_supervisors import CERTIFICATE
+
+pytest.importorskip("rclpy", reason="ROS 2 (rclpy) is not installed")
+
+pytestmark = pytest.mark.ros2
+
+MODEL = """
+robot Planner {
+    interface plan use Plan from plan_msgs
+    datatype object Point { x: double }
+    datatype object Pose { position: Point }
+    datatype object Stamped { pose: Pose }
+    datatype object Goal { goal: Stamped tolerance: double }
+    component C {
+        action go with
+            identifier: "go", request: Goal, response: none, feedback: none, stamped: "map" links plan
+    }
+    provide go with { goal: { pose: { position: { x: 2.5 } } }, tolerance: 0.5 }
+}
+"""
+
+
+class Client:
+    """Keeps what it is asked to send."""
+
+    def __init__(self, node: Any, type_: Any, name: str) -> None:
+        self.name = name
+        self.sent: list[Any] = []
+        node.clients.append(self)
+
+    def server_is_ready(self) -> bool:
+        return True
+
+    def send_goal_async(self, goal: Any, feedback_callback: Any) -> Any:
+        self.sent.append(goal)
+        return SimpleNamespace(add_done_callback=lambda callback: None)
+
+
+def test_every_stamped_field_of_a_goal_gets_time_and_frame(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    with warnings.catch_warnings():
+        # As in support.ros2: a parser that rclpy loads uses a module that Python deprecates.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        import rosidl_generator_py  # type: ignore[import-untyped]  # noqa: F401
+    from builtin_interfaces.msg import Time
+    from nav_msgs.srv import GetPlan
+    from std_msgs.msg import Empty
+
+    module: Any = types.ModuleType("plan_msgs.action")
+    module.Plan = SimpleNamespace(Goal=GetPlan.Request, Result=GetPlan.Response, Feedback=Empty)
+    monkeypatch.setitem(sys.modules, "plan_msgs", types.ModuleType("plan_msgs"))
+    monkeypatch.setitem(sys.modules, "plan_msgs.action", module)
+    supervisor = Supervisor(model_of(MODEL), Deployment.CONTROLLER, (), CERTIFICATE)
+    now = SimpleNamespace(to_msg=lambda: Time(sec=7))
+    node: Any = SimpleNamespace(clients=[], get_clock=lambda: SimpleNamespace(now=lambda: now))
+    settings = SimpleNamespace(service_timeout_s=None)
+    parameters = SimpleNamespace(topic_prefix="/r", resample_scans=False, settings=settings)
+    with imported(generate(supervisor, "ros2"), tmp_path, "planner_controller.middleware") as generated:
+        monkeypatch.setattr(generated, "ActionClient", Client)
+        middleware = generated.Middleware(node, parameters, lambda: 0.0)
+        data = {"goal": {"pose": {"position": {"x": 2.5}}}, "tolerance": 0.5}
+        middleware.send_goal("go", 1, middleware.prepare("go", data))
+    (client,) = node.clients
+    assert client.name == "/r/go"
+    (goal,) = client.sent
+    assert (goal.goal.pose.position.x, goal.tolerance) == (2.5, 0.5)
+    for header in (goal.start.header, goal.goal.header):
+        assert (header.stamp, header.frame_id) == (Time(sec=7), "map")

@@ -1,0 +1,72 @@
+"""A stand-in for `launch` and `launch_ros`, which are in no package index: it records what a launch file asks for."""
+
+import importlib.util
+import sys
+import types
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+
+class Recorded:
+    """Stands for a class of `launch` or `launch_ros`: keeps what it was called with."""
+
+    def __init__(self, *positional: Any, **named: Any) -> None:
+        self.positional = positional
+        self.named = named
+
+
+_CLASSES = {
+    "launch": ["LaunchDescription"],
+    "launch.actions": ["DeclareLaunchArgument"],
+    "launch.substitutions": ["LaunchConfiguration"],
+    "launch_ros": [],
+    "launch_ros.actions": ["Node"],
+    "ament_index_python": [],
+    "ament_index_python.packages": [],
+}
+
+
+@contextmanager
+def recorded_launch(share: Path) -> Iterator[None]:
+    """The modules that a launch file imports, recording.
+
+    Args:
+        share: The share folder of every package.
+    """
+    before = {name: sys.modules.get(name) for name in _CLASSES}
+    for name, classes in _CLASSES.items():
+        module = types.ModuleType(name)
+        for item in classes:
+            setattr(module, item, type(item, (Recorded,), {}))
+        sys.modules[name] = module
+    packages: Any = sys.modules["ament_index_python.packages"]
+    packages.get_package_share_directory = lambda package: str(share)
+    try:
+        yield
+    finally:
+        for name, module_before in before.items():
+            if module_before is None:
+                del sys.modules[name]
+            else:
+                sys.modules[name] = module_before
+
+
+def launch_actions(file: Path, share: Path) -> dict[str, list[Recorded]]:
+    """What the description of a launch file holds, by the name of its class.
+
+    Args:
+        file: The launch file.
+        share: The share folder of every package.
+    """
+    with recorded_launch(share):
+        spec = importlib.util.spec_from_file_location("launch_file", file)
+        assert spec is not None and spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        (actions,) = module.generate_launch_description().positional
+    found: dict[str, list[Recorded]] = {}
+    for action in actions:
+        found.setdefault(type(action).__name__, []).append(action)
+    return found

@@ -8,8 +8,9 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import NamedTuple
 
-from robosc.execution.executor import Executor, Status
+from robosc.execution.executor import Executor
 from robosc.execution.recorder import Counters
+from robosc.execution.runner import Status
 
 
 class Level(IntEnum):

@@ -9,7 +9,8 @@ from robosc.expressions import (
     conjuncts,
 )
 from robosc.expressions.text import expression_text
-from robosc.model.structure import Behaviour, EventKind, Requirement, Transition, Variable, is_tau
+from robosc.model.structure import Behaviour, EventKind, Transition, Variable, is_tau
+from robosc.targets.events import has_plant_location, plant_step, split, taken_transition
 from robosc.targets.python.expressions import (
     FALSE_CODE,
     TRUE_CODE,
@@ -23,9 +24,9 @@ from robosc.targets.python.expressions import (
     truth,
     value,
 )
-from robosc.targets.python.layout import has_plant_location, plant_step, split
 from robosc.targets.python.text import comment, docstring, indent
 from robosc.targets.python.writer import Writer
+from robosc.targets.words import requirement_text
 
 Condition = tuple[str, Code]
 """Words that explain a condition, and its code."""
@@ -39,16 +40,6 @@ def allow_method(writer: Writer, event: str) -> list[str]:
         f"    {docstring(f'Whether {event} is allowed now.')}",
         *indent(_return_all(conditions)),
     ]
-
-
-def requirement_text(requirement: Requirement) -> str:
-    """A requirement as a user writes it."""
-    names = ", ".join(requirement.communications)
-    group = f"{{{names}}}" if len(requirement.communications) != 1 else names
-    words = expression_text(requirement.expression)
-    return (
-        f"requirement {group} needs {words}" if requirement.form == "needs" else f"requirement {words} disables {group}"
-    )
 
 
 def requirements_method(writer: Writer, communication: str) -> list[str]:
@@ -169,7 +160,7 @@ def _component_conditions(writer: Writer, component: str, behaviour: Behaviour, 
     """Where a component accepts a request, and that no update of a synthesis variable leaves its range."""
     if not any(item.event == event for item in behaviour.transitions):
         return []
-    chosen = {state.name: writer.chosen(behaviour, event, state.name) for state in behaviour.states}
+    chosen = {state.name: taken_transition(behaviour, event, state.name) for state in behaviour.states}
     accepting = tuple(state for state, transition in chosen.items() if transition is not None)
     result: list[Condition] = []
     if len(accepting) < len(chosen) and split(event)[1] == EventKind.REQUEST:

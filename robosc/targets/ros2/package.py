@@ -11,7 +11,6 @@ from robosc._version import __version__
 from robosc.errors import UnsupportedModelError
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.files import GeneratedFiles
-from robosc.targets.python.allow import requirement_text
 from robosc.targets.python.generate import header
 from robosc.targets.python.layout import make_layout
 from robosc.targets.python.package import package_name, python_files, with_relative_imports
@@ -20,6 +19,7 @@ from robosc.targets.registry import GenerateOptions
 from robosc.targets.ros2.runtime.parameters import declarations
 from robosc.targets.ros2.state_topic import state_topic
 from robosc.targets.ros2.topics import Topic, sent_paths, shape_of, topics
+from robosc.targets.words import requirement_text
 
 _OWN_DEPENDENCIES = ("ament_index_python", "launch", "launch_ros", "rcl_interfaces", "rclpy", "std_msgs")
 _RELEASED_TYPES = frozenset({"Twist", "TwistStamped"})

@@ -208,6 +208,9 @@ class Reference:
         else:
             self.lines.append(f"log {kind}")
 
+    def close(self) -> None:
+        """Nothing."""
+
     # Commands.
 
     def _told(self, words: Sequence[object]) -> None:

@@ -140,7 +140,8 @@ static bool do_fits(void *context, const @p@_request_t *request)
 
 static void do_log(void *context, @p@_log_t kind, int what)
 {
-    static const char *const kinds[] = {"event", "unexpected", "unknown", "release", "fault", "stop", "resume", "restart"};
+    static const char *const kinds[]
+        = {"event", "unexpected", "unknown", "release", "fault", "stop", "resume", "restart"};
     (void)context;
     if (kind == @P@_LOG_FAULT || kind == @P@_LOG_STOP || kind == @P@_LOG_RESTART || kind == @P@_LOG_RESUME) {
         printf("log %s\\n", kinds[kind]);
@@ -151,7 +152,8 @@ static void do_log(void *context, @p@_log_t kind, int what)
 
 static void do_new(void)
 {
-    static const @p@_callbacks_t callbacks = {NULL, do_publish, do_default, do_call, do_goal, do_cancel, do_fits, do_log};
+    static const @p@_callbacks_t callbacks
+        = {NULL, do_publish, do_default, do_call, do_goal, do_cancel, do_fits, do_log};
     @p@_settings_t settings;
     @p@_default_settings(&settings);
     failing = 0;
@@ -300,7 +302,8 @@ class _Program:
             "static void do_receive(int topic, uint64_t now_us)\n{\n    (void)now_us;\n    switch (topic) {",
             *receive,
             "    default: break;\n    }\n}\n",
-            "static void do_back(int event, uint64_t now_us, uint32_t id)\n{\n    (void)now_us;\n    (void)id;\n    switch (event) {",
+            "static void do_back(int event, uint64_t now_us, uint32_t id)\n{\n    (void)now_us;\n    (void)id;",
+            "    switch (event) {",
             *back,
             "    default: break;\n    }\n}\n",
             self.print_request(),
@@ -310,7 +313,11 @@ class _Program:
         return "\n".join(parts).replace("@p@", layout.prefix).replace("@P@", layout.upper)
 
     def print_request(self) -> str:
-        lines = ["static void print_request(const @p@_request_t *request)", "{", '    printf("%d", (int)request->communication);']
+        lines = [
+            "static void print_request(const @p@_request_t *request)",
+            "{",
+            '    printf("%d", (int)request->communication);',
+        ]
         lines.append("    switch ((int)request->communication) {")
         for item in self.layout.requests:
             found = request_field(self.unit, item)
@@ -352,7 +359,8 @@ def _print_value(type_: Type, place: str) -> str:
 
 def _print_field(found: Field, place: str, path: list[str]) -> list[str]:
     if not isinstance(found.type, ObjectType):
-        return [f'        if ({place}.{found.flag}) {{ printf(" ="); {_print_given(found.type, f"{place}.{found.value}")} }}']
+        given = _print_given(found.type, f"{place}.{found.value}")
+        return [f'        if ({place}.{found.flag}) {{ printf(" ="); {given} }}']
     lines = []
     for name, (member, part) in found.parts.items():
         if isinstance(part.type, ObjectType):

@@ -46,7 +46,7 @@ class Conditions:
         unit: The file.
 
     Attributes:
-        nodes: Lines of each node's function so far.
+        nodes: Lines of each node's function so far, by its name.
     """
 
     def __init__(self, unit: Unit) -> None:
@@ -54,7 +54,7 @@ class Conditions:
         self._reading = Reading(unit)
         self._formulas = Formulas(diagram_domains(unit.system))
         self._names: dict[tuple[object, ...], str] = {}
-        self.nodes: list[list[str]] = []
+        self.nodes: dict[str, list[str]] = {}
 
     @property
     def _layout(self) -> Layout:
@@ -201,7 +201,6 @@ class Conditions:
         high = MAXIMUM_INTEGER if type_.high is None else type_.high
         if not code.may_be_unknown and low <= code.low and code.high <= high:
             return TRUE_CODE
-        self._unit.used.add("stays_in_range")
         return Code(f"stays_in_range({code.text}, {low_text(low)}, {low_text(high)})")
 
     def _added_condition(self, event: str) -> list[Condition]:
@@ -230,7 +229,7 @@ class Conditions:
         if key not in self._names:
             name = f"node_{len(self._names) + 1}"
             self._names[key] = name
-            self.nodes.append(self._node_function(name, node, branches))
+            self.nodes[name] = self._node_function(name, node, branches)
         return Code(f"{self._names[key]}(s)")
 
     def _node_function(self, name: str, node: DecisionNode, branches: tuple[str, ...]) -> list[str]:

@@ -76,6 +76,8 @@ class Code:
         operator: `&&` or `||`, if that is outermost.
         low: Least value of an integer.
         high: Greatest value of an integer.
+        is_constant: Whether it is a constant of which there are not two texts.
+        tests: The tests of places against constants that it joins, or is: place, constant, whether they are equal.
     """
 
     text: str
@@ -85,6 +87,8 @@ class Code:
     operator: str = ""
     low: int = MINIMUM_INTEGER
     high: int = MAXIMUM_INTEGER
+    is_constant: bool = False
+    tests: frozenset[tuple[str, str, bool]] = frozenset()
 
     @property
     def atom(self) -> str:
@@ -108,7 +112,6 @@ class Scope:
         element: The code of a part of a quantifier's element, given level and path.
         reduction: Writes a reduction.
         quantifier: Writes a quantifier.
-        used: Called with the name of each function that the code needs.
     """
 
     variable: Callable[[str, str], tuple[str, Type]]
@@ -118,7 +121,6 @@ class Scope:
     element: Callable[[int, tuple[PathStep, ...]], Code]
     reduction: Callable[[Reduction], Code]
     quantifier: Callable[[Quantifier], Code]
-    used: Callable[[str], None]
 
 
 _LEAST_NATIVE_DIVISOR = 1e-6
@@ -155,11 +157,13 @@ def value(expression: Expression, scope: Scope) -> Code:
         case Constant(value=constant):
             return _constant(constant)
         case EnumValue(enum=enum, value=name):
-            return Code(scope.enum_value(enum, name), Sort.ENUM)
+            return Code(scope.enum_value(enum, name), Sort.ENUM, is_constant=True)
         case VariableRead(component=component, variable=variable):
             text, type_ = scope.variable(component, variable)
             if isinstance(type_, IntegerType):  # Small members would be added as `int`, which may have 16 bits.
                 return code_for(f"(int64_t){text}", type_, is_atom=False)
+            if isinstance(type_, BooleanType):
+                return Code(text, tests=frozenset({(text, "true", True)}))
             return code_for(text, type_)
         case StateTest(component=component, state=state):
             return scope.in_state(component, state)
@@ -168,49 +172,49 @@ def value(expression: Expression, scope: Scope) -> Code:
         case Unary(operator="holds", operand=operand):
             return truth(operand, scope)
         case Unary(operator="not", operand=operand):
-            return _not(value(operand, scope), scope)
+            return _not(value(operand, scope))
         case Unary(operator="-", operand=operand):
-            return _negate(value(operand, scope), scope)
+            return _negate(value(operand, scope))
         case Binary(operator=operator, left=left, right=right):
-            return _binary(operator, value(left, scope), value(right, scope), right, scope)
+            return _binary(operator, value(left, scope), value(right, scope), right)
         case Conditional(condition=condition, then=then, otherwise=otherwise):
-            return _conditional(value(condition, scope), value(then, scope), value(otherwise, scope), scope)
+            return _conditional(value(condition, scope), value(then, scope), value(otherwise, scope))
         case Call(function=function, arguments=arguments):
-            return _function(function, [value(item, scope) for item in arguments], scope)
+            return _function(function, [value(item, scope) for item in arguments])
         case Element(level=level, path=path):
             return scope.element(level, path)
         case Reduction():
             return scope.reduction(expression)
         case Quantifier():
             return scope.quantifier(expression)
-    assert_never(expression)
+    raise InternalError(f"no C for {expression!r}")
 
 
-def _conditional(condition: Code, then: Code, otherwise: Code, scope: Scope) -> Code:
-    then, otherwise = _alike(then, otherwise, scope)
+def _conditional(condition: Code, then: Code, otherwise: Code) -> Code:
+    then, otherwise = _alike(then, otherwise)
     low, high = min(then.low, otherwise.low), max(then.high, otherwise.high)
     if not condition.may_be_unknown:
         unknown = then.may_be_unknown or otherwise.may_be_unknown
         text = f"{condition.atom} ? {then.atom} : {otherwise.atom}"
         return Code(text, then.sort, unknown, is_atom=False, low=low, high=high)
-    code = _call(f"choose_{then.sort.letter}", condition, then, otherwise, sort=then.sort, scope=scope)
+    code = _call(f"choose_{then.sort.letter}", condition, then, otherwise, sort=then.sort)
     return replace(code, low=low, high=high)
 
 
-def _function(function: str, arguments: list[Code], scope: Scope) -> Code:
+def _function(function: str, arguments: list[Code]) -> Code:
     """A function of numbers: known wherever its arguments are, unless an absolute value leaves 32 bits."""
     is_known = not any(item.may_be_unknown for item in arguments)
     first = arguments[0]
     if function == "double":
-        return as_double(first, scope)
+        return as_double(first)
     if function == "integer":
         if first.sort is Sort.INTEGER:
             return first
-        return replace(_call("integer_of", first, sort=Sort.INTEGER, scope=scope), may_be_unknown=not is_known)
+        return replace(_call("integer_of", first, sort=Sort.INTEGER), may_be_unknown=not is_known)
     is_integer = all(item.sort is Sort.INTEGER for item in arguments)
     sort = Sort.INTEGER if is_integer else Sort.DOUBLE
-    codes = arguments if is_integer else [as_double(item, scope) for item in arguments]
-    code = _call(f"{function}_{sort.letter}", *codes, sort=sort, scope=scope)
+    codes = arguments if is_integer else [as_double(item) for item in arguments]
+    code = _call(f"{function}_{sort.letter}", *codes, sort=sort)
     low, high = MINIMUM_INTEGER, MAXIMUM_INTEGER
     if is_integer:
         low, high = call_bounds(function, [(item.low, item.high) for item in arguments])
@@ -218,20 +222,20 @@ def _function(function: str, arguments: list[Code], scope: Scope) -> Code:
     return replace(code, may_be_unknown=unknown, low=low, high=min(high, MAXIMUM_INTEGER))
 
 
-def as_double(code: Code, scope: Scope) -> Code:
+def as_double(code: Code) -> Code:
     """A number as a double."""
     if code.sort is Sort.DOUBLE:
         return code
     if code.may_be_unknown:
-        return _call("double_of", code, sort=Sort.DOUBLE, scope=scope)
+        return _call("double_of", code, sort=Sort.DOUBLE)
     return Code(f"(double){code.atom}", Sort.DOUBLE, is_atom=False)
 
 
-def _alike(left: Code, right: Code, scope: Scope) -> tuple[Code, Code]:
+def _alike(left: Code, right: Code) -> tuple[Code, Code]:
     """Two codes of one sort: where one is a double, both are."""
     if left.sort is right.sort or Sort.DOUBLE not in (left.sort, right.sort):
         return left, right
-    return as_double(left, scope), as_double(right, scope)
+    return as_double(left), as_double(right)
 
 
 def truth(expression: Expression, scope: Scope) -> Code:
@@ -248,7 +252,7 @@ def truth(expression: Expression, scope: Scope) -> Code:
         case Binary(operator="implies", left=left, right=right):
             return either(falsity(left, scope), truth(right, scope))
         case Binary(operator=operator, left=left, right=right) if operator in _NATIVE:
-            return _comparison_is(operator, value(left, scope), value(right, scope), True, scope)
+            return _comparison_is(operator, value(left, scope), value(right, scope), True)
     return _is(value(expression, scope), True)
 
 
@@ -266,13 +270,30 @@ def falsity(expression: Expression, scope: Scope) -> Code:
         case Binary(operator="implies", left=left, right=right):
             return both(truth(left, scope), falsity(right, scope))
         case Binary(operator=operator, left=left, right=right) if operator in _NATIVE:
-            return _comparison_is(operator, value(left, scope), value(right, scope), False, scope)
+            return _comparison_is(operator, value(left, scope), value(right, scope), False)
     return _is(value(expression, scope), False)
 
 
+def equality(place: str, constant: str, is_equal: bool) -> Code:
+    """The test of a place against a constant."""
+    operator = "==" if is_equal else "!="
+    return Code(f"{place} {operator} {constant}", is_atom=False, tests=frozenset({(place, constant, is_equal)}))
+
+
+def _is_decided(operator: str, tests: frozenset[tuple[str, str, bool]]) -> bool:
+    """Whether tests joined by an operator say nothing, as compilers warn: never all true, or always one of them."""
+    # Of a conjunction at most one equality of a place can be true, of a disjunction at most one inequality false.
+    told = {(place, constant) for place, constant, is_equal in tests if is_equal is (operator == "&&")}
+    others = {(place, constant) for place, constant, is_equal in tests if is_equal is not (operator == "&&")}
+    return len({place for place, _ in told}) < len(told) or bool(told & others)
+
+
 def _joined(operator: str, left: Code, right: Code) -> Code:
+    tests = frozenset().union(*(item.tests for item in (left, right) if item.operator in ("", operator)))
+    if _is_decided(operator, tests):
+        return FALSE_CODE if operator == "&&" else TRUE_CODE
     sides = [item.text if item.operator == operator else item.atom for item in (left, right)]
-    return Code(f" {operator} ".join(sides), is_atom=False, operator=operator)
+    return Code(f" {operator} ".join(sides), is_atom=False, operator=operator, tests=tests)
 
 
 def both(left: Code, right: Code) -> Code:
@@ -297,6 +318,12 @@ def negated(code: Code) -> Code:
     """Native negation of a known condition, simplified."""
     if code in (TRUE_CODE, FALSE_CODE):
         return FALSE_CODE if code == TRUE_CODE else TRUE_CODE
+    if not code.operator and code.tests:
+        ((place, constant, is_equal),) = code.tests
+        if constant == "true":
+            tests = frozenset({(place, constant, not is_equal)})
+            return Code(f"!{place}" if is_equal else place, is_atom=not is_equal, tests=tests)
+        return equality(place, constant, not is_equal)
     return Code(f"!{code.atom}", is_atom=False)
 
 
@@ -306,15 +333,8 @@ def _constant(constant: bool | int | float | str) -> Code:
             return TRUE_CODE if constant else FALSE_CODE
         case int():
             text = str(constant) if constant > MINIMUM_INTEGER else "-2147483647 - 1"
-            return Code(
-                f"INT64_C({text})" if constant >= 0 else text,
-                Sort.INTEGER,
-                False,
-                constant >= 0,
-                "",
-                constant,
-                constant,
-            )
+            code = Code(f"INT64_C({text})", Sort.INTEGER, low=constant, high=constant, is_constant=True)
+            return code if constant >= 0 else replace(code, text=text, is_atom=False)
         case float():
             return Code(repr(constant), Sort.DOUBLE, is_atom=not repr(constant).startswith("-"))
         case str():
@@ -322,43 +342,42 @@ def _constant(constant: bool | int | float | str) -> Code:
     assert_never(constant)
 
 
-def _call(function: str, *arguments: Code, sort: Sort = Sort.BOOLEAN, scope: Scope) -> Code:
+def _call(function: str, *arguments: Code, sort: Sort = Sort.BOOLEAN) -> Code:
     """A call of a function of the unit; its result may be unknown."""
-    scope.used(function)
     return Code(f"{function}({', '.join(item.text for item in arguments)})", sort, may_be_unknown=True)
 
 
-def _not(operand: Code, scope: Scope) -> Code:
-    return _call("not_b", operand, scope=scope) if operand.may_be_unknown else negated(operand)
+def _not(operand: Code) -> Code:
+    return _call("not_b", operand) if operand.may_be_unknown else negated(operand)
 
 
-def _negate(operand: Code, scope: Scope) -> Code:
+def _negate(operand: Code) -> Code:
     low, high = -operand.high, -operand.low
     if operand.may_be_unknown or (operand.sort is Sort.INTEGER and high > MAXIMUM_INTEGER):
-        return _call(f"negate_{operand.sort.letter}", operand, sort=operand.sort, scope=scope)
+        return _call(f"negate_{operand.sort.letter}", operand, sort=operand.sort)
     return Code(f"-{operand.atom}", operand.sort, is_atom=False, low=low, high=high)
 
 
-def _binary(operator: str, left: Code, right: Code, divisor: Expression, scope: Scope) -> Code:
+def _binary(operator: str, left: Code, right: Code, divisor: Expression) -> Code:
     if operator in _NATIVE:
-        left, right = _alike(left, right, scope)
+        left, right = _alike(left, right)
         if not left.may_be_unknown and not right.may_be_unknown:
-            return _compare(operator, left, right, scope)
-        return _kleene_comparison(operator, left, right, scope)
+            return _compare(operator, left, right)
+        return _kleene_comparison(operator, left, right)
     if operator in ("and", "or", "implies"):
-        return _logic(operator, left, right, scope)
-    return _arithmetic(operator, left, right, divisor, scope)
+        return _logic(operator, left, right)
+    return _arithmetic(operator, left, right, divisor)
 
 
-def _logic(operator: str, left: Code, right: Code, scope: Scope) -> Code:
+def _logic(operator: str, left: Code, right: Code) -> Code:
     if operator == "implies":
-        operator, left = "or", _not(left, scope)
+        operator, left = "or", _not(left)
     if left.may_be_unknown or right.may_be_unknown:
-        return _call(f"{operator}_b", left, right, scope=scope)
+        return _call(f"{operator}_b", left, right)
     return both(left, right) if operator == "and" else either(left, right)
 
 
-def _arithmetic(operator: str, left: Code, right: Code, divisor: Expression, scope: Scope) -> Code:
+def _arithmetic(operator: str, left: Code, right: Code, divisor: Expression) -> Code:
     is_integer = left.sort is right.sort is Sort.INTEGER and operator != "/"
     is_known = not left.may_be_unknown and not right.may_be_unknown
     name = {"+": "add", "-": "subtract", "*": "multiply", "/": "divide"}[operator]
@@ -366,12 +385,12 @@ def _arithmetic(operator: str, left: Code, right: Code, divisor: Expression, sco
         low, high = _interval(operator, left, right)
         if is_known and low >= MINIMUM_INTEGER and high <= MAXIMUM_INTEGER:
             return Code(f"{left.atom} {operator} {right.atom}", Sort.INTEGER, False, False, "", low, high)
-        return _call(f"{name}_i", left, right, sort=Sort.INTEGER, scope=scope)
+        return _call(f"{name}_i", left, right, sort=Sort.INTEGER)
     is_native = is_known and operator == "/" and left.sort is Sort.INTEGER and _is_safe_divisor(divisor)
-    left, right = as_double(left, scope), as_double(right, scope)
+    left, right = as_double(left), as_double(right)
     if is_native:
         return Code(f"{left.atom} / {right.atom}", Sort.DOUBLE, is_atom=False)
-    return _call(f"{name}_d", left, right, sort=Sort.DOUBLE, scope=scope)
+    return _call(f"{name}_d", left, right, sort=Sort.DOUBLE)
 
 
 def _is_safe_divisor(divisor: Expression) -> bool:
@@ -394,43 +413,60 @@ def _interval(operator: str, left: Code, right: Code) -> tuple[int, int]:
             return min(products), max(products)
 
 
-def _compare(operator: str, left: Code, right: Code, scope: Scope) -> Code:
+def _compare(operator: str, left: Code, right: Code) -> Code:
     """A native comparison of known values."""
     if left.text == right.text:  # Compilers warn about a comparison of something with itself.
         return TRUE_CODE if operator in ("=", "<=", ">=") else FALSE_CODE
+    if left.sort is Sort.INTEGER and (decided := _by_bounds(operator, left, right)) is not None:
+        return decided
     if left.sort is Sort.TEXT:
-        scope.used("strcmp")
         return Code(f"strcmp({left.text}, {right.text}) {_NATIVE[operator]} 0", is_atom=False)
+    if operator in ("=", "!=") and right.is_constant:
+        return equality(left.atom, right.atom, operator == "=")
     return Code(f"{left.atom} {_NATIVE[operator]} {right.atom}", is_atom=False)
 
 
-def _kleene_comparison(operator: str, left: Code, right: Code, scope: Scope) -> Code:
+def _by_bounds(operator: str, left: Code, right: Code) -> Code | None:
+    """A comparison of integers that their bounds decide, if they do."""
+    match operator:
+        case "=" | "!=":
+            is_decided = left.high < right.low or right.high < left.low
+            return (TRUE_CODE if operator == "!=" else FALSE_CODE) if is_decided else None
+        case ">" | ">=":
+            return _by_bounds({">": "<", ">=": "<="}[operator], right, left)
+        case "<":
+            return TRUE_CODE if left.high < right.low else FALSE_CODE if left.low >= right.high else None
+        case _:
+            return TRUE_CODE if left.high <= right.low else FALSE_CODE if left.low > right.high else None
+
+
+def _kleene_comparison(operator: str, left: Code, right: Code) -> Code:
     letter = left.sort.letter
     match operator:
         case "=":
-            return _call(f"equal_{letter}", left, right, scope=scope)
+            return _call(f"equal_{letter}", left, right)
         case "!=":
-            return _not(_call(f"equal_{letter}", left, right, scope=scope), scope)
+            return _not(_call(f"equal_{letter}", left, right))
         case "<":
-            return _call(f"less_{letter}", left, right, scope=scope)
+            return _call(f"less_{letter}", left, right)
         case "<=":
-            return _call(f"at_most_{letter}", left, right, scope=scope)
+            return _call(f"at_most_{letter}", left, right)
         case ">":
-            return _call(f"less_{letter}", right, left, scope=scope)
+            return _call(f"less_{letter}", right, left)
         case ">=":
-            return _call(f"at_most_{letter}", right, left, scope=scope)
+            return _call(f"at_most_{letter}", right, left)
     raise InternalError(f"no comparison {operator}")
 
 
-def _comparison_is(operator: str, left: Code, right: Code, wanted: bool, scope: Scope) -> Code:
+def _comparison_is(operator: str, left: Code, right: Code, wanted: bool) -> Code:
     """Whether a comparison is `wanted`, with native operators wherever NaN stands for unknown."""
-    left, right = _alike(left, right, scope)
+    left, right = _alike(left, right)
     wanted_operator = operator if wanted else _OPPOSITE[operator]
     if not left.may_be_unknown and not right.may_be_unknown:
-        return _compare(wanted_operator, left, right, scope)
+        return _compare(wanted_operator, left, right)
     if left.sort is Sort.DOUBLE and wanted_operator != "!=" and left.text != right.text:  # `!=` is true for NaN.
         return Code(f"{left.atom} {_NATIVE[wanted_operator]} {right.atom}", is_atom=False)
-    return _is(_kleene_comparison(operator, left, right, scope), wanted)
+    return _is(_kleene_comparison(operator, left, right), wanted)
 
 
 def _is(code: Code, wanted: bool) -> Code:

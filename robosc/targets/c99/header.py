@@ -16,11 +16,11 @@ from robosc.expressions import (
     ObjectType,
     StringType,
     Type,
+    type_text,
 )
-from robosc.model.structure import CommunicationKind, EventKind
+from robosc.model.structure import Communication, CommunicationKind, EventKind
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.c99.layout import PLANT_LOCATIONS, Layout, event_data, width
-from robosc.targets.c99.naming import Namer
 from robosc.targets.c99.provide import request_field, request_struct
 from robosc.targets.c99.step import unknown_name
 from robosc.targets.c99.text import comment, safe
@@ -210,7 +210,7 @@ def _received_types(layout: Layout) -> list[str]:
         name = layout.raw(type_)
         if name in under_way:
             raise UnsupportedModelError(
-                f"the target c99 does not do data types that contain themselves: {type_.name if isinstance(type_, ObjectType) else name}"
+                f"the target c99 does not do data types that contain themselves: {type_text(type_)}"
             )
         if name in done:
             return
@@ -228,7 +228,8 @@ def _received_types(layout: Layout) -> list[str]:
                     continue
                 visit(part.type)
                 body.append(
-                    f"{declared(layout.raw(part.type), layout.properties[type_.name, part.name])}; /* {_meaning(part.type)} */"
+                    f"{declared(layout.raw(part.type), layout.properties[type_.name, part.name])};"
+                    f" /* {_meaning(part.type)} */"
                 )
             body = body or ["char nothing;"]
             words = f"Received data: the object {type_.name}."
@@ -359,7 +360,7 @@ def _entries(layout: Layout) -> list[str]:
     return lines
 
 
-def batch(layout: Layout, identifier: str) -> list:  # type: ignore[type-arg]
+def batch(layout: Layout, identifier: str) -> list[Communication]:
     """The outgoing messages of an identifier, in source order."""
     return [item for item in layout.of_kind(CommunicationKind.OUTGOING_MESSAGE) if item.identifier == identifier]
 
@@ -374,22 +375,14 @@ def batch_parameters(layout: Layout, identifier: str) -> dict[str, str]:
 def receive_head(layout: Layout, identifier: str) -> str:
     """The head of the function that takes a message."""
     parameters = [f"{layout.prefix}_t *r", "uint64_t now_us"]
-    types = {}
+    types: dict[str, Type] = {}
     for item in batch(layout, identifier):
         type_ = event_data(layout.model, item.event(EventKind.RESPONSE))
         if type_ is not None:
             types.setdefault(layout.raw(type_), type_)
     for raw, name in batch_parameters(layout, identifier).items():
         parameters.append(layout.parameter(types[raw], name))
-    return f"void {layout.function('receive', layout.received_topics[identifier] + _number(layout, identifier))}({', '.join(parameters)})"
-
-
-def _number(layout: Layout, identifier: str) -> str:
-    """What tells two identifiers apart whose words are the same."""
-    word = layout.received_topics[identifier]
-    same = [item for item, other in layout.received_topics.items() if other == word]
-    place = same.index(identifier)
-    return f"_{place + 1}" if place else ""
+    return f"void {layout.function('receive', identifier)}({', '.join(parameters)})"
 
 
 def reply_head(layout: Layout, event: str) -> str:
@@ -405,4 +398,4 @@ def reply_head(layout: Layout, event: str) -> str:
     return f"void {layout.function(purpose, name)}({', '.join(parameters)})"
 
 
-__all__ = ["Namer", "batch", "counts", "head", "header_file", "receive_head", "reply_head", "runtime_text"]
+__all__ = ["batch", "counts", "head", "header_file", "receive_head", "reply_head", "runtime_text"]

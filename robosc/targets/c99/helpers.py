@@ -1,4 +1,4 @@
-"""The functions that generated expressions call: `robosc.expressions.values` in C. Only those that are used are written."""
+"""The functions that generated expressions call: `robosc.expressions.values` in C; a unit gets what it calls."""
 
 _MAXIMUM, _MINIMUM = "INT64_C(2147483647)", "(-INT64_C(2147483647) - 1)"
 
@@ -111,7 +111,8 @@ HELPERS: dict[str, str] = dict(
         *_extreme("max", ">="),
         (
             "clamp_i",
-            "static int64_t clamp_i(int64_t a, int64_t low, int64_t high)\n{\n    return min_i(max_i(a, low), high);\n}",
+            "static int64_t clamp_i(int64_t a, int64_t low, int64_t high)\n{\n"
+            "    return min_i(max_i(a, low), high);\n}",
         ),
         (
             "clamp_d",
@@ -171,17 +172,3 @@ HELPERS: dict[str, str] = dict(
     ]
 )
 """The text of each function by name, each after those that it calls."""
-
-_CALLS = {
-    "clamp_i": ("min_i", "max_i"),
-    "clamp_d": ("min_d", "max_d"),
-    **dict.fromkeys(("add_i", "subtract_i", "multiply_i", "negate_i", "abs_i"), ("whole",)),
-    **dict.fromkeys(("add_d", "subtract_d", "multiply_d", "divide_d", "negate_d", "abs_d"), ("finite",)),
-}
-
-
-def helper_functions(used: set[str]) -> list[str]:
-    """The text of the functions that are used, with those that they call."""
-    needed = {*used, *(below for name in used for below in _CALLS.get(name, ()))}
-    # Every function of `Kleene` kind may be called by another one that is written.
-    return [text for name, text in HELPERS.items() if name in needed]

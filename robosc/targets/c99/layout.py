@@ -31,11 +31,12 @@ PLANT_LOCATIONS = {
 
 # Names of the engine itself after the prefix.
 _ENGINE_NAMES = """
-    t init start tick watch stop restart status enabled event_name communication_name topic_name default_settings
-    settings_t callbacks_t request_t counters_t state_t event_t communication_t topic_t status_t fault_t outcome_t
-    policy_t log_t fault acting_t call_t goal_t sensor_t on_unknown_t goal_accepted cancel_refused goal_ended call_failed is_faulty is_known model_sha256
-    UNKNOWN FALSE TRUE UNKNOWN_INTEGER NO_EVENT EVENT_COUNT COMMUNICATION_COUNT TOPIC_COUNT REQUEST_COUNT
-    SERVICE_COUNT ACTION_COUNT SENSOR_COUNT SILENT_COUNT RECEIVED_COUNT UNCONTROLLABLE_DATA CONJUNCT_COUNT REQUIREMENT_COUNT H
+    t ACTION_COUNT COMMUNICATION_COUNT CONJUNCT_COUNT EVENT_COUNT FALSE H NO_COMMUNICATIONS NO_EVENT NO_EVENTS
+    NO_TOPICS RECEIVED_COUNT REQUEST_COUNT REQUIREMENT_COUNT SENSOR_COUNT SERVICE_COUNT SILENT_COUNT
+    TOPIC_COUNT TRUE UNCONTROLLABLE_DATA UNKNOWN UNKNOWN_INTEGER acting_t call_failed call_t callbacks_t
+    cancel_refused communication_name communication_t counters_t default_settings enabled event_name event_t
+    fault fault_t goal_accepted goal_ended goal_t init log_t on_unknown_t policy_t request_t restart sensor_t
+    settings_t start state_t status status_t stop tick topic_name topic_t watch
 """.split()
 
 
@@ -50,7 +51,7 @@ class Layout:
         events: Enumerator of each event.
         communications: Enumerator of each communication.
         topics: Enumerator of each identifier of incoming messages.
-        received_topics: Name part of each identifier of outgoing messages, in source order.
+        received_topics: Identifiers of outgoing messages, in source order.
         locations: Member of the state that holds each automaton's location.
         location_names: Enumerator of each location, by automaton and location.
         variables: Member and type of each variable, by component and variable.
@@ -66,7 +67,7 @@ class Layout:
     events: dict[str, str] = field(default_factory=dict)
     communications: dict[str, str] = field(default_factory=dict)
     topics: dict[str, str] = field(default_factory=dict)
-    received_topics: dict[str, str] = field(default_factory=dict)
+    received_topics: dict[str, None] = field(default_factory=dict)
     locations: dict[str, str] = field(default_factory=dict)
     location_names: dict[tuple[str, str], str] = field(default_factory=dict)
     variables: dict[tuple[str, str], tuple[str, Type]] = field(default_factory=dict)
@@ -116,7 +117,8 @@ class Layout:
         """The static or public function for a purpose and an event, communication or identifier."""
         key = (purpose, name)
         if key not in self._functions:
-            self._functions[key] = self._namer.name(f"{self.prefix}_{purpose}_{name}")
+            word = _topic_word(name) if purpose == "receive" else name
+            self._functions[key] = self._namer.name(f"{self.prefix}_{purpose}_{word}")
         return self._functions[key]
 
     def raw(self, type_: Type) -> str:
@@ -195,7 +197,7 @@ def make_layout(supervisor: Supervisor, prefix: str | None = None) -> Layout:
         if item.kind is CommunicationKind.INCOMING_MESSAGE and item.identifier not in layout.topics:
             layout.topics[item.identifier] = name(f"{upper}_TOPIC_{_topic_word(item.identifier)}")
         if item.kind is CommunicationKind.OUTGOING_MESSAGE:
-            layout.received_topics.setdefault(item.identifier, _topic_word(item.identifier))
+            layout.received_topics[item.identifier] = None
     for enum in model.enums:
         for value in enum.values:
             layout.values[enum.name, value] = name(f"{upper}_VALUE_{enum.name}_{value}")

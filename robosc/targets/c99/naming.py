@@ -38,9 +38,7 @@ def member_name(wish: str) -> str:
     """A legal name for a member of a struct: never a keyword, a macro or a name that C reserves."""
     name = wish[:_MAXIMUM]
     is_reserved = name in _TAKEN or name.startswith("_") or (len(name) > 1 and name.upper() == name)
-    return (
-        f"{name.lstrip('_')}_" if is_reserved and name.lstrip("_")[:1].isalpha() else f"x{name}_" * is_reserved or name
-    )
+    return f"{'x' if name.startswith('_') else ''}{name}_" if is_reserved else name
 
 
 class Namer:

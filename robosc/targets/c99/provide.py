@@ -91,7 +91,8 @@ def _request_type(type_: Type) -> str:
 def provide_function(unit: Unit, item: Communication) -> list[str]:
     """The function that gives a request's data, of the first statement whose condition is true; false if unknown."""
     reading = Reading(unit)
-    head = f"static bool {unit.layout.function('provides', item.name)}(const state_t *s, {unit.layout.prefix}_request_t *request)"
+    name, prefix = unit.layout.function("provides", item.name), unit.layout.prefix
+    head = f"static bool {name}(const state_t *s, {prefix}_request_t *request)"
     lines = [head, "{", "    (void)s;", "    (void)request;"]
     root = request_field(unit, item)
     for statement in unit.layout.model.provides_for(item.name):
@@ -131,7 +132,7 @@ def _store(
     scope = Reading(unit).scope
     code = value(provided, scope)
     if isinstance(found.type, DoubleType):
-        code = as_double(code, scope)
+        code = as_double(code)
     text = code.text
     if code.may_be_unknown:
         text = f"data_{len(tests) + 1}"

@@ -1,12 +1,14 @@
 """The generated C file: tables, the functions of the model, the engine, and the functions through which data comes."""
 
+import re
+
 from robosc.automata.plants import communication_plant_name
 from robosc.expressions import ArrayType, BooleanType, DoubleType, EnumType, IntegerType, NoneType, ObjectType, Type
 from robosc.model.received import converted_paths
-from robosc.model.structure import CommunicationKind, EventKind
+from robosc.model.structure import CommunicationKind, EventKind, is_tau
 from robosc.targets.c99.conditions import Conditions
 from robosc.targets.c99.header import batch, batch_parameters, counts, head, receive_head, reply_head, runtime_text
-from robosc.targets.c99.helpers import helper_functions
+from robosc.targets.c99.helpers import HELPERS
 from robosc.targets.c99.layout import Layout, event_data
 from robosc.targets.c99.provide import default_function, provide_function
 from robosc.targets.c99.received import converter, converter_head
@@ -21,12 +23,8 @@ def source_file(unit: Unit) -> str:
     """The text of `<robot>.c`."""
     layout = unit.layout
     conditions = Conditions(unit)
-    blocks: list[list[str]] = [
-        [f"{converter_head(unit, enum)};"] for enum in layout.model.enums if _is_read(layout, enum.name)
-    ]
-    converters = [converter(unit, enum) for enum in layout.model.enums if _is_read(layout, enum.name)]
     allows = [conditions.allow_function(event) for event in layout.controllable]
-    steppers = [Stepper(unit, conditions, event) for event in layout.events]
+    steppers = [Stepper(unit, conditions, event) for event in layout.events if not _never_taken(layout, event)]
     steps = [item.step_function() for item in steppers]
     happens = [item.happen_function() for item in steppers if _happens(layout, item.event)]
     messages = layout.of_kind(CommunicationKind.INCOMING_MESSAGE)
@@ -34,33 +32,34 @@ def source_file(unit: Unit) -> str:
     provided += [default_function(unit, item) for item in messages]
     held = [conditions.conjuncts_function(item.name) for item in messages]
     held += [conditions.requirements_function(item.name) for item in layout.of_kind(CommunicationKind.ACTION)]
-    blocks += [text.splitlines() for text in helper_functions(unit.used)]
-    blocks += [text.splitlines() for _, text in unit.functions.values()]
-    blocks += [*converters, *conditions.nodes, *allows, *steps, *provided, *held, *_dispatchers(layout)]
-    blocks += [runtime_text(layout, "engine.c").rstrip().splitlines(), *happens, *_entries(layout), *_names(layout)]
-    text = "\n\n".join("\n".join(block) for block in [_prologue(layout), *blocks]) + "\n"
-    return text
+    ends = [runtime_text(layout, "engine.c").rstrip().splitlines(), *happens, *_entries(layout), *_names(layout)]
+    rest = [*allows, *steps, *provided, *held, *_dispatchers(layout), *ends]
+    converters = {layout.converters[enum.name]: converter(unit, enum) for enum in layout.model.enums}
+    functions = {
+        **HELPERS,
+        **dict(unit.functions.values()),
+        **{name: "\n".join(lines) for name, lines in (*converters.items(), *conditions.nodes.items())},
+    }
+    called = _called(functions, "\n".join(line for block in rest for line in block))
+    heads = [f"{converter_head(unit, enum)};" for enum in layout.model.enums if layout.converters[enum.name] in called]
+    texts = [*heads, *(text for name, text in functions.items() if name in called)]
+    return "\n\n".join([_prologue(layout), *texts, *("\n".join(block) for block in rest)]) + "\n"
 
 
-def _is_read(layout: Layout, enum: str) -> bool:
-    """Whether anything that is received is, or holds, the enum."""
-    stack = [
-        data for event in layout.events if not is_controllable(event) and (data := event_data(layout.model, event))
-    ]
-    seen: list[Type] = []
-    while stack:
-        type_ = stack.pop()
-        if type_ in seen:
-            continue
-        seen.append(type_)
-        match type_:
-            case EnumType(name=name):
-                stack.append(layout.model.enum(name).source)
-            case ObjectType(name=name):
-                stack += [part.type for part in layout.model.object(name).properties]
-            case ArrayType(element=element):
-                stack.append(element)
-    return any(isinstance(type_, EnumType) and type_.name == enum for type_ in seen)
+def _called(functions: dict[str, str], text: str) -> set[str]:
+    """The functions that a text calls, or that those call: a compiler warns about others."""
+    called: set[str] = set()
+    texts = [text]
+    while texts:
+        for name in set(re.findall(r"\w+(?=\()", texts.pop())) & functions.keys() - called:
+            called.add(name)
+            texts.append(functions[name])
+    return called
+
+
+def _never_taken(layout: Layout, event: str) -> bool:
+    """Whether an event is a tau that would change nothing in any state."""
+    return is_tau(event) and event not in layout.description.taus
 
 
 def _happens(layout: Layout, event: str) -> bool:
@@ -68,7 +67,7 @@ def _happens(layout: Layout, event: str) -> bool:
     return not is_controllable(event) and split(event)[1] != EventKind.ERROR
 
 
-def _prologue(layout: Layout) -> list[str]:
+def _prologue(layout: Layout) -> str:
     prefix = layout.prefix
     numbers = counts(layout)
     with_data = sum(_happens(layout, event) and bool(converted_paths(layout.model, event)) for event in layout.events)
@@ -94,7 +93,7 @@ def _prologue(layout: Layout) -> list[str]:
         "",
         f"typedef {prefix}_state_t state_t;",
     ]
-    if any(_is_read(layout, enum.name) for enum in layout.model.enums) or with_data:
+    if with_data:
         lines += [
             "",
             "/* What was unknown in received data. */",
@@ -103,7 +102,7 @@ def _prologue(layout: Layout) -> list[str]:
             "    bool is_enum_unknown;",
             "} notes_t;",
         ]
-    return [*lines, *_unknown_constants(layout), *_tables(layout, numbers)]
+    return "\n".join([*lines, *_unknown_constants(layout), *_tables(layout, numbers)])
 
 
 def _unknown_constants(layout: Layout) -> list[str]:
@@ -228,7 +227,7 @@ def _dispatchers(layout: Layout) -> list[list[str]]:
         taken = [
             (name, f"return {function('takes', event)}(s);")
             for event, name in events.items()
-            if is_controllable(event) or split(event)[1] == EventKind.ERROR
+            if (is_controllable(event) and not _never_taken(layout, event)) or split(event)[1] == EventKind.ERROR
         ]
         result.append(
             _switch(
@@ -441,4 +440,3 @@ def _names(layout: Layout) -> list[list[str]]:
             ]
         )
     return result
-

@@ -71,7 +71,7 @@ class Stepper:
             body += self._block(component, behaviour, branches)
         text = "\n".join(body)
         head = ", ".join(["state_t *s", *parameters])
-        unused = [name for name in (code.text for code in self._received.values())]
+        unused = [code.text for code in self._received.values()]
         return [
             f"static int {self.unit.layout.function('takes', self.event)}({head})",
             "{",
@@ -207,7 +207,7 @@ class Stepper:
         code = value(update.expression, self._reading.scope)
         words = comment(f"{component}: do {variable.name} := {expression_text(update.expression)}")
         if isinstance(variable.type, DoubleType):
-            code = as_double(code, self._reading.scope)
+            code = as_double(code)
         fits = self._fits(variable.type, code)
         cast = stored_cast(variable.type)
         if fits is None:

@@ -25,7 +25,7 @@ from robosc.expressions import (
 )
 from robosc.model.received import Path
 from robosc.supervisor.structure import Supervisor
-from robosc.targets.c99.expressions import TRUE_CODE, Code, Scope, Sort, code_for, sort_of, value
+from robosc.targets.c99.expressions import TRUE_CODE, Code, Scope, Sort, code_for, equality, sort_of, value
 from robosc.targets.c99.layout import Layout, make_layout
 from robosc.targets.paths import path_type
 
@@ -37,13 +37,11 @@ class Unit:
     Attributes:
         layout: Names.
         system: The automata, for the domains of decision diagrams.
-        used: Helper functions that the code calls.
         functions: Text of each function made for an array, by its head and body without its name.
     """
 
     layout: Layout
     system: System
-    used: set[str] = field(default_factory=set)
     functions: dict[str, tuple[str, str]] = field(default_factory=dict)
 
     def function(self, purpose: str, template: str) -> str:
@@ -57,10 +55,8 @@ class Unit:
         """The value of a type that is made of received data; what must be noted goes to `notes`."""
         match type_:
             case IntegerType(low=int(low), high=int(high)):
-                self.used.add("clamped")
                 return code_for(f"clamped({lvalue}, {low_text(low)}, {low_text(high)}, {notes})", type_, True)
             case IntegerType():
-                self.used.add("whole")
                 return code_for(f"whole({lvalue})", type_, True)
             case EnumType(name=name):
                 argument = address(lvalue) if self.layout.is_by_pointer(type_) else lvalue
@@ -70,7 +66,6 @@ class Unit:
             case ObjectType():
                 raise InternalError(f"{lvalue} is no single value")
         if sort_of(type_) is Sort.BOOLEAN:
-            self.used.add("boolean_of")
             return code_for(f"boolean_of({lvalue})", type_, True)
         return code_for(lvalue, type_, True)
 
@@ -161,7 +156,6 @@ class Reading:
             element=self._element,
             reduction=self._reduction,
             quantifier=self._quantifier,
-            used=self.unit.used.add,
         )
 
     def variable(self, component: str, name: str) -> tuple[str, Type]:
@@ -173,8 +167,7 @@ class Reading:
         """Whether an automaton is in a location."""
         if automaton not in self.unit.layout.locations:
             return TRUE_CODE  # A message's plant has one location.
-        test = f"{self.location(automaton)} == {self.unit.layout.location_names[automaton, state]}"
-        return Code(test, is_atom=False)
+        return equality(self.location(automaton), self.unit.layout.location_names[automaton, state], True)
 
     def location(self, automaton: str) -> str:
         """Text of an automaton's location."""
@@ -203,7 +196,6 @@ class Reading:
         """How many elements are looked at, and the place of the one with number `k`."""
         if part.low is None or part.high is None:
             return "array->length", "k"
-        self.unit.used.update(("part_count", "part_index"))
         bounds = f"array->length, {part.low}U"
         return f"part_count({bounds}, {part.high}U)", f"part_index({bounds}, k)"
 

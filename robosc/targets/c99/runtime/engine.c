@@ -15,7 +15,7 @@ static void note(const robot_t *r, robot_log_t kind, int what)
     }
 }
 
-#if ROBOT_EVENT_COUNT > 0
+#if ROBOT_RECEIVED_COUNT > 0 || ROBOT_REQUEST_COUNT > 0 || ROBOT_SILENT_COUNT > 0
 static void unexpected(robot_t *r, int event)
 {
     r->counters.unexpected++;
@@ -51,7 +51,7 @@ static bool notes_count(robot_t *r, robot_event_t event, const notes_t *notes, b
 }
 #endif
 
-#if ROBOT_EVENT_COUNT > 0
+#if ROBOT_RECEIVED_COUNT > 0 || ROBOT_REQUEST_COUNT > 0 || ROBOT_SILENT_COUNT > 0
 /* An event was taken, with so many skipped updates, or refused. */
 static void happened(robot_t *r, robot_event_t event, int skipped)
 {
@@ -121,7 +121,7 @@ static bool another_is_enabled(const robot_t *r, int topic)
 static void observe_acting(robot_t *r, int topic)
 {
     robot_acting_t *acting = &r->acting[topic];
-    bool holds[ROBOT_CONJUNCT_COUNT + 1];
+    bool holds[ROBOT_CONJUNCT_COUNT + 1] = {false};
     const bool is_enabled = is_allowed(&r->state, REQUESTS[acting->request].event);
     get_conjuncts(&r->state, acting->request, holds);
     if (acting->was_enabled && !is_enabled) {
@@ -227,7 +227,7 @@ static void observe_goals(robot_t *r)
     for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
         robot_goal_t *goal = &r->goals[action];
         if (goal->is_open && goal->is_running) {
-            bool holds[ROBOT_REQUIREMENT_COUNT + 1];
+            bool holds[ROBOT_REQUIREMENT_COUNT + 1] = {false};
             get_requirements(&r->state, action, holds);
             for (int place = 0; place < ACTIONS[action].requirements; place++) {
                 goal->held[place] = goal->held[place] || holds[place];
@@ -242,7 +242,7 @@ static int goal_to_cancel(const robot_t *r)
     for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
         const robot_goal_t *goal = &r->goals[action];
         if (goal->is_open && goal->is_running) {
-            bool holds[ROBOT_REQUIREMENT_COUNT + 1];
+            bool holds[ROBOT_REQUIREMENT_COUNT + 1] = {false};
             bool has_turned = false;
             get_requirements(&r->state, action, holds);
             for (int place = 0; place < ACTIONS[action].requirements; place++) {

@@ -43,7 +43,7 @@ of enums (`{upper}_VALUE_...`), and the variables as they are. `{prefix}_enabled
 - The policy `random` draws from another generator (splitmix64): the same seed gives another sequence.
 - The counters count entries of the log; one entry may tell several unknown values.
 - The event log and the state topic are the caller's, made from the `log` callback and the state.
-- There are no objects of any kind to be received: what does not fit is for the caller to tell as unknown.
+- Received data is typed: what does not fit is for the caller to tell as unknown.
 """
 
 

@@ -18,6 +18,9 @@ from robosc.targets.c99.unit import Unit, low_text
 from robosc.targets.events import has_plant_location, is_controllable, split
 from robosc.targets.python.text import indent
 
+_ENGINE = tuple(f"{part}.c" for part in "log releases goals steps policies decisions rest time replies life".split())
+"""The parts of the engine, each after those that it calls."""
+
 
 def source_file(unit: Unit) -> str:
     """The text of `<robot>.c`."""
@@ -32,7 +35,8 @@ def source_file(unit: Unit) -> str:
     provided += [default_function(unit, item) for item in messages]
     held = [conditions.conjuncts_function(item.name) for item in messages]
     held += [conditions.requirements_function(item.name) for item in layout.of_kind(CommunicationKind.ACTION)]
-    ends = [runtime_text(layout, "engine.c").rstrip().splitlines(), *happens, *_entries(layout), *_names(layout)]
+    engine = [runtime_text(layout, part).rstrip().splitlines() for part in _ENGINE]
+    ends = [*engine, *happens, *_entries(layout), *_names(layout)]
     rest = [*allows, *steps, *provided, *held, *_dispatchers(layout), *ends]
     converters = {layout.converters[enum.name]: converter(unit, enum) for enum in layout.model.enums}
     functions = {

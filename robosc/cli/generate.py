@@ -49,7 +49,12 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 def add_generate_arguments(parser: argparse.ArgumentParser) -> None:
     """What to generate, and where to."""
-    parser.add_argument("--target", required=True, metavar="NAME", help="what to generate: see --list-targets")
+    parser.add_argument(
+        "--target",
+        required=True,
+        metavar="NAME",
+        help="what to generate: see --list-targets; in c99 the policy random draws another sequence than in Python",
+    )
     parser.add_argument("--list-targets", action=_ListTargets, nargs=0, help="list what can be generated")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="folder to write to")
     parser.add_argument("--force", action="store_true", help="overwrite generated files even where you changed them")

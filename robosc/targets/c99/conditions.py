@@ -1,25 +1,22 @@
 """Generated functions that tell whether a controllable event is allowed now, and which requirements hold."""
 
-from robosc.automata.plants import communication_plant_name
 from robosc.expressions import (
-    FALSE,
     MAXIMUM_INTEGER,
     MINIMUM_INTEGER,
-    TRUE,
     IntegerType,
     StateTest,
     conjuncts,
 )
-from robosc.expressions.text import expression_text
-from robosc.model.structure import Behaviour, Deployment, EventKind, Model, Requirement, Transition, is_tau
+from robosc.model.structure import Model
 from robosc.supervisor.diagram import diagram_domains
 from robosc.supervisor.structure import DecisionDiagram, DecisionNode
 from robosc.supervisor.words import Formulas, in_words, size_in_words
+from robosc.targets import acceptance
+from robosc.targets.acceptance import InOneOf, StaysInRange, accepting_conditions, enabling_conditions
 from robosc.targets.c99.expressions import (
     FALSE_CODE,
     TRUE_CODE,
     Code,
-    both,
     either,
     falsity,
     negated,
@@ -29,7 +26,6 @@ from robosc.targets.c99.expressions import (
 from robosc.targets.c99.layout import Layout
 from robosc.targets.c99.text import comment
 from robosc.targets.c99.unit import Reading, Unit, low_text
-from robosc.targets.events import has_plant_location, plant_step, split, taken_transition
 from robosc.targets.python.text import indent
 from robosc.targets.words import requirement_text
 
@@ -98,102 +94,24 @@ class Conditions:
 
     def accepted(self, event: str, reading: Reading) -> list[Condition]:
         """Where the behaviours accept a controllable event, without leaving a range of a synthesis variable."""
-        if is_tau(event):
-            return self._tau_conditions(event, reading)
-        return [
-            condition
-            for component, behaviour in self._layout.behaviours
-            for condition in self._component_conditions(component, behaviour, event, reading)
-        ]
+        return [(words, self._code(item, reading)) for words, item in accepting_conditions(self._model, event)]
 
     def _conditions(self, event: str) -> list[Condition]:
-        name, kind = split(event)
-        result: list[Condition] = []
-        if is_tau(event):
-            result.append(self._changes_something(event))
-        else:
-            communication = self._model.communication(name)
-            if has_plant_location(communication):
-                sources, _ = plant_step(communication, EventKind(kind))
-                plant = communication_plant_name(communication)
-                result.append((f"{plant} is {' or '.join(sources)}", in_one_of(self._reading, plant, sources)))
-        result += self.accepted(event, self._reading)
-        if kind == EventKind.REQUEST:
-            for item in self._model.requirements_on(name):
-                result.append((requirement_text(item), truth(item.condition, self._reading.scope)))
-        elif kind == EventKind.CANCEL:
-            result += self._cancel_condition(self._model.requirements_on(name))
-        return [*result, *self._added_condition(event)]
+        found = enabling_conditions(self._layout.supervisor, event)
+        return [*((words, self._code(item, self._reading)) for words, item in found), *self._added_condition(event)]
 
-    def _cancel_condition(self, requirements: tuple[Requirement, ...]) -> list[Condition]:
-        """Cancel only where at least one requirement does not hold; without requirements, and as a layer, anywhere."""
-        if not requirements or self._layout.supervisor.deployment is Deployment.LAYER:
-            return []
-        all_hold = TRUE_CODE
-        for requirement in requirements:
-            all_hold = both(all_hold, truth(requirement.condition, self._reading.scope))
-        return [("at least one of the action's requirements does not hold", negated(all_hold))]
-
-    def _tau(self, event: str) -> tuple[str, Transition]:
-        component, _ = split(event)
-        behaviour = dict(self._layout.behaviours)[component]
-        return component, next(item for item in behaviour.transitions if item.event == event)
-
-    def _tau_conditions(self, event: str, reading: Reading) -> list[Condition]:
-        component, transition = self._tau(event)
-        code = TRUE_CODE
-        if transition.source is not None:
-            code = truth(StateTest(component, transition.source), reading.scope)
-        guard = transition.guard if transition.guard is not None else TRUE
-        source = f"in {transition.source}: " if transition.source else ""
-        condition = f" if {expression_text(guard)}" if transition.guard is not None else ""
-        target = f" goto {transition.target}" if transition.target else ""
-        words = f"{component}: {source}transition{condition}{target}"
-        return [(words, both(code, truth(guard, reading.scope)))]
-
-    def _changes_something(self, event: str) -> Condition:
-        """A tau that would change nothing is not taken."""
-        component, transition = self._tau(event)
-        if transition.target is None or transition.target == transition.source:
-            return "it would change nothing", truth(FALSE, self._reading.scope)
-        if transition.source is not None:
-            return "", TRUE_CODE
-        return f"{component} is elsewhere", falsity(StateTest(component, transition.target), self._reading.scope)
-
-    def _component_conditions(
-        self, component: str, behaviour: Behaviour, event: str, reading: Reading
-    ) -> list[Condition]:
-        """Where a component accepts a request, and that no update of a synthesis variable leaves its range."""
-        if not any(item.event == event for item in behaviour.transitions):
-            return []
-        taken = {state.name: taken_transition(behaviour, event, state.name) for state in behaviour.states}
-        accepting = tuple(state for state, transition in taken.items() if transition is not None)
-        result: list[Condition] = []
-        if len(accepting) < len(taken) and split(event)[1] == EventKind.REQUEST:
-            words = f"{component} accepts it in {', '.join(accepting)}"
-            result.append((words, in_one_of(reading, component, accepting)))
-        for state, transition in taken.items():
-            if transition is not None:
-                result += self._range_conditions(component, behaviour, state, transition, reading)
-        return result
-
-    def _range_conditions(
-        self, component: str, behaviour: Behaviour, state: str, transition: Transition, reading: Reading
-    ) -> list[Condition]:
-        variables = {variable.name: variable for variable in behaviour.variables}
-        result = []
-        for update in transition.updates:
-            variable = variables[update.variable]
-            if not variable.is_synthesis or not isinstance(variable.type, IntegerType):
-                continue
-            fits = self._fits(value(update.expression, reading.scope), variable.type)
-            if fits == TRUE_CODE:
-                continue
-            if len(behaviour.states) > 1:
-                fits = either(falsity(StateTest(component, state), reading.scope), fits)
-            words = f"{component}.{update.variable} := {expression_text(update.expression)} stays in its range"
-            result.append((words, fits))
-        return result
+    def _code(self, condition: acceptance.Condition, reading: Reading) -> Code:
+        """Whether a condition holds."""
+        match condition:
+            case InOneOf(automaton=automaton, locations=locations):
+                return in_one_of(reading, automaton, locations)
+            case StaysInRange(component=component, state=state, expression=expression, type=type_):
+                fits = self._fits(value(expression, reading.scope), type_)
+                if fits == TRUE_CODE or state is None:
+                    return fits
+                return either(falsity(StateTest(component, state), reading.scope), fits)
+            case _:
+                return truth(condition, reading.scope)
 
     def _fits(self, code: Code, type_: IntegerType) -> Code:
         """Whether a value is in a range; an unknown one leaves the variable alone."""

@@ -83,7 +83,10 @@ robot Everything {
             on response from level do level := value
             on response from side do side := value
             on response from speed do speed := value
-            initial marked state calm { on response from button goto tense }
+            initial marked state calm {
+                on response from button goto tense
+                on request to turn goto tense
+            }
             marked state tense { on response from button goto calm }
         }
     }
@@ -115,9 +118,21 @@ robot Everything {
             }
         }
     }
+    component Wheels {
+        behaviour {
+            initial marked state still {
+                on request to turn goto rolling
+                on response from speed goto rolling
+            }
+            marked state rolling {
+                on request to turn
+                on response from level goto still
+            }
+        }
+    }
     requirement forward needs Sensors.level = high and Sensors.calm
     requirement back needs Sensors.level = low or Sensors.side = left
-    requirement turn needs Sensors.calm or Base.idle
+    requirement turn needs Wheels.still and Sensors.calm
     requirement Sensors.level = middle disables calibrate
     requirement move needs Sensors.calm
     requirement move needs Base.idle

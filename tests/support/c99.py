@@ -258,14 +258,10 @@ class Reference:
         self.clock.advance(dice.choice([0, 1, 1] if self.is_calm else [0, 0, 1, 1, 1, 2, 4, 9, 33]) * 0.125)
         now = _microseconds(self.clock.now_s)
         back = events_back(self.layout)
-        kind = dice.choices(
-            ["start", "tick", "watch", "stop", "restart", "failing", "receive", "back", "failed", "goal"],
-            [
-                *([4, 8, 0, 0, 0, 0] if self.is_calm else [0.3, 4, 0.5, 0.15, 0.6, 0.3]),
-                6,
-                *(back and [4, 0.7, 1.5] or [0] * 3),
-            ],
-        )[0]
+        kinds = ["start", "tick", "watch", "stop", "restart", "failing", "receive", "back", "failed", "goal"]
+        weights = [4, 8, 0, 0, 0, 0] if self.is_calm else [0.3, 4, 0.5, 0.15, 0.6, 0.3]
+        weights += [6, 4, 0.7, 1.5] if back else [6, 0, 0, 0]
+        kind = dice.choices(kinds, weights)[0]
         match kind:
             case "start":
                 executor.start()

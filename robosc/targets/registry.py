@@ -61,6 +61,10 @@ class UnknownTargetError(RoboscError, LookupError):
 
 # Name, description and place of the built-in targets: listing them imports none.
 _BUILT_IN: dict[str, tuple[str, str]] = {
+    "c99": (
+        "the supervisor and its executor as portable C99 without allocation",
+        "robosc.targets.c99:TARGET",
+    ),
     "cif": (
         "the synthesis problem and the controlled system in CIF, for Eclipse ESCET",
         "robosc.targets.cif:TARGET",

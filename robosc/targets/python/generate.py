@@ -7,14 +7,15 @@ from robosc.execution.interpreter import describe
 from robosc.execution.protocol import Description
 from robosc.expressions import DoubleType, values
 from robosc.supervisor.structure import Supervisor
-from robosc.targets.python.allow import allow_method, conjuncts_method, requirement_text, requirements_method
-from robosc.targets.python.layout import has_plant_location
+from robosc.targets.events import has_plant_location
+from robosc.targets.python.allow import allow_method, conjuncts_method, requirements_method
 from robosc.targets.python.provide import provide_method
 from robosc.targets.python.received import converter
 from robosc.targets.python.step import read_method, step_method
 from robosc.targets.python.text import indent, printable
 from robosc.targets.python.when import matches_method
 from robosc.targets.python.writer import Writer, make_writer
+from robosc.targets.words import requirement_text
 
 _READING_FUNCTIONS = frozenset(
     """

@@ -5,16 +5,13 @@ from dataclasses import dataclass
 from robosc.automata.plants import communication_plant_name
 from robosc.expressions import Type
 from robosc.model.structure import (
-    CONTROLLABLE_KINDS,
     EVENT_KINDS,
     Behaviour,
-    Communication,
-    CommunicationKind,
     EventKind,
     Model,
-    is_tau,
 )
 from robosc.supervisor.structure import Supervisor
+from robosc.targets.events import events, has_plant_location, is_controllable
 from robosc.targets.python.naming import Namer
 
 PROTOCOL_NAMES = (
@@ -72,40 +69,6 @@ class Layout:
     def uncontrollable(self) -> tuple[str, ...]:
         """Events of the environment, in source order."""
         return tuple(event for event in events(self.model) if not is_controllable(event))
-
-
-def events(model: Model) -> tuple[str, ...]:
-    """Every event of a model: of its communications in source order, then its taus."""
-    return tuple(event for item in model.communications for event in item.events) + model.taus
-
-
-def split(event: str) -> tuple[str, str]:
-    """`move.request` -> (`move`, `request`)."""
-    name, _, kind = event.rpartition(".")
-    return name, kind
-
-
-def is_controllable(event: str) -> bool:
-    """Whether an event is caused by the executor rather than the environment."""
-    return is_tau(event) or split(event)[1] in CONTROLLABLE_KINDS
-
-
-def has_plant_location(communication: Communication) -> bool:
-    """Whether its plant has more than one location."""
-    return communication.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
-
-
-def plant_step(communication: Communication, kind: EventKind) -> tuple[tuple[str, ...], str | None]:
-    """Locations from which an event is possible, and the one it leads to (None: it stays); semantics part 1."""
-    busy = "waiting" if communication.kind is CommunicationKind.SERVICE else "executing"
-    return {
-        EventKind.REQUEST: (("idle",), busy),
-        EventKind.RESPONSE: ((busy,), "ready"),
-        EventKind.ERROR: ((busy,), "failed"),
-        EventKind.FEEDBACK: ((busy,), None),
-        EventKind.CANCEL: ((busy,), "idle"),
-        EventKind.RESET: (("ready", "failed"), "idle"),
-    }[kind]
 
 
 def make_layout(supervisor: Supervisor) -> Layout:

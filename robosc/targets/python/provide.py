@@ -1,10 +1,10 @@
 """Generated methods that compute the data of a request at the moment it is made."""
 
-from robosc.expressions.text import expression_text
-from robosc.model.structure import ObjectValue, Provide, ProvidedValue
+from robosc.model.structure import ObjectValue, ProvidedValue
 from robosc.targets.python.expressions import TRUE_CODE, Unknown, truth, value
 from robosc.targets.python.text import comment, docstring, indent
 from robosc.targets.python.writer import Writer
+from robosc.targets.words import provide_text
 
 
 def provide_method(writer: Writer, communication: str) -> list[str]:
@@ -21,18 +21,6 @@ def provide_method(writer: Writer, communication: str) -> list[str]:
             return [*lines, *indent(result)]
         lines += [f"    if {condition.text}:", *indent(result, 2)]
     return [*lines, "    return True, None"]
-
-
-def provide_text(statement: Provide) -> str:
-    """A provide statement as a user writes it."""
-    condition = f" if {expression_text(statement.condition)}" if statement.condition is not None else ""
-    return f"provide {statement.communication} with {_value_text(statement.value)}{condition}"
-
-
-def _value_text(provided: ProvidedValue) -> str:
-    if isinstance(provided, ObjectValue):
-        return "{ " + ", ".join(f"{name}: {_value_text(item)}" for name, item in provided.properties) + " }"
-    return expression_text(provided)
 
 
 def _result(writer: Writer, provided: ProvidedValue) -> list[str]:

@@ -12,14 +12,15 @@ from robosc.expressions import (
     Expression,
     IntegerType,
     ObjectType,
-    PathStep,
     Received,
     StringType,
     Type,
     children,
 )
 from robosc.expressions.text import expression_text
-from robosc.model.structure import EnumDefinition, Model
+from robosc.model.received import Path
+from robosc.model.structure import EnumDefinition
+from robosc.targets.paths import path_text, path_type
 from robosc.targets.python.expressions import (
     TRUE_CODE,
     Code,
@@ -35,8 +36,6 @@ from robosc.targets.python.layout import Layout
 from robosc.targets.python.naming import Namer
 from robosc.targets.python.text import comment, indent
 
-Path = tuple[PathStep, ...]
-
 _PLAIN: dict[type, str] = {
     DoubleType: "read_double",
     IntegerType: "read_integer",
@@ -44,25 +43,6 @@ _PLAIN: dict[type, str] = {
     StringType: "read_string",
 }
 """Functions of `values` that convert an element about which there is nothing to note."""
-
-
-def path_text(path: Path) -> str:
-    """A path as a user writes it: `value.ranges[0]`."""
-    return "value" + "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
-
-
-def path_type(model: Model, root: Type, path: Path) -> Type:
-    """The type at the end of a path."""
-    type_ = root
-    for step in path:
-        match type_, step:
-            case ObjectType(name=name), str():
-                type_ = next(item.type for item in model.object(name).properties if item.name == step)
-            case ArrayType(element=element), int():
-                type_ = element
-            case _:
-                raise InternalError(f"{path_text(path)} does not fit its type")
-    return type_
 
 
 def received_unknown(type_: Type, path: Path) -> Unknown:
@@ -296,13 +276,4 @@ def no_location(automaton: str) -> str:
     raise InternalError(f"a condition on received data reads the state of {automaton}")
 
 
-__all__ = [
-    "Path",
-    "Reader",
-    "converter",
-    "no_location",
-    "no_variable",
-    "path_text",
-    "path_type",
-    "received_unknown",
-]
+__all__ = ["Reader", "converter", "no_location", "no_variable", "received_unknown"]

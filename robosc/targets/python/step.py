@@ -21,13 +21,14 @@ from robosc.expressions import (
     leaves,
 )
 from robosc.expressions.text import expression_text
-from robosc.model.received import converted_paths
+from robosc.model.received import Path, converted_paths
 from robosc.model.structure import Behaviour, EventKind, Transition, Update, Variable, is_tau
+from robosc.targets.events import has_plant_location, is_controllable, plant_step, split, taken_transition
+from robosc.targets.paths import path_text, path_type
 from robosc.targets.python.allow import accepted
 from robosc.targets.python.expressions import TRUE_CODE, Code, Scope, Sort, Unknown, code_for, negated, value
-from robosc.targets.python.layout import has_plant_location, is_controllable, plant_step, split
 from robosc.targets.python.naming import Namer
-from robosc.targets.python.received import Path, Reader, path_text, path_type, received_unknown
+from robosc.targets.python.received import Reader, received_unknown
 from robosc.targets.python.text import comment, docstring, indent
 from robosc.targets.python.writer import Writer
 
@@ -141,7 +142,7 @@ class _StepWriter:
         for component, behaviour in self.writer.layout.behaviours:
             by_transition: dict[int, list[str]] = {}
             for state in behaviour.states:
-                transition = self.writer.chosen(behaviour, self.event, state.name)
+                transition = taken_transition(behaviour, self.event, state.name)
                 if transition is not None:
                     by_transition.setdefault(behaviour.transitions.index(transition), []).append(state.name)
             branches = [(tuple(states), behaviour.transitions[index]) for index, states in by_transition.items()]

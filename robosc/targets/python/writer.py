@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from robosc.automata import System, to_automata
 from robosc.errors import InternalError
 from robosc.expressions import PathStep, Type
-from robosc.model.structure import Behaviour, Model, Transition
+from robosc.model.structure import Model
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.python.diagrams import Diagrams
 from robosc.targets.python.expressions import Code, Scope
@@ -56,13 +56,6 @@ class Writer:
         if automaton in self.layout.locations:
             return f"self.{self.layout.locations[automaton]}"
         return repr(self.system.automaton(automaton).initial[0])  # A message's plant has one location.
-
-    @staticmethod
-    def chosen(behaviour: Behaviour, event: str, state: str) -> Transition | None:
-        """The transition that takes an event in a state: the state's own first, then the behaviour's."""
-        fitting = [item for item in behaviour.transitions if item.event == event and item.source in (state, None)]
-        own = [item for item in fitting if item.source is not None]
-        return next(iter([*own, *fitting]), None)
 
 
 def make_writer(supervisor: Supervisor) -> Writer:

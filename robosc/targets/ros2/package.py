@@ -12,7 +12,6 @@ from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Communication, CommunicationKind, Interface, Model
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.files import GeneratedFiles
-from robosc.targets.python.allow import requirement_text
 from robosc.targets.python.generate import header
 from robosc.targets.python.layout import make_layout
 from robosc.targets.python.naming import snake_case
@@ -22,6 +21,7 @@ from robosc.targets.registry import GenerateOptions
 from robosc.targets.ros2.runtime.parameters import declarations
 from robosc.targets.ros2.state_topic import state_topic
 from robosc.targets.ros2.topics import Topic, sent_paths, servers, shapes_of, topics
+from robosc.targets.words import requirement_text
 
 _OWN_DEPENDENCIES = (
     "ament_index_python",

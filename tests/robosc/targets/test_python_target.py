@@ -33,7 +33,7 @@ from robosc.model.structure import (
 from robosc.supervisor import decode, encode, make_supervisor
 from robosc.supervisor.structure import Supervisor
 from robosc.targets import GenerateOptions, generate
-from robosc.targets.python.layout import events, is_controllable
+from robosc.targets.events import events, is_controllable
 from support.generated import example_supervisor, imported, load_system, python_text, same
 from support.layers import BothSides
 from support.models import EXAMPLE_DEPLOYMENTS, EXAMPLE_NAMES, model_of

@@ -1,0 +1,8 @@
+"""The target `c99`."""
+
+from robosc.targets.c99.package import generate
+from robosc.targets.registry import Target, TargetInfo
+
+TARGET = Target(TargetInfo("c99", "the supervisor and its executor as portable C99 without allocation"), generate)
+
+__all__ = ["TARGET"]

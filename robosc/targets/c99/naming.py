@@ -1,0 +1,65 @@
+"""C identifiers for a model's names: distinct, of bounded length, no keyword and no name that C reserves."""
+
+import re
+
+from robosc.targets.python.naming import snake_case
+
+_MAXIMUM = 120
+_MAXIMUM_PREFIX = 60
+
+# What C99, C11, C23 and C++ keep for themselves, and macros of common headers that look like ordinary names.
+_TAKEN = frozenset(
+    """
+    alignas alignof and and_eq asm auto bitand bitor bool break case catch char char16_t char32_t char8_t class compl
+    concept const const_cast consteval constexpr constinit continue co_await co_return co_yield decltype default delete
+    do double dynamic_cast else enum explicit export extern false float for friend goto if inline int long mutable
+    namespace new noexcept not not_eq nullptr operator or or_eq private protected public register reinterpret_cast
+    requires restrict return short signed sizeof static static_assert static_cast struct switch template this
+    thread_local throw true try typedef typeid typename typeof typeof_unqual union unsigned using virtual void volatile
+    wchar_t while xor xor_eq assert complex errno imaginary isfinite isinf isnan isnormal linux noreturn offsetof
+    setjmp signbit stderr stdin stdout unix
+    """.split()
+)
+
+# C99 7.26 keeps these beginnings for its library, POSIX the others: a robot's prefix must not be one of them.
+_LIBRARY_PREFIX = re.compile(
+    r"(is|to|str|mem|wcs|u?int|atomic|cnd|mtx|thrd|tss|sig|f[eo])[a-z]"
+    r"|(aio|clock|dl|mq|posix|pthread|sched|sem|shm|sig|timer|msg|net|poll|stdc|va|wait)(_|\Z)"
+)
+
+
+def prefix_for(robot: str) -> str:
+    """The beginning of every global name of a robot's files: `LineFollower` -> `line_follower`."""
+    name = snake_case(robot)[:_MAXIMUM_PREFIX].rstrip("_")
+    return f"robot_{name}" if _LIBRARY_PREFIX.match(name) else name
+
+
+def member_name(wish: str) -> str:
+    """A legal name for a member of a struct: never a keyword, a macro or a name that C reserves."""
+    name = wish[:_MAXIMUM]
+    is_reserved = name in _TAKEN or name.startswith("_") or (len(name) > 1 and name.upper() == name)
+    return f"{'x' if name.startswith('_') else ''}{name}_" if is_reserved else name
+
+
+class Namer:
+    """Hands out distinct names; the same wishes in the same order give the same names.
+
+    Args:
+        taken: Names that must not be handed out.
+    """
+
+    def __init__(self, taken: frozenset[str] = frozenset()) -> None:
+        self._taken = set(taken)
+
+    def name(self, wish: str) -> str:
+        """A new name as close as possible to `wish`, which must be a legal identifier but for its length."""
+        base = re.sub(r"[^A-Za-z0-9_]", "_", wish)[:_MAXIMUM]
+        name, number = base, 2
+        while name in self._taken:
+            name, number = f"{base}_{number}", number + 1
+        self._taken.add(name)
+        return name
+
+    def member(self, wish: str) -> str:
+        """A new name for a member of a struct."""
+        return self.name(member_name(wish))

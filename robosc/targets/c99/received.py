@@ -1,0 +1,167 @@
+"""Generated code that reads received data into local variables, and makes enums of it."""
+
+from dataclasses import dataclass, field
+
+from robosc.expressions import (
+    ArrayType,
+    Binary,
+    Call,
+    EnumType,
+    Expression,
+    IntegerType,
+    ObjectType,
+    Received,
+    Type,
+    Unary,
+    children,
+)
+from robosc.expressions.text import expression_text
+from robosc.model.received import Path
+from robosc.model.structure import EnumDefinition
+from robosc.targets.c99.expressions import TRUE_CODE, Code, both, falsity, truth
+from robosc.targets.c99.naming import Namer
+from robosc.targets.c99.text import comment
+from robosc.targets.c99.unit import Reading, Unit, declared
+from robosc.targets.paths import path_type
+from robosc.targets.python.text import indent
+
+_ARITHMETIC = frozenset({"+", "-", "*", "/"})
+
+
+@dataclass
+class Reader:
+    """Writes declarations that read paths of one received datum; each path is read once.
+
+    Attributes:
+        unit: The file.
+        root: Type of the datum.
+        lvalue: Where it is.
+        notes: Text of the address of what is noted.
+    """
+
+    unit: Unit
+    root: Type
+    lvalue: str
+    notes: str
+    names: dict[str, None] = field(default_factory=dict)
+    _lines: list[str] = field(default_factory=list)
+    _codes: dict[Path, Code] = field(default_factory=dict)
+    _namer: Namer = field(default_factory=lambda: Namer(frozenset({"data", "notes", "s", "old", "skipped", "r"})))
+
+    def read(self, path: Path) -> Code:
+        """The code of a path."""
+        if path not in self._codes:
+            self._codes[path] = self._read(path)
+        return self._codes[path]
+
+    def type_at(self, path: Path) -> Type:
+        """The type of a path."""
+        return path_type(self.unit.layout.model, self.root, path)
+
+    def take_lines(self) -> list[str]:
+        """The declarations since the last call."""
+        lines, self._lines = self._lines, []
+        return lines
+
+    def _read(self, path: Path) -> Code:
+        code, type_ = self.unit.part(self.lvalue, self.root, path, self.notes), self.type_at(path)
+        name = self._namer.name("_".join(["value", *map(str, path)]))
+        self.names[name] = None
+        is_array = isinstance(type_, ArrayType)
+        c_type = f"const {self.unit.layout.raw(type_)} *" if is_array else code.sort.c_type
+        # The text itself is constant already; of everything else the local variable is.
+        constant = "" if is_array or c_type.endswith("*") else "const "
+        self._lines.append(f"{constant}{declared(c_type, name)} = {code.text};")
+        if is_array:
+            notable = note_function(self.unit, type_)
+            if notable:
+                self._lines.append(f"{notable}({name}, {self.notes});")
+        return Code(name, code.sort, code.may_be_unknown, low=code.low, high=code.high)
+
+
+def note_function(unit: Unit, type_: Type) -> str | None:
+    """The function that notes what is unknown in an array's elements, or None if nothing can be noted."""
+    if not isinstance(type_, ArrayType):
+        return None
+    body = _notes_on(unit, "array->items[k]", type_.element)
+    if not body:
+        return None
+    lines = [
+        f"static void @(const {unit.layout.raw(type_)} *array, notes_t *notes)",
+        "{",
+        "    const size_t count = (array == NULL || array->items == NULL) ? 0 : array->length;",
+        "    for (size_t k = 0; k < count; k++) {",
+        *indent(body, 2),
+        "    }",
+        "}",
+    ]
+    return unit.function("note", "\n".join(lines))
+
+
+def _notes_on(unit: Unit, lvalue: str, type_: Type) -> list[str]:
+    match type_:
+        case IntegerType(low=int(), high=int()) | EnumType():
+            return [f"(void){unit.conversion(lvalue, type_, 'notes').text};"]
+        case ObjectType(name=name):
+            return [
+                line
+                for item in unit.layout.model.object(name).properties
+                for line in _notes_on(unit, f"{lvalue}.{unit.layout.properties[name, item.name]}", item.type)
+            ]
+        case ArrayType():
+            inner = note_function(unit, type_)
+            return [f"{inner}(&{lvalue}, notes);"] if inner else []
+        case _:
+            return []
+
+
+def converter_head(unit: Unit, enum: EnumDefinition) -> str:
+    """The head of the function that makes an enum out of received data."""
+    name, parameter = unit.layout.converters[enum.name], unit.layout.parameter(enum.source, "data")
+    return f"static int {name}({parameter}, notes_t *notes)"
+
+
+def converter(unit: Unit, enum: EnumDefinition) -> list[str]:
+    """The function that makes an enum out of received data, as a readable chain of conditions."""
+    lvalue = "(*data)" if unit.layout.is_by_pointer(enum.source) else "data"
+    reader = Reader(unit, enum.source, lvalue, "notes")
+    reading = Reading(unit, None, reader.read, reader.type_at)
+    values = unit.layout.values
+    body = ["(void)data;", "(void)notes;"]
+    all_false = TRUE_CODE
+    for rule in enum.rules:
+        fires = truth(rule.condition, reading.scope)
+        all_false = both(all_false, falsity(rule.condition, reading.scope))
+        # What only a later rule needs is not read before that rule's turn.
+        body += _declared_and_used(reader)
+        body += comment(f"{expression_text(rule.condition)} -> {rule.value}")
+        body += [f"if ({fires.text}) {{", f"    return {values[enum.name, rule.value]};", "}"]
+    body += comment(f"default -> {enum.default}")
+    if any(_may_be_unknown(rule.condition) for rule in enum.rules):
+        body += [
+            f"if (notes != NULL && !({all_false.text})) {{",
+            "    notes->is_unknown = true;",
+            "    notes->is_enum_unknown = true;",
+            "}",
+        ]
+    body.append(f"return {values[enum.name, enum.default]};")
+    return [converter_head(unit, enum), "{", *indent(body), "}"]
+
+
+def _declared_and_used(reader: Reader) -> list[str]:
+    """The declarations, none of which a compiler may call unused."""
+    lines = reader.take_lines()
+    names, reader.names = list(reader.names), {}
+    return [*lines, *(f"(void){name};" for name in names)]
+
+
+def _may_be_unknown(condition: Expression) -> bool:
+    """Whether a condition reads received data or computes: even constants can leave 32 bits."""
+    stack = [condition]
+    while stack:
+        node = stack.pop()
+        computes = isinstance(node, Binary | Unary) and node.operator in _ARITHMETIC
+        if computes or isinstance(node, Received | Call):
+            return True
+        stack.extend(children(node))
+    return False

@@ -1,0 +1,1 @@
+"""C text that does not depend on a model."""

@@ -1,0 +1,186 @@
+#if ROBOT_REQUEST_COUNT > 0
+/* Decisions. */
+
+/* A request cannot be issued: what acts on its identifier is released at once. */
+static bool withhold(robot_t *r, int request)
+{
+    unknown(r, (int)REQUESTS[request].event);
+#if ROBOT_TOPIC_COUNT > 0
+    if (keeps_acting(r, request) && r->acting[REQUESTS[request].topic].request >= 0) {
+        return release(r, REQUESTS[request].topic);
+    }
+#endif
+    return true;
+}
+
+static bool send(robot_t *r, int request, const robot_request_t *data)
+{
+    const robot_callbacks_t *callbacks = &r->callbacks;
+    (void)request;
+#if ROBOT_SERVICE_COUNT > 0
+    if (REQUESTS[request].service >= 0) {
+        robot_call_t *call = &r->calls[REQUESTS[request].service];
+        call->is_open = true;
+        call->id = r->next_call_id++;
+        call->deadline_us = later(r->now_us, r->settings.service_timeout_us);
+        if (!callbacks->call(callbacks->context, call->id, data)) {
+            call->is_open = false;
+            return fault(r, ROBOT_FAULT_CALLBACK);
+        }
+        return true;
+    }
+#endif
+#if ROBOT_ACTION_COUNT > 0
+    if (REQUESTS[request].action >= 0) {
+        robot_goal_t *goal = &r->goals[REQUESTS[request].action];
+        goal->is_open = true;
+        goal->is_running = true;
+        goal->is_accepted = false;
+        goal->is_cancel_wanted = false;
+        goal->is_cancel_sent = false;
+        goal->id = r->next_goal_id++;
+        goal->deadline_us = later(r->now_us, r->settings.action_timeout_us);
+        get_requirements(&r->state, REQUESTS[request].action, goal->held);
+        if (!callbacks->send_goal(callbacks->context, goal->id, data)) {
+            goal->is_open = false;
+            return fault(r, ROBOT_FAULT_CALLBACK);
+        }
+        return true;
+    }
+#endif
+    if (!callbacks->publish(callbacks->context, data)) {
+        return fault(r, ROBOT_FAULT_CALLBACK);
+    }
+    return true;
+}
+
+/* Issue a request, unless its data is unknown or does not fit: whether it was is told by `is_issued`. */
+static bool issue(robot_t *r, int request, bool *is_issued)
+{
+    robot_request_t data;
+    const bool is_unchanging = r->is_unchanging[request];
+    bool has_changed = false;
+    *is_issued = false;
+    memset(&data, 0, sizeof data);
+    data.communication = REQUESTS[request].communication;
+    if (!get_data(&r->state, request, &data)
+        || (r->callbacks.fits != NULL && !r->callbacks.fits(r->callbacks.context, &data))) {
+        return withhold(r, request);
+    }
+#if ROBOT_TOPIC_COUNT > 0
+    const bool is_acting = keeps_acting(r, request);
+    if (is_acting && !is_unchanging && r->acting[REQUESTS[request].topic].is_waiting) {
+        forget_acting(r, REQUESTS[request].topic);
+    }
+#endif
+    if (!take(r, REQUESTS[request].event)) {
+        return false;
+    }
+    /* A step that changed nothing in this state changes nothing the next time. */
+    if (!is_unchanging && !settle(r, request, &has_changed)) {
+        return false;
+    }
+    if (REQUESTS[request].topic >= 0) {
+        r->is_unchanging[request] = !has_changed;
+#if ROBOT_TOPIC_COUNT > 0
+        if (is_acting) {
+            const bool is_default = is_data_default(request, &data);
+            if (has_changed || is_default || r->acting[REQUESTS[request].topic].request != request) {
+                sent(r, request, is_default);
+            }
+        }
+#endif
+    }
+    if (!send(r, request, &data)) {
+        return false;
+    }
+    *is_issued = true;
+    return true;
+}
+
+/* Issue what the policy chooses among the candidates, or the next if its data is unknown or does not fit. */
+static bool issue_one_of(robot_t *r, bool *candidates, int *issued)
+{
+    *issued = -1;
+    for (;;) {
+        bool is_issued = false;
+        bool is_any = false;
+        int chosen = 0;
+        for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
+            is_any = is_any || candidates[request];
+        }
+        if (!is_any) {
+            return true;
+        }
+        chosen = choose(r, candidates);
+        if (!issue(r, chosen, &is_issued)) {
+            return false;
+        }
+        if (is_issued) {
+            remember_issued(r, chosen);
+            *issued = chosen;
+            return true;
+        }
+        candidates[chosen] = false;
+    }
+}
+
+static void find_enabled(robot_t *r)
+{
+    for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
+        r->is_enabled[request] = is_allowed(&r->state, REQUESTS[request].event);
+#if ROBOT_ACTION_COUNT > 0
+        if (REQUESTS[request].action >= 0 && r->goals[REQUESTS[request].action].is_open) {
+            r->is_enabled[request] = false;
+        }
+#endif
+    }
+    r->is_enabled_known = true;
+}
+
+static uint64_t next_deadline(const robot_t *r);
+
+/* One decision. */
+static bool decide(robot_t *r)
+{
+    bool enabled[ROBOT_REQUEST_COUNT];
+    bool candidates[ROBOT_REQUEST_COUNT];
+    int issued = -1;
+    if (!r->is_enabled_known) {
+        find_enabled(r);
+    }
+    for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
+        enabled[request] = r->is_enabled[request];
+        candidates[request] = enabled[request];
+    }
+#if ROBOT_TOPIC_COUNT > 0
+    if (is_any_waiting(r)) {
+        bool others[ROBOT_REQUEST_COUNT];
+        for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
+            const int topic = REQUESTS[request].topic;
+            const bool is_ending
+                = topic >= 0 && r->acting[topic].is_waiting && r->acting[topic].request != request;
+            candidates[request] = enabled[request] && is_ending;
+            others[request] = enabled[request] && !is_ending;
+        }
+        if (!issue_one_of(r, candidates, &issued)) {
+            return false;
+        }
+        if (issued < 0 && !issue_one_of(r, others, &issued)) {
+            return false;
+        }
+    } else
+#endif
+        if (!issue_one_of(r, candidates, &issued)) {
+            return false;
+        }
+    for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
+        r->was_enabled[request] = enabled[request];
+    }
+    r->decision++;
+    if (issued >= 0 && REQUESTS[issued].topic < 0) {
+        r->deadline_us = next_deadline(r);
+    }
+    return true;
+}
+#endif

@@ -1,0 +1,197 @@
+/* What happens when received data leaves an enum to its default although an earlier rule was unknown. */
+typedef enum {
+    ROBOT_ON_UNKNOWN_DEFAULT, /* the event happens with that value */
+    ROBOT_ON_UNKNOWN_KEEP,    /* the message's event does not happen, as if nothing had come */
+    ROBOT_ON_UNKNOWN_FAULT    /* safe stop, for a skipped update too */
+} robot_on_unknown_t;
+
+typedef enum {
+    ROBOT_POLICY_FAIR,     /* newly enabled first, then the longest-ago issued */
+    ROBOT_POLICY_PRIORITY, /* a list, then fair */
+    ROBOT_POLICY_RANDOM    /* splitmix64 from `seed`: not the sequence of the Python executor */
+} robot_policy_t;
+
+typedef enum {
+    ROBOT_STATUS_NEW,      /* not started */
+    ROBOT_STATUS_WAITING,  /* for the first message of every sensor with a maximum age */
+    ROBOT_STATUS_RUNNING,
+    ROBOT_STATUS_STOPPING, /* at rest; the ends of cancelled goals are awaited */
+    ROBOT_STATUS_STOPPED
+} robot_status_t;
+
+typedef enum {
+    ROBOT_FAULT_NONE,
+    ROBOT_FAULT_CALLBACK,       /* a callback returned false */
+    ROBOT_FAULT_ENDLESS,        /* silent steps do not end */
+    ROBOT_FAULT_UNKNOWN,        /* something was unknown, and `on_unknown` is a fault */
+    ROBOT_FAULT_REFUSED,        /* an event is enabled, but the state does not accept it */
+    ROBOT_FAULT_CANCEL_REFUSED, /* the cancel of a running goal was refused */
+    ROBOT_FAULT_CALLER          /* stopped with is_fault */
+} robot_fault_t;
+
+/* What is told to the `log` callback, and what its argument is then. */
+typedef enum {
+    ROBOT_LOG_EVENT,      /* an event was taken: the event */
+    ROBOT_LOG_UNEXPECTED, /* the event that the state does not accept; ROBOT_NO_EVENT: a reply to nothing */
+    ROBOT_LOG_UNKNOWN,    /* something was unknown at this event, or the data of this request was */
+    ROBOT_LOG_RELEASE,    /* the default message went out: the topic */
+    ROBOT_LOG_FAULT,      /* the robot_fault_t */
+    ROBOT_LOG_STOP,       /* the communication that is stale, or -1: stopped by the caller */
+    ROBOT_LOG_RESUME,     /* the communication that is fresh again */
+    ROBOT_LOG_RESTART     /* -1 */
+} robot_log_t;
+
+/* Settings of a deployment; begin with `robot_default_settings`. All spans are microseconds. */
+typedef struct {
+    robot_policy_t policy;
+    robot_communication_t priority[ROBOT_REQUEST_COUNT + 1]; /* most urgent first, for ROBOT_POLICY_PRIORITY */
+    int priority_count;
+    uint64_t seed;                                        /* for ROBOT_POLICY_RANDOM */
+    bool decides_after_batch;                             /* decide after each batch and each period */
+    robot_on_unknown_t on_unknown;
+    uint64_t service_timeout_us;                          /* UINT64_MAX: none */
+    uint64_t action_timeout_us;                           /* UINT64_MAX: none */
+    uint64_t max_age_us[ROBOT_COMMUNICATION_COUNT + 1];   /* by outgoing message; 0: it is not watched */
+    bool releases[ROBOT_TOPIC_COUNT + 1];                 /* by topic: whether its last message keeps acting */
+} robot_settings_t;
+
+/* What the executor asks of the world. None of them may call the executor back. Those that return a bool return
+   false if they failed, which is a fault. */
+typedef struct {
+    void *context;                                                                   /* first argument of all */
+    bool (*publish)(void *context, const robot_request_t *request);
+    bool (*publish_default)(void *context, robot_topic_t topic);                      /* the all-default message */
+    bool (*call)(void *context, uint32_t id, const robot_request_t *request);         /* call a service */
+    bool (*send_goal)(void *context, uint32_t id, const robot_request_t *request);
+    bool (*cancel_goal)(void *context, robot_communication_t action, uint32_t id);
+    bool (*fits)(void *context, const robot_request_t *request);                      /* NULL: all data fits */
+    void (*log)(void *context, robot_log_t kind, int what);                           /* NULL: nothing is logged */
+} robot_callbacks_t;
+
+/* How often something went wrong: one for each entry of that kind in the log. */
+typedef struct {
+    uint32_t unknown;
+    uint32_t unexpected;
+    uint32_t faults;
+} robot_counters_t;
+
+typedef struct {
+    int request; /* -1: nothing acts */
+    uint64_t sent;
+    bool was_enabled;
+    bool is_due;
+    bool is_waiting;
+    bool held[ROBOT_CONJUNCT_COUNT + 1];
+} robot_acting_t;
+
+typedef struct {
+    bool is_open;
+    uint32_t id;
+    uint64_t deadline_us;
+} robot_call_t;
+
+typedef struct {
+    bool is_open;
+    bool is_running;
+    bool is_accepted;
+    bool is_cancel_wanted;
+    bool is_cancel_sent;
+    uint32_t id;
+    uint64_t deadline_us;
+    bool held[ROBOT_REQUIREMENT_COUNT + 1];
+} robot_goal_t;
+
+typedef struct {
+    uint64_t seen_us;
+    bool was_seen;
+    bool is_stale;
+} robot_sensor_t;
+
+/* The executor. `state` and `counters` may be read at any time; the rest is its own business. */
+typedef struct {
+    robot_state_t state;
+    robot_counters_t counters;
+    robot_settings_t settings;
+    robot_callbacks_t callbacks;
+    robot_state_t stable;
+    bool has_stable;
+    bool is_enabled_known;
+    bool is_pending;
+    bool is_started;
+    bool is_stopped;
+    bool may_request;
+    bool is_new;
+    robot_fault_t fault;
+    robot_fault_t why;
+    uint64_t now_us;
+    uint64_t deadline_us;
+    uint64_t awaited_until_us;
+    uint64_t random;
+    uint64_t sent_count;
+    uint32_t next_call_id;
+    uint32_t next_goal_id;
+    int64_t decision;
+    int64_t issued[ROBOT_REQUEST_COUNT + 1];
+    int64_t favoured[ROBOT_REQUEST_COUNT + 1];
+    bool was_enabled[ROBOT_REQUEST_COUNT + 1];
+    bool is_enabled[ROBOT_REQUEST_COUNT + 1];
+    bool is_unchanging[ROBOT_REQUEST_COUNT + 1];
+    robot_acting_t acting[ROBOT_TOPIC_COUNT + 1];
+    bool is_restless[ROBOT_TOPIC_COUNT + 1];
+    robot_call_t calls[ROBOT_SERVICE_COUNT + 1];
+    robot_goal_t goals[ROBOT_ACTION_COUNT + 1];
+    robot_sensor_t sensors[ROBOT_SENSOR_COUNT + 1];
+} robot_t;
+
+/* The default settings of this model. */
+void robot_default_settings(robot_settings_t *settings);
+
+/* Make an executor in the initial state; NULL settings are the default ones. False if a setting is wrong or a
+   callback that the model needs is missing; it must not be used then. */
+bool robot_init(robot_t *r, const robot_settings_t *settings, const robot_callbacks_t *callbacks);
+
+/* In all that follows `now_us` is the time since some moment, in microseconds; it never goes back. */
+
+/* Begin; what comes earlier is ignored. Does nothing the second time. */
+void robot_start(robot_t *r, uint64_t now_us);
+
+/* A period has passed: one decision. */
+void robot_tick(robot_t *r, uint64_t now_us);
+
+/* Time has passed, but no period: stale sensors, replies that did not come, messages and cancels still owed. */
+void robot_watch(robot_t *r, uint64_t now_us);
+
+/* Come to rest until `robot_restart`; tell with is_fault whether the caller found a fault. */
+void robot_stop(robot_t *r, uint64_t now_us, bool is_fault);
+
+/* Begin again in the initial state, whatever happened. */
+void robot_restart(robot_t *r, uint64_t now_us);
+
+robot_status_t robot_status(const robot_t *r, uint64_t now_us);
+
+/* The fault that stopped it, or ROBOT_FAULT_NONE. */
+robot_fault_t robot_fault(const robot_t *r);
+
+/* Whether a controllable event is allowed now; false for an event of the environment. */
+bool robot_enabled(const robot_t *r, robot_event_t event);
+
+/* Names as the model has them; NULL for a number that is none. */
+const char *robot_event_name(int event);
+const char *robot_communication_name(int communication);
+const char *robot_topic_name(int topic);
+#if ROBOT_SERVICE_COUNT > 0
+
+/* A service call will not be answered: its server is absent or lost, or refuses it. */
+void robot_call_failed(robot_t *r, uint64_t now_us, uint32_t id);
+#endif
+#if ROBOT_ACTION_COUNT > 0
+
+/* A goal was accepted by its server. */
+void robot_goal_accepted(robot_t *r, uint64_t now_us, uint32_t id);
+
+/* A goal ended without a result: rejected, aborted, cancelled, or its server is lost. */
+void robot_goal_ended(robot_t *r, uint64_t now_us, uint32_t id);
+
+/* A cancel was refused: whether because the goal had ended already. */
+void robot_cancel_refused(robot_t *r, uint64_t now_us, uint32_t id, bool has_ended);
+#endif

@@ -1,0 +1,208 @@
+static bool begin(robot_t *r)
+{
+    bool has_changed = false;
+    r->is_started = true;
+#if ROBOT_SERVICE_COUNT > 0
+    for (int service = 0; service < ROBOT_SERVICE_COUNT; service++) {
+        r->calls[service].is_open = false;
+    }
+#endif
+#if ROBOT_ACTION_COUNT > 0
+    for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
+        r->goals[action].is_running = false;
+    }
+#endif
+#if ROBOT_SENSOR_COUNT > 0
+    for (int sensor = 0; sensor < ROBOT_SENSOR_COUNT; sensor++) {
+        r->sensors[sensor].seen_us = r->now_us;
+        r->sensors[sensor].was_seen = false;
+    }
+#endif
+#if ROBOT_REQUEST_COUNT > 0
+    new_policy(r);
+    for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
+        r->is_unchanging[request] = false;
+    }
+#endif
+    set_initial(&r->state);
+    r->has_stable = false;
+    r->is_enabled_known = false;
+    r->is_pending = false;
+    if (!settle(r, -1, &has_changed)) {
+        return false;
+    }
+    r->deadline_us = next_deadline(r);
+    update_may_request(r);
+    return true;
+}
+
+void robot_default_settings(robot_settings_t *settings)
+{
+    memset(settings, 0, sizeof *settings);
+    settings->policy = ROBOT_POLICY_FAIR;
+    settings->on_unknown = ROBOT_ON_UNKNOWN_DEFAULT;
+    settings->service_timeout_us = UINT64_C(10000000);
+    settings->action_timeout_us = FOREVER;
+    set_model_settings(settings);
+}
+
+bool robot_init(robot_t *r, const robot_settings_t *settings, const robot_callbacks_t *callbacks)
+{
+    memset(r, 0, sizeof *r);
+    if (settings != NULL) {
+        r->settings = *settings;
+    } else {
+        robot_default_settings(&r->settings);
+    }
+    if (callbacks == NULL || r->settings.policy > ROBOT_POLICY_RANDOM
+        || r->settings.on_unknown > ROBOT_ON_UNKNOWN_FAULT || r->settings.priority_count < 0
+        || r->settings.priority_count > ROBOT_REQUEST_COUNT) {
+        return false;
+    }
+#if ROBOT_REQUEST_COUNT > 0
+    for (int place = 0; place < r->settings.priority_count; place++) {
+        bool is_request = false;
+        for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
+            is_request = is_request || REQUESTS[request].communication == r->settings.priority[place];
+        }
+        if (!is_request) {
+            return false;
+        }
+    }
+#endif
+    r->callbacks = *callbacks;
+#if ROBOT_TOPIC_COUNT > 0
+    if (callbacks->publish == NULL || callbacks->publish_default == NULL) {
+        return false;
+    }
+    for (int topic = 0; topic < ROBOT_TOPIC_COUNT; topic++) {
+        forget_acting(r, topic);
+    }
+#endif
+#if ROBOT_SERVICE_COUNT > 0
+    if (callbacks->call == NULL) {
+        return false;
+    }
+    r->next_call_id = 1;
+#endif
+#if ROBOT_ACTION_COUNT > 0
+    if (callbacks->send_goal == NULL || callbacks->cancel_goal == NULL) {
+        return false;
+    }
+    r->next_goal_id = 1;
+#endif
+    set_initial(&r->state);
+    return true;
+}
+
+void robot_start(robot_t *r, uint64_t now_us)
+{
+    if (!r->is_started) {
+        r->now_us = now_us;
+        guard(r, begin(r));
+    }
+}
+
+void robot_tick(robot_t *r, uint64_t now_us)
+{
+    if (!r->is_started) {
+        return;
+    }
+    if (!look_at_clock(r, now_us)) {
+        fail(r, r->why);
+        return;
+    }
+    if (r->may_request) {
+#if ROBOT_REQUEST_COUNT > 0
+        guard(r, decide(r));
+#endif
+    } else if (is_at_rest(r)) {
+        (void)retry(r);
+    }
+}
+
+void robot_watch(robot_t *r, uint64_t now_us)
+{
+    if (!r->is_started) {
+        return;
+    }
+    if (!look_at_clock(r, now_us)) {
+        fail(r, r->why);
+        return;
+    }
+    if (is_at_rest(r)) {
+        (void)retry(r);
+    }
+}
+
+void robot_stop(robot_t *r, uint64_t now_us, bool is_fault)
+{
+    r->now_us = now_us;
+    if (is_fault) {
+        fail(r, ROBOT_FAULT_CALLER);
+        return;
+    }
+    note(r, ROBOT_LOG_STOP, -1);
+    r->is_stopped = true;
+    come_to_rest(r);
+}
+
+void robot_restart(robot_t *r, uint64_t now_us)
+{
+    bool is_restless = false;
+    r->now_us = now_us;
+#if ROBOT_TOPIC_COUNT > 0
+    for (int topic = 0; topic < ROBOT_TOPIC_COUNT; topic++) {
+        is_restless = is_restless || r->is_restless[topic];
+    }
+#endif
+    if (is_restless || !is_at_rest(r)) {
+        come_to_rest(r);
+    }
+    is_restless = false;
+#if ROBOT_TOPIC_COUNT > 0
+    for (int topic = 0; topic < ROBOT_TOPIC_COUNT; topic++) {
+        is_restless = is_restless || r->is_restless[topic];
+    }
+#endif
+    if (is_restless) {
+        fail(r, ROBOT_FAULT_CALLBACK);
+        return;
+    }
+    r->is_stopped = false;
+    r->fault = ROBOT_FAULT_NONE;
+#if ROBOT_SENSOR_COUNT > 0
+    for (int sensor = 0; sensor < ROBOT_SENSOR_COUNT; sensor++) {
+        r->sensors[sensor].is_stale = false;
+    }
+#endif
+    note(r, ROBOT_LOG_RESTART, -1);
+    guard(r, begin(r));
+}
+
+robot_status_t robot_status(const robot_t *r, uint64_t now_us)
+{
+    if (is_at_rest(r)) {
+#if ROBOT_ACTION_COUNT > 0
+        if (is_any_goal_open(r) && now_us < r->awaited_until_us) {
+            return ROBOT_STATUS_STOPPING;
+        }
+#endif
+        (void)now_us;
+        return ROBOT_STATUS_STOPPED;
+    }
+    if (!r->is_started) {
+        return ROBOT_STATUS_NEW;
+    }
+    return r->may_request ? ROBOT_STATUS_RUNNING : ROBOT_STATUS_WAITING;
+}
+
+bool robot_enabled(const robot_t *r, robot_event_t event)
+{
+    return is_allowed(&r->state, event);
+}
+
+robot_fault_t robot_fault(const robot_t *r)
+{
+    return r->fault;
+}

@@ -1,0 +1,112 @@
+#if ROBOT_TOPIC_COUNT > 0
+/* Messages that keep acting (releases). */
+
+static void forget_acting(robot_t *r, int topic)
+{
+    r->acting[topic].request = -1;
+    r->acting[topic].is_waiting = false;
+}
+
+static bool release(robot_t *r, int topic)
+{
+    if (!r->callbacks.publish_default(r->callbacks.context, (robot_topic_t)topic)) {
+        return fault(r, ROBOT_FAULT_CALLBACK);
+    }
+    forget_acting(r, topic);
+    note(r, ROBOT_LOG_RELEASE, topic);
+    return true;
+}
+
+static bool keeps_acting(const robot_t *r, int request)
+{
+    return REQUESTS[request].topic >= 0 && r->settings.releases[REQUESTS[request].topic];
+}
+
+static bool another_is_enabled(const robot_t *r, int topic)
+{
+    for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
+        if (REQUESTS[request].topic == topic && request != r->acting[topic].request
+            && is_allowed(&r->state, REQUESTS[request].event)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Judge one message in a stable state. */
+static void observe_acting(robot_t *r, int topic)
+{
+    robot_acting_t *acting = &r->acting[topic];
+    bool holds[ROBOT_CONJUNCT_COUNT + 1] = {false};
+    const bool is_enabled = is_allowed(&r->state, REQUESTS[acting->request].event);
+    get_conjuncts(&r->state, acting->request, holds);
+    if (acting->was_enabled && !is_enabled) {
+        acting->is_due = true;
+    }
+    for (int place = 0; place < REQUESTS[acting->request].conjuncts; place++) {
+        if (acting->held[place] && !holds[place]) {
+            acting->is_due = true;
+        }
+        acting->held[place] = holds[place];
+    }
+    acting->was_enabled = is_enabled;
+}
+
+/* Release what is due in this stable state, in the order in which it was sent. */
+static bool judge_releases(robot_t *r, int issuing)
+{
+    bool is_now[ROBOT_TOPIC_COUNT] = {false};
+    for (int topic = 0; topic < ROBOT_TOPIC_COUNT; topic++) {
+        robot_acting_t *acting = &r->acting[topic];
+        if (acting->request >= 0) {
+            acting->is_waiting = false;
+            if (acting->request != issuing) {
+                observe_acting(r, topic);
+                if (acting->is_due) {
+                    acting->is_waiting = another_is_enabled(r, topic);
+                    is_now[topic] = !acting->is_waiting;
+                }
+            }
+        }
+    }
+    for (;;) {
+        int first = -1;
+        for (int topic = 0; topic < ROBOT_TOPIC_COUNT; topic++) {
+            if (is_now[topic] && (first < 0 || r->acting[topic].sent < r->acting[first].sent)) {
+                first = topic;
+            }
+        }
+        if (first < 0) {
+            return true;
+        }
+        is_now[first] = false;
+        if (!release(r, first)) {
+            return false;
+        }
+    }
+}
+
+static bool is_any_waiting(const robot_t *r)
+{
+    for (int topic = 0; topic < ROBOT_TOPIC_COUNT; topic++) {
+        if (r->acting[topic].is_waiting) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static void sent(robot_t *r, int request, bool is_default)
+{
+    const int topic = REQUESTS[request].topic;
+    robot_acting_t *acting = &r->acting[topic];
+    forget_acting(r, topic);
+    if (!is_default) {
+        acting->request = request;
+        acting->is_due = false;
+        acting->sent = r->sent_count++;
+        acting->was_enabled = is_allowed(&r->state, REQUESTS[request].event);
+        get_conjuncts(&r->state, request, acting->held);
+    }
+}
+#endif

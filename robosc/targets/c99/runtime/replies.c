@@ -1,0 +1,145 @@
+#if ROBOT_RECEIVED_COUNT > 0
+/* The end of a batch: silent steps, and a decision if each batch brings one. */
+static bool end_batch(robot_t *r)
+{
+    bool has_changed = false;
+    if (!settle(r, -1, &has_changed)) {
+        return false;
+    }
+#if ROBOT_REQUEST_COUNT > 0
+    if (r->settings.decides_after_batch && r->may_request) {
+        return decide(r);
+    }
+#endif
+    return true;
+}
+#endif
+
+static void guard(robot_t *r, bool is_well)
+{
+    if (!is_well) {
+        fail(r, r->why);
+    }
+}
+
+#if ROBOT_SENSOR_COUNT > 0
+/* A message came: its sensor is fresh, and a stop because it was not is over. */
+static void see(robot_t *r, int sensor)
+{
+    if (r->settings.max_age_us[SENSORS[sensor]] > 0) {
+        r->sensors[sensor].seen_us = r->now_us;
+        r->sensors[sensor].was_seen = true;
+        if (r->sensors[sensor].is_stale) {
+            r->sensors[sensor].is_stale = false;
+            note(r, ROBOT_LOG_RESUME, (int)SENSORS[sensor]);
+            r->deadline_us = next_deadline(r);
+        }
+        update_may_request(r);
+    }
+}
+#endif
+
+#if ROBOT_SERVICE_COUNT > 0
+/* End a call: whether it was under way. */
+static bool close_call(robot_t *r, int service, uint32_t id)
+{
+    robot_call_t *call = &r->calls[service];
+    if (!call->is_open || call->id != id) {
+        unexpected(r, ROBOT_NO_EVENT);
+        return false;
+    }
+    call->is_open = false;
+    return true;
+}
+
+void robot_call_failed(robot_t *r, uint64_t now_us, uint32_t id)
+{
+    int found = 0;
+    if (!look_at_clock(r, now_us)) {
+        fail(r, r->why);
+        return;
+    }
+    for (int service = 0; service < ROBOT_SERVICE_COUNT; service++) {
+        found = r->calls[service].is_open && r->calls[service].id == id ? service : found;
+    }
+    if (close_call(r, found, id)) {
+        happened(r, SERVICES[found].error, take_event(&r->state, SERVICES[found].error));
+        guard(r, end_batch(r));
+    }
+}
+#endif
+
+#if ROBOT_ACTION_COUNT > 0
+/* The action whose open goal has an id, or -1. */
+static int find_goal(robot_t *r, uint32_t id)
+{
+    for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
+        if (r->goals[action].is_open && r->goals[action].id == id) {
+            return action;
+        }
+    }
+    unexpected(r, ROBOT_NO_EVENT);
+    return -1;
+}
+
+/* An action's goal with an id: whether there is one. */
+static bool has_goal(robot_t *r, int action, uint32_t id)
+{
+    if (!r->goals[action].is_open || r->goals[action].id != id) {
+        unexpected(r, ROBOT_NO_EVENT);
+        return false;
+    }
+    return true;
+}
+
+/* The end of a goal is known: its action may be requested again. */
+static void close_goal(robot_t *r, int action)
+{
+    r->goals[action].is_open = false;
+    r->is_enabled_known = false;
+}
+
+void robot_goal_accepted(robot_t *r, uint64_t now_us, uint32_t id)
+{
+    int action = -1;
+    if (!look_at_clock(r, now_us)) {
+        fail(r, r->why);
+        return;
+    }
+    action = find_goal(r, id);
+    if (action >= 0) {
+        r->goals[action].is_accepted = true;
+        if (r->goals[action].is_cancel_wanted) {
+            guard(r, request_cancel(r, action));
+        }
+    }
+}
+
+void robot_goal_ended(robot_t *r, uint64_t now_us, uint32_t id)
+{
+    int action = -1;
+    if (!look_at_clock(r, now_us)) {
+        fail(r, r->why);
+        return;
+    }
+    action = find_goal(r, id);
+    if (action >= 0) {
+        close_goal(r, action);
+        if (r->goals[action].is_running) {
+            happened(r, ACTIONS[action].error, take_event(&r->state, ACTIONS[action].error));
+            guard(r, end_batch(r));
+        }
+    }
+}
+
+void robot_cancel_refused(robot_t *r, uint64_t now_us, uint32_t id, bool has_ended)
+{
+    if (!look_at_clock(r, now_us)) {
+        fail(r, r->why);
+        return;
+    }
+    if (!has_ended && find_goal(r, id) >= 0) {
+        fail(r, ROBOT_FAULT_CANCEL_REFUSED);
+    }
+}
+#endif

@@ -1,0 +1,96 @@
+/* Silent steps. */
+
+/* Take one silent step, cancels first, then resets, then taus; whether there was one is told by `has_stepped`. */
+static bool silent_step(robot_t *r, bool *has_stepped)
+{
+    (void)r;
+    *has_stepped = true;
+#if ROBOT_ACTION_COUNT > 0
+    const int action = goal_to_cancel(r);
+    if (action >= 0) {
+        if (!take(r, ACTIONS[action].cancel)) {
+            return false;
+        }
+        r->goals[action].is_running = false;
+        return request_cancel(r, action);
+    }
+#endif
+#if ROBOT_SILENT_COUNT > 0
+    for (int place = 0; place < ROBOT_SILENT_COUNT; place++) {
+        if (is_allowed(&r->state, SILENT[place])) {
+            return take(r, SILENT[place]);
+        }
+    }
+#endif
+    *has_stepped = false;
+    return true;
+}
+
+/* Silent steps after the first one. A run is deterministic: it ends if and only if no state comes twice, which the
+   algorithm of R. P. Brent finds with one remembered state. */
+static bool run_on(robot_t *r)
+{
+    state_t remembered = r->state;
+    int64_t steps = 0;
+    int64_t power = 1;
+    int64_t distance = 0;
+    bool has_remembered = false;
+    bool has_stepped = true;
+    while (has_stepped) {
+        steps++;
+        if (steps > SILENT_BOUND) {
+            return fault(r, ROBOT_FAULT_ENDLESS);
+        }
+        if (steps > PATIENCE) {
+            if (has_remembered && is_same_state(&r->state, &remembered)) {
+                return fault(r, ROBOT_FAULT_ENDLESS);
+            }
+            distance++;
+            if (distance == power) {
+                remembered = r->state;
+                has_remembered = true;
+                power *= 2;
+                distance = 0;
+            }
+        }
+        if (!silent_step(r, &has_stepped)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Silent steps to the end; then releases and running goals are judged, if the stable state is another one. */
+static bool settle(robot_t *r, int issuing, bool *has_changed)
+{
+    *has_changed = !r->has_stable || !is_same_state(&r->state, &r->stable);
+    if (*has_changed) {
+        bool has_stepped = false;
+        r->has_stable = false;
+        r->is_enabled_known = false;
+#if ROBOT_REQUEST_COUNT > 0
+        for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
+            r->is_unchanging[request] = false;
+        }
+#endif
+        if (!silent_step(r, &has_stepped) || (has_stepped && !run_on(r))) {
+            return false;
+        }
+        r->stable = r->state;
+        r->has_stable = true;
+#if ROBOT_ACTION_COUNT > 0
+        observe_goals(r);
+#endif
+#if ROBOT_TOPIC_COUNT > 0
+        if (!judge_releases(r, issuing)) {
+            return false;
+        }
+#endif
+        (void)issuing;
+    }
+    if (r->is_pending) {
+        r->is_pending = false;
+        return fault(r, ROBOT_FAULT_UNKNOWN);
+    }
+    return true;
+}

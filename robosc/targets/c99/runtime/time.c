@@ -1,0 +1,117 @@
+/* Time. */
+
+static void update_may_request(robot_t *r)
+{
+    r->may_request = r->is_started && !is_at_rest(r);
+#if ROBOT_SENSOR_COUNT > 0
+    for (int sensor = 0; sensor < ROBOT_SENSOR_COUNT; sensor++) {
+        if (r->settings.max_age_us[SENSORS[sensor]] > 0 && !r->sensors[sensor].was_seen) {
+            r->may_request = false;
+        }
+    }
+#endif
+}
+
+static uint64_t next_deadline(const robot_t *r)
+{
+    uint64_t next = FOREVER;
+#if ROBOT_SERVICE_COUNT > 0
+    for (int service = 0; service < ROBOT_SERVICE_COUNT; service++) {
+        if (r->calls[service].is_open && r->calls[service].deadline_us < next) {
+            next = r->calls[service].deadline_us;
+        }
+    }
+#endif
+#if ROBOT_ACTION_COUNT > 0
+    for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
+        if (r->goals[action].is_open && r->goals[action].is_running && r->goals[action].deadline_us < next) {
+            next = r->goals[action].deadline_us;
+        }
+    }
+#endif
+#if ROBOT_SENSOR_COUNT > 0
+    for (int sensor = 0; sensor < ROBOT_SENSOR_COUNT; sensor++) {
+        const uint64_t max_age_us = r->settings.max_age_us[SENSORS[sensor]];
+        const uint64_t age = later(r->sensors[sensor].seen_us, max_age_us);
+        if (max_age_us > 0 && age > r->now_us && age < next) {
+            next = age;
+        }
+    }
+#endif
+    (void)r;
+    return next;
+}
+
+/* Replies that did not come in time. */
+static bool expire(robot_t *r)
+{
+#if ROBOT_SERVICE_COUNT > 0 || ROBOT_ACTION_COUNT > 0
+    bool has_changed = false;
+#endif
+#if ROBOT_SERVICE_COUNT > 0
+    for (;;) {
+        int first = -1;
+        for (int service = 0; service < ROBOT_SERVICE_COUNT; service++) {
+            const robot_call_t *call = &r->calls[service];
+            if (call->is_open && r->now_us >= call->deadline_us
+                && (first < 0 || call->id < r->calls[first].id)) {
+                first = service;
+            }
+        }
+        if (first < 0) {
+            break;
+        }
+        r->calls[first].is_open = false;
+        happened(r, SERVICES[first].error, take_event(&r->state, SERVICES[first].error));
+        if (!settle(r, -1, &has_changed)) {
+            return false;
+        }
+    }
+#endif
+#if ROBOT_ACTION_COUNT > 0
+    bool is_expired[ROBOT_ACTION_COUNT];
+    for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
+        const robot_goal_t *goal = &r->goals[action];
+        is_expired[action] = goal->is_open && goal->is_running && r->now_us >= goal->deadline_us;
+    }
+    for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
+        if (is_expired[action]) {
+            r->goals[action].is_running = false;
+            happened(r, ACTIONS[action].error, take_event(&r->state, ACTIONS[action].error));
+            if (!settle(r, -1, &has_changed) || !request_cancel(r, action)) {
+                return false;
+            }
+        }
+    }
+#endif
+    (void)r;
+    return true;
+}
+
+/* Replies that did not come in time, and stale sensors. */
+static bool check_time(robot_t *r)
+{
+    if (!expire(r)) {
+        return false;
+    }
+#if ROBOT_SENSOR_COUNT > 0
+    for (int sensor = 0; sensor < ROBOT_SENSOR_COUNT; sensor++) {
+        const uint64_t max_age_us = r->settings.max_age_us[SENSORS[sensor]];
+        if (max_age_us > 0 && r->now_us >= later(r->sensors[sensor].seen_us, max_age_us)
+            && !r->sensors[sensor].is_stale) {
+            note(r, ROBOT_LOG_STOP, (int)SENSORS[sensor]);
+            r->sensors[sensor].is_stale = true;
+            come_to_rest(r);
+        }
+    }
+#endif
+    r->deadline_us = next_deadline(r);
+    return true;
+}
+
+/* Take the time; whatever is over by now has its effect first. */
+static bool look_at_clock(robot_t *r, uint64_t now_us)
+{
+    r->now_us = now_us;
+    return !(r->is_started && now_us >= r->deadline_us) || check_time(r);
+}

@@ -1,0 +1,257 @@
+"""Generated functions that take an event: move and update, all at once.
+
+All updates of a step read the state before it: a copy, of which a compiler keeps what is needed.
+"""
+
+from robosc.automata.plants import communication_plant_name
+from robosc.expressions import (
+    MAXIMUM_INTEGER,
+    MINIMUM_INTEGER,
+    ArrayType,
+    BooleanType,
+    DoubleType,
+    EnumType,
+    IntegerType,
+    Type,
+)
+from robosc.expressions.text import expression_text
+from robosc.model.received import Path, converted_paths
+from robosc.model.structure import Behaviour, EventKind, Transition, Update, Variable, is_tau
+from robosc.targets.c99.conditions import Conditions, in_one_of
+from robosc.targets.c99.expressions import FALSE_CODE, TRUE_CODE, Code, Sort, as_double, either, negated, value
+from robosc.targets.c99.layout import event_data, width
+from robosc.targets.c99.naming import Namer
+from robosc.targets.c99.received import Reader
+from robosc.targets.c99.text import comment
+from robosc.targets.c99.unit import Reading, Unit, declared, low_text
+from robosc.targets.events import has_plant_location, is_controllable, plant_step, split, taken_transition
+from robosc.targets.paths import path_type
+from robosc.targets.python.text import indent
+
+_Branch = tuple[tuple[str, ...], Transition]
+"""States and the transition taken in them."""
+
+
+class Stepper:
+    """Writes what one event does.
+
+    Args:
+        unit: The file.
+        conditions: Tells where controllable events are accepted.
+        event: The event.
+    """
+
+    def __init__(self, unit: Unit, conditions: Conditions, event: str) -> None:
+        self.unit = unit
+        self.event = event
+        self._conditions = conditions
+        self.data = None if is_tau(event) else event_data(unit.layout.model, event)
+        self.paths = converted_paths(unit.layout.model, event) if self.data is not None else ()
+        self._namer = Namer(frozenset({"data", "notes", "s", "old", "skipped", "r"}))
+        self._received: dict[Path, Code] = {}
+        self._may_skip = False
+        self._reading = Reading(unit, "old.", self._read, self._type_at)
+
+    @property
+    def parameters(self) -> list[str]:
+        """Parameters of the step function after the state: one value for each path."""
+        self._name_received()
+        return [
+            f"const {self.unit.layout.raw(self._type_at(path))} *{code.text}"
+            if isinstance(self._type_at(path), ArrayType)
+            else declared(code.sort.c_type, code.text)
+            for path, code in self._received.items()
+        ]
+
+    def step_function(self) -> list[str]:
+        """The function that takes the event: how many updates were skipped, or REFUSED."""
+        parameters = self.parameters
+        body = [*self._refusals(), *self._plant()]
+        for component, behaviour, branches in self._blocks():
+            body += self._block(component, behaviour, branches)
+        text = "\n".join(body)
+        head = ", ".join(["state_t *s", *parameters])
+        unused = [code.text for code in self._received.values()]
+        return [
+            f"static int {self.unit.layout.function('takes', self.event)}({head})",
+            "{",
+            *(["    const state_t old = *s;"] if "old." in text or "&old" in text else []),
+            *(["    int skipped = 0;"] if self._may_skip else []),
+            "    (void)s;",
+            *(f"    (void){name};" for name in unused),
+            *indent(body),
+            f"    return {'skipped' if self._may_skip else '0'};",
+            "}",
+        ]
+
+    def happen_function(self) -> list[str]:
+        """The function that converts what came with an event of the environment and takes it."""
+        layout = self.unit.layout
+        parameter = [] if self.data is None else [layout.parameter(self.data, "data")]
+        head = ", ".join([f"{layout.prefix}_t *r", *parameter, "bool may_keep"])
+        lines = [f"static bool {layout.function('happens', self.event)}({head})", "{", "    (void)may_keep;"]
+        arguments = ["&r->state"]
+        if self.data is not None:
+            lines.append("    (void)data;")
+            if self.paths:
+                is_pointer = layout.is_by_pointer(self.data)
+                reader = Reader(self.unit, self.data, "(*data)" if is_pointer else "data", "&notes")
+                arguments += [reader.read(path).text for path in self.paths]
+                lines.append("    notes_t notes = {false, false};")
+                if is_pointer:
+                    lines += indent(["if (data == NULL) {", f"    data = &{unknown_name(layout.raw(self.data))};", "}"])
+                lines += indent(reader.take_lines())
+                enumerator = layout.events[self.event]
+                lines += indent(
+                    [
+                        f"if (notes.is_unknown && !notes_count(r, {enumerator}, &notes, may_keep)) {{",
+                        "    return false;",
+                        "}",
+                    ]
+                )
+        function = layout.function("takes", self.event)
+        return [
+            *lines,
+            f"    happened(r, {layout.events[self.event]}, {function}({', '.join(arguments)}));",
+            "    return true;",
+            "}",
+        ]
+
+    def _name_received(self) -> None:
+        for path in self.paths:
+            if path not in self._received:
+                name = self._namer.name("_".join(["value", *map(str, path)]))
+                # The declared code of the reader has the same bounds: it is made of the same path.
+                code = Reader(self.unit, self._root, "(*data)", "NULL").read(path)
+                self._received[path] = Code(name, code.sort, code.may_be_unknown, low=code.low, high=code.high)
+
+    @property
+    def _root(self) -> Type:
+        assert self.data is not None  # noqa: S101  # There are paths only where data comes.
+        return self.data
+
+    def _read(self, path: Path) -> Code:
+        return self._received[path]
+
+    def _type_at(self, path: Path) -> Type:
+        return path_type(self.unit.layout.model, self._root, path)
+
+    def _refusals(self) -> list[str]:
+        """Refuse where the event is not accepted, before anything changes."""
+        lines = []
+        name, kind = split(self.event)
+        if not is_tau(self.event) and has_plant_location(self.unit.layout.model.communication(name)):
+            communication = self.unit.layout.model.communication(name)
+            sources, _ = plant_step(communication, EventKind(kind))
+            code = in_one_of(self._reading, communication_plant_name(communication), sources)
+            lines += [f"if ({negated(code).text}) {{", "    return REFUSED;", "}"]
+        if is_controllable(self.event):
+            for words, code in self._conditions.accepted(self.event, self._reading):
+                if code != TRUE_CODE:
+                    lines += [*comment(words), f"if ({negated(code).text}) {{", "    return REFUSED;", "}"]
+        return lines
+
+    def _plant(self) -> list[str]:
+        name, kind = split(self.event)
+        if is_tau(self.event) or not has_plant_location(self.unit.layout.model.communication(name)):
+            return []
+        communication = self.unit.layout.model.communication(name)
+        _, target = plant_step(communication, EventKind(kind))
+        return [] if target is None else [self._move(communication_plant_name(communication), target)]
+
+    def _move(self, automaton: str, target: str) -> str:
+        layout = self.unit.layout
+        return f"s->{layout.locations[automaton]} = {layout.location_names[automaton, target]};"
+
+    def _blocks(self) -> list[tuple[str, Behaviour, list[_Branch]]]:
+        """Which transition each component takes, by state."""
+        blocks = []
+        for component, behaviour in self.unit.layout.behaviours:
+            by_transition: dict[int, list[str]] = {}
+            for state in behaviour.states:
+                transition = taken_transition(behaviour, self.event, state.name)
+                if transition is not None:
+                    by_transition.setdefault(behaviour.transitions.index(transition), []).append(state.name)
+            branches = [(tuple(states), behaviour.transitions[index]) for index, states in by_transition.items()]
+            if branches:
+                blocks.append((component, behaviour, branches))
+        return blocks
+
+    def _block(self, component: str, behaviour: Behaviour, branches: list[_Branch]) -> list[str]:
+        """What one component does."""
+        lines: list[str] = []
+        for states, transition in branches:
+            body = self._transition(component, behaviour, states, transition)
+            if body and len(states) == len(behaviour.states):
+                lines += body
+            elif body:
+                test = FALSE_CODE
+                for state in states:
+                    test = either(test, self._reading.in_state(component, state))
+                lines += [f"if ({test.text}) {{", *indent(body), "}"]
+        return lines
+
+    def _transition(
+        self, component: str, behaviour: Behaviour, states: tuple[str, ...], transition: Transition
+    ) -> list[str]:
+        variables = {variable.name: variable for variable in behaviour.variables}
+        lines = []
+        for update in transition.updates:
+            lines += self._update(component, variables[update.variable], update)
+        if transition.target is not None and states != (transition.target,):
+            lines.append(self._move(component, transition.target))
+        return lines
+
+    def _update(self, component: str, variable: Variable, update: Update) -> list[str]:
+        place = f"s->{self.unit.layout.variables[component, variable.name][0]}"
+        code = value(update.expression, self._reading.scope)
+        words = comment(f"{component}: do {variable.name} := {expression_text(update.expression)}")
+        if isinstance(variable.type, DoubleType):
+            code = as_double(code)
+        fits = self._fits(variable.type, code)
+        cast = stored_cast(variable.type)
+        if fits is None:
+            return [*words, f"{place} = {cast}{code.atom if cast else code.text};"]
+        self._may_skip = True
+        new = self._namer.name(f"new_{variable.name}")
+        constant = "" if code.sort is Sort.TEXT else "const "
+        return [
+            *words,
+            f"{constant}{declared(code.sort.c_type, new)} = {code.text};",
+            f"if ({fits.replace('@', new)}) {{",
+            f"    {place} = {cast}{f'({new} != 0)' if isinstance(variable.type, BooleanType) else new};",
+            "} else {",
+            "    skipped++;",
+            "}",
+        ]
+
+    @staticmethod
+    def _fits(type_: Type, code: Code) -> str | None:
+        """The test of a value `@` that may be skipped, or None for one that never is."""
+        if isinstance(type_, IntegerType):
+            low = MINIMUM_INTEGER if type_.low is None else type_.low
+            high = MAXIMUM_INTEGER if type_.high is None else type_.high
+            if not code.may_be_unknown and low <= code.low and code.high <= high:
+                return None
+            return f"@ >= {low_text(low)} && @ <= {low_text(high)}"
+        if not code.may_be_unknown:
+            return None
+        if code.sort is Sort.DOUBLE:
+            return "isfinite(@)"
+        return "@ != NULL" if code.sort is Sort.TEXT else "@ >= 0"
+
+
+def stored_cast(type_: Type) -> str:
+    """The conversion to the member that holds a variable."""
+    match type_:
+        case IntegerType():
+            return "(int32_t)"
+        case EnumType(values=values):
+            return f"({width(len(values))})"
+        case _:
+            return ""
+
+
+def unknown_name(raw: str) -> str:
+    """The constant of an object type in which everything is unknown."""
+    return f"{raw.removesuffix('_t')}_unknown"

@@ -1,0 +1,30 @@
+"""Small helpers for writing C text."""
+
+import textwrap
+
+from robosc.targets.python.text import printable
+
+_WIDTH = 105
+
+
+def safe(text: str) -> str:
+    """A text for a comment: printable ASCII that neither ends the comment nor is a trigraph or a spliced line."""
+    shown = printable(text).replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?")
+    return f"{shown} " if shown.endswith("\\") else shown
+
+
+def comment(text: str) -> list[str]:
+    """A comment, wrapped."""
+    lines = textwrap.wrap(safe(text), _WIDTH, break_on_hyphens=False) or [""]
+    return [f"/* {line}" if place == 0 else f"   {line}" for place, line in enumerate(lines[:-1])] + [
+        f"{'/*' if len(lines) == 1 else '  '} {lines[-1]} */"
+    ]
+
+
+def string_literal(text: str) -> str:
+    """A C string literal of the text in UTF-8; whatever is not plain stands as an octal escape of three digits."""
+    parts = []
+    for byte in text.encode("utf-8", "surrogatepass"):
+        char = chr(byte)
+        parts.append(char if " " <= char <= "~" and char not in '"\\?' else f"\\{byte:03o}")
+    return f'"{"".join(parts)}"'

@@ -1,0 +1,53 @@
+"""What every generator asks of a model's events: their order, who causes them, how they move a plant."""
+
+from robosc.model.structure import (
+    CONTROLLABLE_KINDS,
+    Behaviour,
+    Communication,
+    CommunicationKind,
+    EventKind,
+    Model,
+    Transition,
+    is_tau,
+)
+
+
+def events(model: Model) -> tuple[str, ...]:
+    """Every event of a model: of its communications in source order, then its taus."""
+    return tuple(event for item in model.communications for event in item.events) + model.taus
+
+
+def split(event: str) -> tuple[str, str]:
+    """`move.request` -> (`move`, `request`)."""
+    name, _, kind = event.rpartition(".")
+    return name, kind
+
+
+def is_controllable(event: str) -> bool:
+    """Whether an event is caused by the executor rather than the environment."""
+    return is_tau(event) or split(event)[1] in CONTROLLABLE_KINDS
+
+
+def has_plant_location(communication: Communication) -> bool:
+    """Whether its plant has more than one location."""
+    return communication.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
+
+
+def plant_step(communication: Communication, kind: EventKind) -> tuple[tuple[str, ...], str | None]:
+    """Locations from which an event is possible, and the one it leads to (None: it stays); semantics part 1."""
+    busy = "waiting" if communication.kind is CommunicationKind.SERVICE else "executing"
+    return {
+        EventKind.REQUEST: (("idle",), busy),
+        EventKind.RESPONSE: ((busy,), "ready"),
+        EventKind.ERROR: ((busy,), "failed"),
+        EventKind.FEEDBACK: ((busy,), None),
+        EventKind.CANCEL: ((busy,), "idle"),
+        EventKind.RESET: (("ready", "failed"), "idle"),
+    }[kind]
+
+
+def taken_transition(behaviour: Behaviour, event: str, state: str) -> Transition | None:
+    """The transition that takes an event in a state: the state's own first, then the behaviour's."""
+    fitting = [item for item in behaviour.transitions if item.event == event and item.source in (state, None)]
+    own = [item for item in fitting if item.source is not None]
+    return next(iter([*own, *fitting]), None)

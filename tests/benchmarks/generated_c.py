@@ -1,0 +1,114 @@
+"""Time of generated C (`gcc -O2`) in nanoseconds: what Table I of the paper measures, and single events, in a loop.
+
+*Attempt*: whether a controllable event is allowed, one after the other. *Event*: a message through the whole executor:
+conversion, step, silent steps; every other one changes the state. *Cycle*: one `tick` in a state that does not change.
+"""
+
+import shutil
+import statistics
+import subprocess
+import tempfile
+from pathlib import Path
+
+from figures import text_table
+from robosc.targets import generate
+from support.generated import example_supervisor
+
+RUNS = 5
+LOOPS = 2_000_000
+
+_MAIN = """
+#define _POSIX_C_SOURCE 199309L
+#include "@p@.h"
+#include <stdio.h>
+#include <time.h>
+
+static double ranges[2][360];
+static volatile unsigned sink;
+
+static bool publish(void *context, const @p@_request_t *request)
+{
+    (void)context;
+    sink += (unsigned)request->communication;
+    return true;
+}
+
+static bool publish_default(void *context, @p@_topic_t topic)
+{
+    (void)context;
+    sink += (unsigned)topic;
+    return true;
+}
+
+static double now_ns(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec * 1e9 + (double)now.tv_nsec;
+}
+
+int main(void)
+{
+    static @p@_t r;
+    @p@_callbacks_t callbacks = {0};
+    uint64_t now_us = 0;
+    double begin;
+    callbacks.publish = publish;
+    callbacks.publish_default = publish_default;
+    for (int k = 0; k < 360; k++) {
+        ranges[0][k] = 3.0;
+        ranges[1][k] = 0.2;
+    }
+    if (!@p@_init(&r, NULL, &callbacks)) {
+        return 1;
+    }
+    @p@_start(&r, now_us);
+    begin = now_ns();
+    for (int k = 0; k < @n@; k++) {
+        sink += @p@_enabled(&r, (@p@_event_t)(k % @P@_EVENT_COUNT));
+    }
+    printf("%.3f ", (now_ns() - begin) / @n@);
+    begin = now_ns();
+    for (int k = 0; k < @n@; k++) {
+        const @s@ scan = {{ranges[k & 1], 360}};
+        @p@_receive_scan(&r, ++now_us, &scan);
+    }
+    printf("%.3f ", (now_ns() - begin) / @n@);
+    begin = now_ns();
+    for (int k = 0; k < @n@; k++) {
+        @p@_tick(&r, ++now_us);
+    }
+    printf("%.3f\\n", (now_ns() - begin) / @n@);
+    return 0;
+}
+"""
+
+EXAMPLES = {
+    "line_follower/line_follower": "line_follower_data_Scan_t",
+    "maze_solver/maze_solver": "maze_solver_data_Scan_t",
+}
+
+
+def table() -> str:
+    """Mean and least nanoseconds of an attempt, an event and a cycle."""
+    gcc = shutil.which("gcc")
+    if gcc is None:
+        return "Generated C: gcc is not installed"
+    rows = []
+    for name, scan in EXAMPLES.items():
+        prefix = name.split("/")[1]
+        with tempfile.TemporaryDirectory() as folder:
+            for path, text in generate(example_supervisor(name), "c99").items():
+                (Path(folder) / path).write_text(text, encoding="utf-8")
+            main = _MAIN.replace("@p@", prefix).replace("@P@", prefix.upper()).replace("@s@", scan)
+            (Path(folder) / "bench.c").write_text(main.replace("@n@", str(LOOPS)), encoding="utf-8")
+            command = [gcc, "-std=c99", "-O2", "-ffp-contract=off", f"{prefix}.c", "bench.c", "-lm", "-o", "bench"]
+            subprocess.run(command, cwd=folder, check=True)
+            runs = [
+                [float(word) for word in subprocess.check_output([Path(folder) / "bench"], text=True).split()]
+                for _ in range(RUNS)
+            ]
+        for what, samples in zip(("attempt", "event", "cycle"), zip(*runs, strict=True), strict=True):
+            aim = "10" if what == "attempt" else ""
+            rows.append([f"{prefix}: {what}", f"{statistics.fmean(samples):.1f}", f"{min(samples):.1f}", aim])
+    return text_table("Generated C, gcc -O2", ["nanoseconds", "mean", "min", "aim (mean)"], rows)

@@ -1,0 +1,336 @@
+"""Generated C does what the reference executor does, command by command, whatever the model and the data."""
+
+import re
+import subprocess
+from collections import Counter
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from robosc.errors import UnsupportedModelError
+from robosc.expressions import Binary, BooleanType, Constant, DoubleType, Expression, Received
+from robosc.model.structure import (
+    Behaviour,
+    Communication,
+    CommunicationKind,
+    Component,
+    Deployment,
+    Model,
+    State,
+    Transition,
+    Update,
+    Variable,
+)
+from robosc.supervisor.structure import Supervisor
+from robosc.targets import GenerateOptions, generate
+from robosc.targets.c99.naming import member_name, prefix_for
+from robosc.targets.c99.text import safe, string_literal
+from support.c99 import GCC, SANITIZERS, WARNINGS, compare, compiled
+from support.generated import example_supervisor
+from support.models import EXAMPLE_NAMES, model_of
+from support.random_controllers import random_robot
+from support.random_supervisors import CERTIFICATE, random_supervisor
+
+needs_gcc = pytest.mark.skipif(GCC is None, reason="gcc is not installed")
+
+
+def supervisor_of_text(text: str, deployment: Deployment = Deployment.CONTROLLER) -> Supervisor:
+    return Supervisor(model_of(text), deployment, (), CERTIFICATE)
+
+
+@needs_gcc
+@pytest.mark.parametrize("name", EXAMPLE_NAMES)
+def test_an_example_behaves_as_the_reference(name: str, tmp_path: Path) -> None:
+    supervisor = example_supervisor(name)
+    lines = compare(supervisor, compiled(supervisor, tmp_path), Random(1), 8, 150)
+    assert sum(line.startswith("log event") for line in lines) > 300
+
+
+@needs_gcc
+def test_random_supervisors_behave_as_the_reference(tmp_path: Path) -> None:
+    """Fixed seeds, since each costs a compiler run; what they meet shows that the comparison is worth something."""
+    seen: Counter[str] = Counter()
+    for seed in range(18):
+        supervisor = random_supervisor(seed)
+        try:
+            program = compiled(supervisor, tmp_path / str(seed))
+        except UnsupportedModelError:
+            continue
+        seen.update(_kinds(compare(supervisor, program, Random(seed), 4, 80)))
+    for what in ("log event", "log unknown", "log unexpected", "log fault", "log restart", "publish"):
+        assert seen[what] > 5, seen
+
+
+EVERYTHING = """
+robot Everything {
+    interface twist use Twist from geometry_msgs
+    interface go use Go from some_msgs
+    datatype object Twist { x: double  y: double }
+    datatype object Goal { place: integer  fast: boolean }
+    datatype object Progress { left: double }
+    datatype enum Level from double to { value > 1.0 -> high  value < 0.5 -> low  default -> middle }
+    datatype enum Side from double to { value >= 0.7 -> left  default -> right }
+    component Sensors {
+        outgoing message level with identifier: "/scan", type: Level
+        outgoing message side with identifier: "/scan", type: Side
+        outgoing message speed with type: double
+        outgoing message button with type: none
+        behaviour {
+            variable level: Level = high
+            variable side: Side = left
+            variable speed: double = 1.0
+            on response from level do level := value
+            on response from side do side := value
+            on response from speed do speed := value
+            initial marked state calm {
+                on response from button goto tense
+                on request to turn goto tense
+            }
+            marked state tense { on response from button goto calm }
+        }
+    }
+    component Base {
+        incoming message forward with identifier: "/cmd", type: Twist links twist
+        incoming message back with identifier: "/cmd", type: Twist links twist
+        incoming message turn with identifier: "/turn", type: Twist links twist
+        incoming message beep with type: integer
+        service calibrate with request: none, response: boolean links go
+        action move with request: Goal, response: none, feedback: Progress links go
+        behaviour {
+            variable tries: integer(0..3)
+            variable left: double
+            on feedback from move do left := value.left
+            initial marked state idle {
+                on request to forward
+                on request to back
+                on request to turn
+                on request to beep
+                on request to calibrate
+                on request to move goto busy
+            }
+            marked state busy {
+                on request to turn
+                on request to calibrate
+                on response from move do tries := 0 goto idle
+                on error from move do tries := if tries < 3 then tries + 1 else 0 goto idle
+                on cancel to move goto idle
+            }
+        }
+    }
+    component Wheels {
+        behaviour {
+            initial marked state still {
+                on request to turn goto rolling
+                on response from speed goto rolling
+            }
+            marked state rolling {
+                on request to turn
+                on response from level goto still
+            }
+        }
+    }
+    requirement forward needs Sensors.level = high and Sensors.calm
+    requirement back needs Sensors.level = low or Sensors.side = left
+    requirement turn needs Wheels.still and Sensors.calm
+    requirement Sensors.level = middle disables calibrate
+    requirement move needs Sensors.calm
+    requirement move needs Base.idle
+    requirement move needs Sensors.level != low
+    provide forward with { x: 1.0 / Sensors.speed } if Sensors.side = left
+    provide forward with { x: 0.5, y: Sensors.speed }
+    provide back with { x: 0.0 }
+    provide turn with { y: Sensors.speed - 1.0 }
+    provide beep with Base.tries
+    provide move with { place: Base.tries + 1, fast: Sensors.side = right }
+}
+"""
+
+
+@needs_gcc
+def test_requests_of_every_kind_behave_as_the_reference(tmp_path: Path) -> None:
+    supervisor = supervisor_of_text(EVERYTHING)
+    seen = Counter(_kinds(compare(supervisor, compiled(supervisor, tmp_path), Random(7), 60, 150)))
+    for what in "release stop resume restart fault unknown unexpected event".split():
+        assert seen[f"log {what}"] > 5, seen
+    for what in ("publish", "default", "call", "goal", "cancel"):
+        assert seen[what] > 5, seen
+
+
+@needs_gcc
+def test_random_robots_behave_as_the_reference(tmp_path: Path) -> None:
+    """Robots in which silent steps are many and may not end."""
+    for seed in (3, 10, 17, 20, 21, 24, 107, 108):
+        supervisor = random_robot(seed)
+        compare(supervisor, compiled(supervisor, tmp_path / str(seed)), Random(seed), 6, 100)
+
+
+@needs_gcc
+def test_sanitizers_find_nothing(tmp_path: Path) -> None:
+    for number, supervisor in enumerate((example_supervisor("navigation/navigation"), random_supervisor(167))):
+        program = compiled(supervisor, tmp_path / str(number), *SANITIZERS)
+        compare(supervisor, program, Random(number), 3, 100)
+
+
+@needs_gcc
+def test_optimized_code_behaves_alike(tmp_path: Path) -> None:
+    supervisor = example_supervisor("navigation/navigation")
+    compare(supervisor, compiled(supervisor, tmp_path, "-O2"), Random(5), 5, 150)
+
+
+def _kinds(lines: list[str]) -> list[str]:
+    return [" ".join(line.split()[: 2 if line.startswith("log") else 1]) for line in lines]
+
+
+HOSTILE = """
+robot Class {
+    datatype enum None from double to { value > 0.5 -> self  default -> int }
+    datatype object struct { from_: double  double_: double  int: array(double)  _x: boolean  NULL: double }
+    component union {
+        outgoing message def with identifier: "it's \\"quoted\\" \\\\ #*/ ??/", type: None
+        outgoing message a_b with identifier: "/a/b", type: double
+        outgoing message a__b with identifier: "/a_b", type: boolean
+        outgoing message void with identifier: "/v", type: struct links x
+        incoming message return with type: string
+        service read with request: none, response: struct links x
+        behaviour {
+            variable errno: None = int
+            variable volatile: boolean
+            variable words: string = "'''\\"\\"\\"\\\\ %s ??/ */"
+            variable int: integer(0..3)
+            variable number: double
+            on response from def do errno := value
+            on response from a_b do number := value
+            on response from a__b do volatile := value
+            on response from void do number := max(value.int[0..2]), volatile := value._x
+            on response from read do volatile := value.from_ > 1.0, int := int + 1
+            initial marked state x_y {
+                on request to return
+                on request to read
+                transition if union.errno = self goto x__y
+            }
+            marked state x__y { transition if errno = None.int goto x_y }
+        }
+    }
+    component union_x { behaviour { variable y: boolean  initial marked state y_2 { } } }
+    interface x use Trigger from std_srvs
+    requirement return needs union.int < 3
+    provide return with "a\\nb'c\\"d\\\\ {{ x }} %d ?? */ é"
+}
+"""
+
+
+@needs_gcc
+def test_names_that_are_words_of_c_work(tmp_path: Path) -> None:
+    supervisor = supervisor_of_text(HOSTILE)
+    lines = compare(supervisor, compiled(supervisor, tmp_path), Random(3), 5, 150)
+    assert any(line.startswith("publish") for line in lines)
+
+
+@needs_gcc
+def test_very_long_names_stay_apart(tmp_path: Path) -> None:
+    long = "n" * 250
+    text = f"""
+        robot {"R" * 255} {{
+            component {long}1 {{
+                incoming message {long}a with type: none
+                incoming message {long}b with type: none
+                behaviour {{ variable {long}x: boolean  variable {long}y: boolean
+                    initial marked state {long}s {{ on request to {long}a goto {long}t }}
+                    marked state {long}t {{ on request to {long}b goto {long}s }} }}
+            }}
+        }}
+    """
+    supervisor = supervisor_of_text(text)
+    compare(supervisor, compiled(supervisor, tmp_path), Random(3), 3, 50)
+
+
+def test_prefixes_are_identifiers_that_c_leaves_to_programs() -> None:
+    assert prefix_for("LineFollower") == "line_follower"
+    assert prefix_for("Island") == "robot_island"
+    assert prefix_for("Sem") == "robot_sem"
+    assert prefix_for("Integer") == "robot_integer"
+    assert prefix_for("_") == "robot"
+    for name in ("int", "errno", "_x", "NULL", "class", "__"):
+        assert re.fullmatch(r"[a-z]\w*_|[A-Z]\w*_", member_name(name)), member_name(name)
+    assert member_name("x") == "x"
+
+
+def test_texts_are_escaped() -> None:
+    assert string_literal('a"\\\n?é') == '"a\\042\\134\\012\\077\\303\\251"'
+    assert "*/" not in safe("*/ ??/")
+    assert "??" not in safe("*/ ??/")
+
+
+@needs_gcc
+@pytest.mark.parametrize("name", EXAMPLE_NAMES)
+def test_the_example_program_runs(name: str, tmp_path: Path) -> None:
+    files = generate(example_supervisor(name), "c99")
+    for path, text in files.items():
+        (tmp_path / path).write_text(text, encoding="utf-8")
+    sources = [path for path in files if path.endswith(".c")]
+    command = [str(GCC), *WARNINGS, "-Wstrict-prototypes", *sources, "-lm", "-o", "example"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    done = subprocess.run([tmp_path / "example"], capture_output=True, text=True, check=True)
+    assert "bytes of RAM" in done.stdout
+    assert "status 2 after 1000000 us" in done.stdout
+
+
+@needs_gcc
+def test_nothing_allocates_and_nothing_is_global(tmp_path: Path) -> None:
+    compiled(example_supervisor("navigation/navigation"), tmp_path, "-fno-pie", "-no-pie")
+    symbols = subprocess.run(["nm", "unit.o"], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    kinds = {line.split()[-1]: line.split()[-2] for line in symbols.splitlines()}
+    assert {name for name, kind in kinds.items() if kind == "U"} <= {"memset", "memcpy", "strcmp", "__stack_chk_fail"}
+    assert not {name for name, kind in kinds.items() if kind in "bBdDC"}
+    assert all(name.startswith("navigation_") for name, kind in kinds.items() if kind == "T")
+
+
+def test_the_same_supervisor_gives_the_same_bytes() -> None:
+    first = example_supervisor("maze_solver/maze_solver")
+    second = example_supervisor.__wrapped__("maze_solver/maze_solver", Deployment.CONTROLLER)
+    assert generate(first, "c99") == generate(second, "c99")
+
+
+def test_every_file_says_where_it_comes_from() -> None:
+    supervisor = example_supervisor("line_follower/line_follower")
+    files = generate(supervisor, "c99")
+    assert set(files) == {"CMakeLists.txt", "README.md", "line_follower.c", "line_follower.h", "main.c"}
+    for path, text in files.items():
+        head = text.splitlines()[:2]
+        assert "Generated by RoboSC " in head[0], path
+        assert f"Model files SHA-256: {supervisor.certificate.bundle_sha256}" in head[1], path
+
+
+def test_the_prefix_may_be_chosen() -> None:
+    files = generate(example_supervisor("line_follower/line_follower"), "c99", GenerateOptions("my_robot"))
+    assert "my_robot.c" in files
+    assert "my_robot_init" in files["my_robot.h"]
+    with pytest.raises(UnsupportedModelError, match="is no name for a package"):
+        generate(example_supervisor("line_follower/line_follower"), "c99", GenerateOptions("My-Robot"))
+
+
+def test_what_is_not_done_is_refused() -> None:
+    with pytest.raises(UnsupportedModelError, match="does not do supervision layers of models with actions"):
+        generate(example_supervisor("navigation/navigation", Deployment.LAYER), "c99")
+    text = """
+        robot R { component C {
+            outgoing message m with type: string
+            behaviour { variable v: string  on response from m do v := value  initial marked state s { } }
+        } }
+    """
+    with pytest.raises(UnsupportedModelError, match=r"received texts that are kept: the variable C\.v takes one"):
+        generate(supervisor_of_text(text), "c99")
+
+
+def test_an_expression_too_deep_for_c_is_one_clear_error() -> None:
+    for depth in (300, 5000):
+        expression: Expression = Binary(">", Received(), Constant(0.0))
+        for _ in range(depth):
+            expression = Binary("or", Binary("and", expression, Received()), Binary("=", Received(), Constant(True)))
+        transition = Transition(None, "m.response", None, (Update("b", expression),), None)
+        behaviour = Behaviour((Variable("b", BooleanType(), False, False),), (State("s", True, True),), (transition,))
+        message = Communication("m", "C", CommunicationKind.OUTGOING_MESSAGE, "m", response=DoubleType())
+        model = Model("Deep", (Component("C", behaviour),), (message,), (), (), (), (), ())
+        with pytest.raises(UnsupportedModelError, match="the model Deep has an expression that is nested too deeply"):
+            generate(Supervisor(model, Deployment.CONTROLLER, (), CERTIFICATE), "c99")

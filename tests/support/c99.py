@@ -1,0 +1,453 @@
+"""Compares generated C with the reference executor: the same commands to both, everything that happens line by line."""
+
+import math
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+from random import Random
+from typing import Any
+
+from robosc.automata.plants import communication_plant_name
+from robosc.execution.clock import ManualClock
+from robosc.execution.executor import Executor
+from robosc.execution.interpreter import InterpretedSystem
+from robosc.execution.protocol import DataDoesNotFit
+from robosc.execution.runner import Status
+from robosc.execution.settings import Settings
+from robosc.expressions import (
+    ArrayType,
+    BooleanType,
+    DoubleType,
+    EnumType,
+    IntegerType,
+    NoneType,
+    ObjectType,
+    StringType,
+    Type,
+)
+from robosc.model.structure import CommunicationKind, ObjectValue
+from robosc.supervisor.structure import Supervisor
+from robosc.targets import generate
+from robosc.targets.c99.layout import PLANT_LOCATIONS, Layout, event_data, make_layout
+from robosc.targets.events import has_plant_location
+from support.c99_main import batch_types, events_back, test_program
+
+GCC = shutil.which("gcc")
+WARNINGS = "-std=c99 -Wall -Wextra -Wpedantic -Werror -Wconversion".split()
+SANITIZERS = "-g -fsanitize=address,undefined -fno-sanitize-recover=all".split()
+_STATUSES = (Status.NEW, Status.WAITING, Status.RUNNING, Status.STOPPING, Status.STOPPED)
+_FAILURES = {"publish": 1, "default": 2, "call": 4, "goal": 8, "cancel": 16, "fits": 32}
+_MASK = 2**64 - 1
+
+
+def compiled(supervisor: Supervisor, folder: Path, *options: str) -> Path:
+    """The test program of a supervisor."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for path, text in generate(supervisor, "c99").items():
+        (folder / path).write_text(text, encoding="utf-8")
+    layout = make_layout(supervisor)
+    (folder / "test.c").write_text(test_program(supervisor), encoding="utf-8")
+    command = [GCC or "gcc", *WARNINGS, "-ffp-contract=off", *options, "-c", f"{layout.prefix}.c", "-o", "unit.o"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[:4000]
+    command = [GCC or "gcc", "-std=c99", *options, "test.c", "unit.o", "-lm", "-o", "test"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[:4000]
+    return folder / "test"
+
+
+class Splitmix:
+    """The policy `random` of generated C."""
+
+    def __init__(self, seed: int) -> None:
+        self._state = seed & _MASK
+
+    def choose(self, candidates: Sequence[int]) -> int:
+        """One of the candidates."""
+        z = self._state = (self._state + 0x9E3779B97F4A7C15) & _MASK
+        z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & _MASK
+        z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & _MASK
+        z ^= z >> 31
+        return candidates[((z >> 32) * len(candidates)) >> 32]
+
+    def issued(self, request: int) -> None:
+        """Nothing."""
+
+    def close(self, enabled: tuple[int, ...]) -> None:
+        """Nothing."""
+
+
+class Reference:
+    """The reference executor, and the lines that generated C must print for the same commands."""
+
+    is_active = True
+    dropped = 0
+
+    def __init__(self, supervisor: Supervisor, dice: Random) -> None:
+        self.model = supervisor.model
+        self.layout: Layout = make_layout(supervisor)
+        self.system = InterpretedSystem(supervisor)
+        self.dice = dice
+        # In half of the runs nothing stops the executor, so that it comes far.
+        self.is_calm = dice.random() < 0.5
+        self.clock = ManualClock()
+        self.failing: set[str] = set()
+        self.commands: list[str] = []
+        self.lines: list[str] = []
+        self.numbers = {name: number for number, name in enumerate(self.layout.communications)}
+        self.events = {name: number for number, name in enumerate(self.layout.events)}
+        self.topics = list(self.layout.topics)
+        self.calls: dict[int, str] = {}
+        self.goals: dict[int, str] = {}
+        self.unknown = 0
+        self.executor = self._new()
+
+    # Settings.
+
+    def _new(self) -> Executor:
+        dice, model = self.dice, self.model
+        requests = [item.name for item in self.layout.requests]
+        policy = dice.choice(["fair", "fair", "priority", "random"])
+        priority = tuple(dice.sample(requests, dice.randint(0, len(requests)))) if policy == "priority" else ()
+        every = dice.choice(["period", "period", "event"])
+        on_unknown = dice.choice(["default", "keep"] if self.is_calm else ["default", "keep", "fault"])
+        identifiers = list(self.layout.received_topics)
+        ages = {name: dice.choice([1.5, 4.0]) for name in identifiers if dice.random() < 0.15 and not self.is_calm}
+        released = tuple(topic for topic in self.topics if self.is_calm or dice.random() < 0.6)
+        service, action = dice.choice([1.0, 10.0]), dice.choice([None, 2.0])
+        seed = dice.randrange(2**64)
+        settings = Settings(0.125, policy, priority, seed, every, released, ages, service, action, on_unknown)
+        executor = Executor(self.system, self, settings, self.clock, self)
+        if policy == "random":
+            executor._new_policy = lambda: Splitmix(seed)  # type: ignore[method-assign]
+        words: list[Any] = ["n", ("fair", "priority", "random").index(policy), len(priority)]
+        words += [self.numbers[name] for name in priority]
+        words += [seed, int(every == "event"), ("default", "keep", "fault").index(on_unknown)]
+        words += [_microseconds(service), _microseconds(action)]
+        for item in model.communications:
+            age = ages.get(item.identifier, item.max_age) if item.kind is CommunicationKind.OUTGOING_MESSAGE else None
+            words.append(0 if age is None else _microseconds(age))
+        words += [int(topic in released) for topic in self.topics]
+        self.executor = executor
+        self._told(words)
+        return executor
+
+    # The middleware.
+
+    def prepare(self, communication: str, data: Any) -> Any:
+        """The data itself."""
+        if "fits" in self.failing and self.numbers[communication] % 2:
+            raise DataDoesNotFit("no")
+        return data
+
+    def is_default(self, communication: str, message: Any) -> bool:
+        """Whether everything is zero or empty."""
+        if isinstance(message, dict):
+            return all(self.is_default(communication, part) for part in message.values())
+        return message is None or message in (0, "")
+
+    def _send(self, kind: str, *words: object) -> None:
+        if kind in self.failing:
+            raise RuntimeError(kind)
+        self.lines.append(" ".join([kind, *map(str, words)]))
+
+    def publish(self, communication: str, message: Any) -> None:
+        """Remember."""
+        self._send("publish", self._request(communication, message))
+
+    def publish_default(self, identifier: str) -> None:
+        """Remember."""
+        self._send("default", self.topics.index(identifier))
+
+    def call(self, communication: str, request_id: int, message: Any) -> None:
+        """Remember."""
+        self._send("call", request_id, self._request(communication, message))
+        self.calls[request_id] = communication
+
+    def send_goal(self, communication: str, goal_id: int, message: Any) -> None:
+        """Remember."""
+        self._send("goal", goal_id, self._request(communication, message))
+        self.goals[goal_id] = communication
+
+    def cancel_goal(self, communication: str, goal_id: int) -> None:
+        """Remember."""
+        self._send("cancel", goal_id, self.numbers[communication])
+
+    def _request(self, communication: str, message: Any) -> str:
+        type_ = self.model.communication(communication).request
+        assert type_ is not None
+        provided = [item.value for item in self.model.provides_for(communication)]
+        order = [path for value in provided for path in _paths(value, ())]
+        given = dict(self._given(type_, message, ()))
+        parts = [f"{'.'.join(path)}={given[path]}" for path in _grouped(order) if path in given]
+        return " ".join([str(self.numbers[communication]), *parts])
+
+    def _given(self, type_: Type, message: Any, path: tuple[str, ...]) -> list[tuple[tuple[str, ...], str]]:
+        if message is None:
+            return []
+        if isinstance(type_, ObjectType):
+            types = {part.name: part.type for part in self.model.object(type_.name).properties}
+            return [item for name, part in message.items() for item in self._given(types[name], part, (*path, name))]
+        match type_:
+            case DoubleType():
+                return [(path, f"{float(message):.17g}")]
+            case StringType() | EnumType():
+                return [(path, _hex(message))]
+            case _:
+                return [(path, str(int(message)))]
+
+    # The log.
+
+    def write(self, entry: dict[str, Any]) -> None:
+        """Remember what happened."""
+        kind = entry["kind"]
+        self.unknown += kind == "unknown"
+        if kind in ("event", "unknown", "unexpected"):
+            number = self.events[entry["event"]] if "event" in entry else -1
+            self.lines.append(f"log {kind} {number}")
+        elif kind == "release":
+            self.lines.append(f"log release {self.topics.index(entry['identifier'])}")
+        else:
+            self.lines.append(f"log {kind}")
+
+    def close(self) -> None:
+        """Nothing."""
+
+    # Commands.
+
+    def _told(self, words: Sequence[object]) -> None:
+        self.commands.append(" ".join(map(str, words)))
+        self.lines.append(self._state(0.0 if words[0] in ("n", "x") else None))
+
+    def _state(self, now_s: float | None) -> str:
+        words = ["state"]
+        state = self.system.state()
+        for component, behaviour in self.layout.behaviours:
+            names = [item.name for item in behaviour.states]
+            words.append(str(names.index(state[component]["state"])))
+            for variable in behaviour.variables:
+                words.append(self._value(variable.type, state[component]["variables"][variable.name]))
+        for item in self.model.communications:
+            if has_plant_location(item):
+                place = self.system._state[communication_plant_name(item), None]
+                words.append(str(PLANT_LOCATIONS[item.kind].index(str(place))))
+        enabled = "".join(str(int(self.system.enabled(event))) for event in self.layout.controllable)
+        counters, executor = self.executor.counters, self.executor
+        before = self.clock.now_s
+        if now_s is not None:
+            self.clock.now_s = now_s
+        status = _STATUSES.index(executor.status)
+        self.clock.now_s = before
+        words += ["enabled", enabled, "status", str(status), "fault", str(int(executor.is_faulty))]
+        return " ".join([*words, "counters", f"{self.unknown} {counters.unexpected} {counters.faults}"])
+
+    def _value(self, type_: Type, value: Any) -> str:
+        match type_:
+            case DoubleType():
+                return f"{value:.17g}"
+            case StringType():
+                return _hex(value)
+            case EnumType(values=values):
+                return str(values.index(value))
+            case _:
+                return str(int(value))
+
+    def act(self) -> None:
+        """One random command."""
+        dice, executor = self.dice, self.executor
+        self.clock.advance(dice.choice([0, 1, 1] if self.is_calm else [0, 0, 1, 1, 1, 2, 4, 9, 33]) * 0.125)
+        now = _microseconds(self.clock.now_s)
+        back = events_back(self.layout)
+        kinds = ["start", "tick", "watch", "stop", "restart", "failing", "receive", "back", "failed", "goal"]
+        weights = [4, 8, 0, 0, 0, 0] if self.is_calm else [0.3, 4, 0.5, 0.15, 0.6, 0.3]
+        weights += [6, 4, 0.7, 1.5] if back else [6, 0, 0, 0]
+        kind = dice.choices(kinds, weights)[0]
+        match kind:
+            case "start":
+                executor.start()
+                self._told(["s", now])
+            case "tick":
+                executor.tick()
+                self._told(["t", now])
+            case "watch":
+                executor.watch()
+                self._told(["w", now])
+            case "stop":
+                is_fault = dice.random() < 0.5
+                executor.stop("test", is_fault)
+                self._told(["S", now, int(is_fault)])
+            case "restart":
+                executor.restart()
+                self._told(["R", now])
+            case "failing":
+                self.failing = {name for name in _FAILURES if dice.random() < 0.15} if dice.random() < 0.4 else set()
+                self._told(["x", sum(_FAILURES[name] for name in self.failing)])
+            case "receive" if self.layout.received_topics:
+                self._receive(now)
+            case "back":
+                self._back(now, dice.choice(back))
+            case "failed" if any(item.kind is CommunicationKind.SERVICE for item in self.model.communications):
+                number = self._some(self.calls)
+                executor.on_call_failed(number, "test")
+                self._told(["f", now, number])
+            case "goal" if any(item.kind is CommunicationKind.ACTION for item in self.model.communications):
+                self._goal(now)
+
+    def _some(self, ids: dict[int, str], of: str | None = None) -> int:
+        open_ = [number for number, name in ids.items() if of in (None, name)][-2:]
+        return self.dice.choice(open_) if open_ and self.dice.random() < 0.9 else self.dice.randint(500, 502)
+
+    def _receive(self, now: int) -> None:
+        identifier = self.dice.choice(list(self.layout.received_topics))
+        types = batch_types(self.layout, identifier)
+        words: list[object] = ["m", now, list(self.layout.received_topics).index(identifier)]
+        datum: Any = None
+        chosen = self.dice.randrange(len(types)) if types else 0
+        if types:
+            datum = self._datum(types[chosen])
+        for number, type_ in enumerate(types):
+            shared: Any = datum if number == chosen else None
+            if number != chosen and isinstance(type_, DoubleType) and type(datum) is int:
+                shared = float(datum)
+            words += self._words(type_, shared, is_root=True)
+        self.executor.receive(identifier, datum)
+        self._told(words)
+
+    def _back(self, now: int, event: str) -> None:
+        name, _, kind = event.rpartition(".")
+        is_service = self.model.communication(name).kind is CommunicationKind.SERVICE
+        number = self._some(self.calls if is_service else self.goals, name)
+        type_ = event_data(self.model, event)
+        datum = None if type_ is None else self._datum(self.layout.source(type_))
+        words: list[object] = ["b", now, events_back(self.layout).index(event), number]
+        if type_ is not None:
+            words += self._words(self.layout.source(type_), datum, is_root=True)
+        if is_service:
+            self.executor.on_reply(number, datum)
+        elif kind == "feedback":
+            self.executor.on_feedback(number, datum)
+        else:
+            self.executor.on_goal_ended(number, "succeeded", datum)
+        self._told(words)
+
+    def _goal(self, now: int) -> None:
+        number = self._some(self.goals)
+        match self.dice.randrange(4):
+            case 0 | 1:
+                self.executor.on_goal_accepted(number)
+                self._told(["a", now, number])
+            case 2:
+                self.executor.on_goal_ended(number, self.dice.choice(["rejected", "aborted", "cancelled", "lost"]))
+                self._told(["e", now, number])
+            case _:
+                ended = self.dice.random() < 0.7
+                self.executor.on_cancel_refused(number, ended)
+                self._told(["c", now, number, int(ended)])
+
+    # Data.
+
+    def _datum(self, type_: Type) -> Any:
+        """What may come as a type, as far as C can tell it."""
+        dice = self.dice
+        match type_:
+            case EnumType():
+                return self._datum(self.layout.source(type_))
+            case BooleanType():
+                return dice.choice([True, False, None])
+            case IntegerType():
+                return dice.choice([0, 1, -1, 2, 3, 4, 5, 6, 7, 100, 2**31 - 1, 2**31, -(2**31), -(2**40), None])
+            case DoubleType():
+                values = [0.0, 0.1, 0.4, 0.5, 0.7, 1.0, 2.0, 3.0, -1.5, 1e308, math.nan, math.inf, -math.inf]
+                return dice.choice(values)
+            case StringType():
+                return dice.choice(["", "a", "it's", '"""\n\\', "\udc80é", None])
+            case ObjectType(name=name):
+                if dice.random() < 0.05:
+                    return None
+                parts = self.model.object(name).properties
+                return {item.name: self._datum(item.type) for item in parts if not isinstance(item.type, NoneType)}
+            case ArrayType(element=element):
+                if dice.random() < 0.1:
+                    return None
+                if isinstance(element, DoubleType) and dice.random() < 0.3:
+                    return [dice.choice([0.1, 3.0])] * 360
+                return [self._datum(element) for _ in range(dice.randint(0, 4))]
+        raise AssertionError(type_)
+
+    def _words(self, type_: Type, datum: Any, is_root: bool = False) -> list[object]:
+        type_ = self.layout.source(type_)
+        match type_:
+            case BooleanType():
+                return [-1 if datum is None or not isinstance(datum, bool) else int(datum)]
+            case IntegerType():
+                return [-(2**63) if datum is None else datum]
+            case DoubleType():
+                return ["nan" if datum is None else repr(float(datum))]
+            case StringType():
+                return ["?" if datum is None else _hex(datum)]
+            case ArrayType(element=element):
+                if datum is None:
+                    return [-1]
+                return [len(datum), *(word for item in datum for word in self._words(element, item))]
+            case ObjectType(name=name):
+                if datum is None and is_root:
+                    return [0]
+                parts = [
+                    word
+                    for item in self.model.object(name).properties
+                    if not isinstance(item.type, NoneType)
+                    for word in self._words(item.type, None if datum is None else datum[item.name])
+                ]
+                return [1, *parts] if is_root else parts
+        raise AssertionError(type_)
+
+
+def _paths(value: Any, path: tuple[str, ...]) -> list[tuple[str, ...]]:
+    if isinstance(value, ObjectValue):
+        return [item for name, part in value.properties for item in _paths(part, (*path, name))]
+    return [path]
+
+
+def _grouped(paths: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
+    """The paths in the order of the structs: all of a property together, where it came first."""
+    found: dict[str, list[tuple[str, ...]]] = {}
+    if paths and not paths[0]:
+        return [()]
+    for path in paths:
+        found.setdefault(path[0], []).append(path[1:])
+    return [(name, *rest) for name, rests in found.items() for rest in (_grouped(rests) if rests[0] else [()])]
+
+
+def _hex(text: str) -> str:
+    return "x" + text.encode("utf-8", "surrogatepass").hex()
+
+
+def _microseconds(seconds: float | None) -> int:
+    return _MASK if seconds is None else round(seconds * 1e6)
+
+
+def compare(supervisor: Supervisor, program: Path, dice: Random, runs: int, length: int) -> list[str]:
+    """Let both execute random commands; all lines, which were the same."""
+    commands: list[str] = []
+    lines: list[str] = []
+    marks: list[int] = []
+    for _ in range(runs):
+        reference = Reference(supervisor, dice)
+        for _ in range(length):
+            reference.act()
+        commands += reference.commands
+        lines += reference.lines
+        marks.append(len(lines))
+    done = subprocess.run([program], input="\n".join(commands) + "\n", capture_output=True, text=True, check=False)
+    assert not done.stderr, done.stderr[-4000:]
+    found = done.stdout.splitlines()
+    if found != lines:
+        place = next(n for n in range(len(lines)) if n >= len(found) or found[n] != lines[n])
+        step = sum(line.startswith("state") for line in lines[:place])
+        around = "\n".join(lines[max(0, place - 12) : place])
+        raise AssertionError(
+            f"command {step}: {commands[step]}\nbefore: {commands[max(0, step - 3) : step]}\n{around}\n"
+            f"expected {lines[place]}\nfound    {found[place] if place < len(found) else None}"
+        )
+    return lines

@@ -276,11 +276,17 @@ class Runner:
         self._update_may_request()
 
     def _look_at_clock(self) -> None:
-        """Take the time; whatever is over by now has its effect first."""
+        """Take the time; whatever is over by now has its effect first.
+
+        Never raises: after a fault, too, what comes is handled; a goal whose end were lost would never have ended.
+        """
         now = self._clock.monotonic()
         self._now_s = self._recorder.began_s = now
         if now >= self._deadline_s and self._is_started:
-            self._check_time(now)
+            try:
+                self._check_time(now)
+            except Exception as error:
+                self._fail(describe_error(error))
 
     def _next_deadline(self, now: float) -> float:
         return min(self._replies.deadline_s(), self._sensors.deadline_s(now))

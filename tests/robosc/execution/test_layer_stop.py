@@ -174,3 +174,40 @@ def test_a_broken_clock_lets_nothing_through(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(type(b.clock), "monotonic", lambda clock: clock.now_s + 1.0)
     assert b.request("/cmd_vel", ON) == [BLOCKED, *ZEROS]
     assert b.call("ask", 1) == [("no answer", "ask", 1), ("blocked", "/ask"), *ZEROS]
+
+
+LAST_MOMENT = """
+robot Robot {
+  interface dock use Dock from irobot_msgs
+  interface trigger use Trigger from std_srvs
+  component Wheels {
+    incoming message move with identifier: "/cmd_vel", type: double
+    action park with identifier: "/park", request: none, response: none, feedback: none links dock
+    service ask with identifier: "/ask", request: none, response: none links trigger
+  }
+}
+"""
+
+
+def broken_at_the_deadline() -> LayerBench:
+    """A goal and a call are under way, and the release that is due next cannot be sent."""
+    b = layer(LAST_MOMENT, release_identifiers=("/cmd_vel",), command_timeout_s=1.0)
+    b.request("/cmd_vel", 0.5)
+    b.goal("park", "g")
+    b.executor.on_goal_accepted(1)
+    b.call("ask", "c")
+    b.clock.advance(1.5)
+    b.middleware.failing = {"publish_default"}
+    return b
+
+
+def test_what_comes_at_the_moment_of_a_fault_is_still_handled() -> None:
+    b = broken_at_the_deadline()
+    assert ("end", "park", "g", "succeeded", 7) in b.end(1, "succeeded", 7)
+    assert b.executor.is_faulty
+    assert ("answer", "ask", "c", 3) in b.reply(1, 3)
+    b.middleware.failing = set()
+    b.wait(1.0)
+    b.during(b.executor.restart)
+    # The action is not dead.
+    assert any(sent[0] == "goal" for sent in b.goal("park", "h"))

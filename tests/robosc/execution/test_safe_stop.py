@@ -410,3 +410,41 @@ def test_each_sensor_alone_is_watched_again_after_its_return() -> None:
         assert b.status() is Status.RUNNING
         b.tick(5)
         assert b.status() is Status.STOPPED
+
+
+LAST_MOMENT = """
+robot Robot {
+  interface dock use Dock from irobot_msgs
+  interface trigger use Trigger from std_srvs
+  component Wheels {
+    action park with identifier: "/park", request: none, response: none, feedback: none links dock
+    service ask with identifier: "/ask", request: none, response: none links trigger
+    incoming message move with identifier: "/cmd_vel", type: double
+    behaviour {
+      initial marked state fine {
+        on request to park
+        on request to ask
+        on error from ask goto bad
+      }
+      marked state bad { on request to park }
+    }
+  }
+  requirement move needs Wheels.fine
+  provide move with 1.0
+}
+"""
+
+
+def test_a_goal_that_ends_at_the_moment_of_a_fault_has_ended() -> None:
+    b = bench(LAST_MOMENT, service_timeout_s=2.0, release_identifiers=("/cmd_vel",))
+    assert ("goal", "park", 1, None) in b.tick(3)
+    b.executor.on_goal_accepted(1)
+    b.clock.advance(3.0)
+    # The call has timed out, so that the wheels must stop, and they cannot be told to.
+    b.middleware.failing = {"publish_default"}
+    b.executor.on_goal_ended(1, "succeeded", None)
+    assert b.executor.is_faulty
+    b.middleware.failing = set()
+    b.tick(10)
+    b.executor.restart()
+    assert ("goal", "park", 2, None) in b.tick(3)

@@ -96,7 +96,7 @@ def table() -> str:
         return "Generated C: gcc is not installed"
     rows = []
     for name, scan in EXAMPLES.items():
-        prefix = name.split("/")[1]
+        prefix = f"{name.split('/')[1]}_supervisor"
         with tempfile.TemporaryDirectory() as folder:
             for path, text in generate(example_supervisor(name), "c99").items():
                 (Path(folder) / path).write_text(text, encoding="utf-8")

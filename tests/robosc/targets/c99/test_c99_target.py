@@ -9,6 +9,7 @@ from random import Random
 import pytest
 
 from robosc.errors import UnsupportedModelError
+from robosc.execution.settings import Settings
 from robosc.expressions import Binary, BooleanType, Constant, DoubleType, Expression, Received
 from robosc.model.structure import (
     Behaviour,
@@ -26,7 +27,8 @@ from robosc.supervisor.structure import Supervisor
 from robosc.targets import GenerateOptions, generate
 from robosc.targets.c99.naming import member_name, prefix_for
 from robosc.targets.c99.text import safe, string_literal
-from support.c99 import GCC, SANITIZERS, WARNINGS, compare, compiled
+from support.c99 import GCC, SANITIZERS, WARNINGS, Reference, compare, compiled, replay
+from support.c99_main import events_back
 from support.generated import example_supervisor
 from support.models import EXAMPLE_NAMES, model_of
 from support.random_controllers import random_robot
@@ -155,6 +157,86 @@ def test_requests_of_every_kind_behave_as_the_reference(tmp_path: Path) -> None:
         assert seen[f"log {what}"] > 5, seen
     for what in ("publish", "default", "call", "goal", "cancel"):
         assert seen[what] > 5, seen
+
+
+TWO_GOALS = """
+robot TwoGoals {
+    interface dock use Dock from some_msgs
+    interface check use Check from some_msgs
+    component P {
+        action one with request: none, response: none, feedback: none links dock
+        action two with request: none, response: none, feedback: none links dock
+        service ask with request: none, response: none links check
+        incoming message go with type: integer
+        behaviour {
+            initial marked state fine {
+                on request to one
+                on request to two
+                on request to ask
+                on request to go
+                on error from one goto broken
+                on error from ask goto broken
+            }
+            marked state broken { }
+        }
+    }
+    requirement two needs P.fine
+    requirement go needs P.fine
+    provide go with 1
+}
+"""
+
+
+@needs_gcc
+def test_goals_that_time_out_together_are_not_ended_twice(tmp_path: Path) -> None:
+    supervisor = supervisor_of_text(TWO_GOALS)
+    reference = Reference(supervisor, Random(1), Settings(action_timeout_s=2.0, release_identifiers=()))
+    executor = reference.executor
+    executor.start()
+    reference.tell("s")
+    for _ in range(2):
+        executor.tick()
+        reference.tell("t")
+    reference.clock.advance(3.0)
+    executor.watch()
+    reference.tell("w")
+    assert sum(line.startswith("goal") for line in reference.lines) == 2
+    assert executor.counters.unexpected == 0
+    cancelled = f"log event {reference.events['two.cancel']}"
+    assert cancelled in reference.lines
+    replay(compiled(supervisor, tmp_path), reference.commands, reference.lines)
+
+
+@needs_gcc
+@pytest.mark.parametrize("outcome", ["succeeded", "aborted"])
+def test_the_end_of_a_goal_is_taken_whatever_else_is_over(outcome: str, tmp_path: Path) -> None:
+    supervisor = supervisor_of_text(TWO_GOALS)
+    settings = Settings(service_timeout_s=2.0, release_identifiers=("go",))
+    reference = Reference(supervisor, Random(1), settings)
+    executor = reference.executor
+    executor.start()
+    reference.tell("s")
+    for _ in range(4):
+        executor.tick()
+        reference.tell("t")
+    number = next(number for number, name in reference.goals.items() if name == "one")
+    reference.clock.advance(2.0)
+    # The call is over its time, which makes a release due, which fails.
+    reference.let_fail("default")
+    executor.on_goal_ended(number, outcome)
+    if outcome == "succeeded":
+        reference.tell("b", events_back(reference.layout).index("one.response"), number)
+    else:
+        reference.tell("e", number)
+    assert executor.is_faulty
+    reference.let_fail()
+    executor.restart()
+    reference.tell("R")
+    for _ in range(4):
+        executor.tick()
+        reference.tell("t")
+    assert [name for number_, name in sorted(reference.goals.items())].count("one") == 2
+    replay(compiled(supervisor, tmp_path), reference.commands, reference.lines)
 
 
 @needs_gcc

@@ -84,8 +84,8 @@ int main(void)
 """
 
 EXAMPLES = {
-    "line_follower/line_follower": "line_follower_data_Scan_t",
-    "maze_solver/maze_solver": "maze_solver_data_Scan_t",
+    "line_follower/line_follower": "line_follower_supervisor_data_Scan_t",
+    "maze_solver/maze_solver": "maze_solver_supervisor_data_Scan_t",
 }
 
 
@@ -96,7 +96,8 @@ def table() -> str:
         return "Generated C: gcc is not installed"
     rows = []
     for name, scan in EXAMPLES.items():
-        prefix = name.split("/")[1]
+        robot = name.split("/")[1]
+        prefix = f"{robot}_supervisor"
         with tempfile.TemporaryDirectory() as folder:
             for path, text in generate(example_supervisor(name), "c99").items():
                 (Path(folder) / path).write_text(text, encoding="utf-8")
@@ -110,5 +111,5 @@ def table() -> str:
             ]
         for what, samples in zip(("attempt", "event", "cycle"), zip(*runs, strict=True), strict=True):
             aim = "10" if what == "attempt" else ""
-            rows.append([f"{prefix}: {what}", f"{statistics.fmean(samples):.1f}", f"{min(samples):.1f}", aim])
+            rows.append([f"{robot}: {what}", f"{statistics.fmean(samples):.1f}", f"{min(samples):.1f}", aim])
     return text_table("Generated C, gcc -O2", ["nanoseconds", "mean", "min", "aim (mean)"], rows)

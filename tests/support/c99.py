@@ -13,6 +13,7 @@ from robosc.execution.clock import ManualClock
 from robosc.execution.executor import Executor
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.protocol import DataDoesNotFit
+from robosc.execution.rest import describe_error
 from robosc.execution.runner import Status
 from robosc.execution.settings import Settings
 from robosc.expressions import (
@@ -84,7 +85,7 @@ class Reference:
     is_active = True
     dropped = 0
 
-    def __init__(self, supervisor: Supervisor, dice: Random) -> None:
+    def __init__(self, supervisor: Supervisor, dice: Random, settings: Settings | None = None) -> None:
         self.model = supervisor.model
         self.layout: Layout = make_layout(supervisor)
         self.system = InterpretedSystem(supervisor)
@@ -101,12 +102,12 @@ class Reference:
         self.calls: dict[int, str] = {}
         self.goals: dict[int, str] = {}
         self.unknown = 0
-        self.executor = self._new()
+        self.executor = self._new(settings or self._settings())
 
     # Settings.
 
-    def _new(self) -> Executor:
-        dice, model = self.dice, self.model
+    def _settings(self) -> Settings:
+        dice = self.dice
         requests = [item.name for item in self.layout.requests]
         policy = dice.choice(["fair", "fair", "priority", "random"])
         priority = tuple(dice.sample(requests, dice.randint(0, len(requests)))) if policy == "priority" else ()
@@ -117,18 +118,34 @@ class Reference:
         released = tuple(topic for topic in self.topics if self.is_calm or dice.random() < 0.6)
         service, action = dice.choice([1.0, 10.0]), dice.choice([None, 2.0])
         seed = dice.randrange(2**64)
-        settings = Settings(0.125, policy, priority, seed, every, released, ages, service, action, on_unknown)
+        return Settings(0.125, policy, priority, seed, every, released, ages, service, action, on_unknown)
+
+    def _new(self, settings: Settings) -> Executor:
         executor = Executor(self.system, self, settings, self.clock, self)
-        if policy == "random":
+        settings = executor.settings
+        if settings.policy == "random":
+            seed = settings.seed
             executor._new_policy = lambda: Splitmix(seed)  # type: ignore[method-assign]
-        words: list[Any] = ["n", ("fair", "priority", "random").index(policy), len(priority)]
-        words += [self.numbers[name] for name in priority]
-        words += [seed, int(every == "event"), ("default", "keep", "fault").index(on_unknown)]
-        words += [_microseconds(service), _microseconds(action)]
-        for item in model.communications:
-            age = ages.get(item.identifier, item.max_age) if item.kind is CommunicationKind.OUTGOING_MESSAGE else None
+        look_at_clock = executor._look_at_clock
+
+        def look() -> None:
+            # What came is taken even if what was over by then brought up a fault.
+            try:
+                look_at_clock()
+            except Exception as error:
+                executor._fail(describe_error(error))
+
+        executor._look_at_clock = look  # type: ignore[method-assign]
+        words: list[Any] = ["n", ("fair", "priority", "random").index(settings.policy), len(settings.priority)]
+        words += [self.numbers[name] for name in settings.priority]
+        words += [settings.seed, int(settings.every == "event")]
+        words += [("default", "keep", "fault").index(settings.on_unknown)]
+        words += [_microseconds(settings.service_timeout_s), _microseconds(settings.action_timeout_s)]
+        for item in self.model.communications:
+            is_sensor = item.kind is CommunicationKind.OUTGOING_MESSAGE
+            age = settings.max_age_s.get(item.identifier, item.max_age) if is_sensor else None
             words.append(0 if age is None else _microseconds(age))
-        words += [int(topic in released) for topic in self.topics]
+        words += [int(topic in (settings.release_identifiers or ())) for topic in self.topics]
         self.executor = executor
         self._told(words)
         return executor
@@ -216,6 +233,15 @@ class Reference:
 
     # Commands.
 
+    def tell(self, kind: str, *words: object) -> None:
+        """Give the generated code, too, a command that the executor was given."""
+        self._told([kind, _microseconds(self.clock.now_s), *words])
+
+    def let_fail(self, *names: str) -> None:
+        """Let these callbacks fail from now on, and no others."""
+        self.failing = set(names)
+        self._told(["x", sum(_FAILURES[name] for name in names)])
+
     def _told(self, words: Sequence[object]) -> None:
         self.commands.append(" ".join(map(str, words)))
         self.lines.append(self._state(0.0 if words[0] in ("n", "x") else None))
@@ -281,8 +307,7 @@ class Reference:
                 executor.restart()
                 self._told(["R", now])
             case "failing":
-                self.failing = {name for name in _FAILURES if dice.random() < 0.15} if dice.random() < 0.4 else set()
-                self._told(["x", sum(_FAILURES[name] for name in self.failing)])
+                self.let_fail(*[name for name in _FAILURES if dice.random() < 0.15] if dice.random() < 0.4 else [])
             case "receive" if self.layout.received_topics:
                 self._receive(now)
             case "back":
@@ -431,14 +456,18 @@ def compare(supervisor: Supervisor, program: Path, dice: Random, runs: int, leng
     """Let both execute random commands; all lines, which were the same."""
     commands: list[str] = []
     lines: list[str] = []
-    marks: list[int] = []
     for _ in range(runs):
         reference = Reference(supervisor, dice)
         for _ in range(length):
             reference.act()
         commands += reference.commands
         lines += reference.lines
-        marks.append(len(lines))
+    replay(program, commands, lines)
+    return lines
+
+
+def replay(program: Path, commands: list[str], lines: list[str]) -> None:
+    """Give generated code commands: it must print these lines."""
     done = subprocess.run([program], input="\n".join(commands) + "\n", capture_output=True, text=True, check=False)
     assert not done.stderr, done.stderr[-4000:]
     found = done.stdout.splitlines()
@@ -450,4 +479,3 @@ def compare(supervisor: Supervisor, program: Path, dice: Random, runs: int, leng
             f"command {step}: {commands[step]}\nbefore: {commands[max(0, step - 3) : step]}\n{around}\n"
             f"expected {lines[place]}\nfound    {found[place] if place < len(found) else None}"
         )
-    return lines

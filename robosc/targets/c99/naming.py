@@ -21,17 +21,23 @@ _TAKEN = frozenset(
     """.split()
 )
 
-# C99 7.26 keeps these beginnings for its library, POSIX the others: a robot's prefix must not be one of them.
-_LIBRARY_PREFIX = re.compile(
+# C99 7.26 keeps these beginnings for its library, POSIX others, and local variables begin with the last: a prefix must
+# not be one of them.
+_KEPT_PREFIX = re.compile(
     r"(is|to|str|mem|wcs|u?int|atomic|cnd|mtx|thrd|tss|sig|f[eo])[a-z]"
-    r"|(aio|clock|dl|mq|posix|pthread|sched|sem|shm|sig|timer|msg|net|poll|stdc|va|wait)(_|\Z)"
+    r"|(aio|clock|dl|mq|posix|pthread|sched|sem|shm|sig|timer|msg|net|poll|stdc|va|wait|value)(_|\Z)"
 )
 
 
 def prefix_for(robot: str) -> str:
-    """The beginning of every global name of a robot's files: `LineFollower` -> `line_follower`."""
-    name = snake_case(robot)[:_MAXIMUM_PREFIX].rstrip("_")
-    return f"robot_{name}" if _LIBRARY_PREFIX.match(name) else name
+    """The beginning of every global name, and the name of the files: `LineFollower` -> `line_follower_supervisor`.
+
+    Its last word stands in no name of the standard library, of the generated code itself, of a system header or of a
+    target of CMake, so that no robot's name makes it one of these: `size` and `_t`, `main` and `.c`.
+    """
+    name = snake_case(robot)
+    name = name.removesuffix("_supervisor")[:_MAXIMUM_PREFIX].rstrip("_") + "_supervisor"
+    return f"robot_{name}" if _KEPT_PREFIX.match(name) else name
 
 
 def member_name(wish: str) -> str:

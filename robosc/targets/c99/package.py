@@ -21,6 +21,9 @@ from robosc.targets.registry import GenerateOptions
 _MAXIMUM_NESTING = 200
 """Parentheses in each other; common compilers take at least 256."""
 
+_MAXIMUM_TEXT = 4095
+"""Bytes of a string literal that every compiler takes (C99 5.2.4.1)."""
+
 _CMAKE = """\
 cmake_minimum_required(VERSION 3.13)
 project({prefix} C)
@@ -95,6 +98,8 @@ def _refuse(supervisor: Supervisor) -> None:
                     f"the target c99 does not do received texts that are kept: the variable "
                     f"{component.name}.{variable.name} takes one; use an enum made from the text"
                 )
+    if any(len(text.encode("utf-8", "surrogatepass")) > _MAXIMUM_TEXT for text in _texts(model)):
+        raise UnsupportedModelError(f"the target c99 does not do texts of more than {_MAXIMUM_TEXT} bytes in UTF-8")
     if "\0" in "".join(_texts(model)):
         raise UnsupportedModelError("the target c99 does not do texts with a NUL character in them")
 

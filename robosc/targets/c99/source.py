@@ -363,12 +363,7 @@ def _model_settings(layout: Layout) -> list[str]:
     return [*lines, "}"]
 
 
-_LOOK = [
-    "    if (!look_at_clock(r, now_us)) {",
-    "        fail(r, r->why);",
-    "        return;",
-    "    }",
-]
+_LOOK = "    look_at_clock(r, now_us);"
 
 
 def _entries(layout: Layout) -> list[list[str]]:
@@ -377,7 +372,7 @@ def _entries(layout: Layout) -> list[list[str]]:
     sensors = [item.name for item in layout.of_kind(CommunicationKind.OUTGOING_MESSAGE)]
     for identifier in layout.received_topics:
         parameters = batch_parameters(layout, identifier)
-        body = ["    if (!r->is_started) {", "        return;", "    }", *_LOOK]
+        body = ["    if (!r->is_started) {", "        return;", "    }", _LOOK]
         for item in batch(layout, identifier):
             event = item.event(EventKind.RESPONSE)
             data = event_data(layout.model, event)
@@ -396,7 +391,7 @@ def _entries(layout: Layout) -> list[list[str]]:
             "    guard(r, end_batch(r));",
             "}",
         ]
-        result.append([reply_head(layout, event), "{", *_LOOK, *indent(body), "}"])
+        result.append([reply_head(layout, event), "{", _LOOK, *indent(body), "}"])
     for name in actions:
         place = actions.index(name)
         for event in (f"{name}.feedback", f"{name}.response"):
@@ -412,7 +407,7 @@ def _entries(layout: Layout) -> list[list[str]]:
                 "    }",
                 "}",
             ]
-            result.append([reply_head(layout, event), "{", *_LOOK, *indent(body), "}"])
+            result.append([reply_head(layout, event), "{", _LOOK, *indent(body), "}"])
     return result
 
 

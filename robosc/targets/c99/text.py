@@ -1,5 +1,6 @@
 """Small helpers for writing C text."""
 
+import re
 import textwrap
 
 from robosc.targets.python.text import printable
@@ -9,7 +10,9 @@ _WIDTH = 105
 
 def safe(text: str) -> str:
     """A text for a comment: printable ASCII that neither ends the comment nor is a trigraph or a spliced line."""
-    shown = printable(text).replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?")
+    shown = printable(text).replace("*/", "* /").replace("/*", "/ *")
+    # Each question mark that another one follows: of three in a row no two are left.
+    shown = re.sub(r"\?(?=\?)", "? ", shown)
     return f"{shown} " if shown.endswith("\\") else shown
 
 

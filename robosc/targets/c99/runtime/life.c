@@ -108,10 +108,7 @@ void robot_tick(robot_t *r, uint64_t now_us)
     if (!r->is_started) {
         return;
     }
-    if (!look_at_clock(r, now_us)) {
-        fail(r, r->why);
-        return;
-    }
+    look_at_clock(r, now_us);
     if (r->may_request) {
 #if ROBOT_REQUEST_COUNT > 0
         guard(r, decide(r));
@@ -126,10 +123,7 @@ void robot_watch(robot_t *r, uint64_t now_us)
     if (!r->is_started) {
         return;
     }
-    if (!look_at_clock(r, now_us)) {
-        fail(r, r->why);
-        return;
-    }
+    look_at_clock(r, now_us);
     if (is_at_rest(r)) {
         (void)retry(r);
     }

@@ -75,7 +75,8 @@ static bool expire(robot_t *r)
         is_expired[action] = goal->is_open && goal->is_running && r->now_us >= goal->deadline_us;
     }
     for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
-        if (is_expired[action]) {
+        /* What another one's end led to may have cancelled it. */
+        if (is_expired[action] && r->goals[action].is_running) {
             r->goals[action].is_running = false;
             happened(r, ACTIONS[action].error, take_event(&r->state, ACTIONS[action].error));
             if (!settle(r, -1, &has_changed) || !request_cancel(r, action)) {
@@ -109,9 +110,12 @@ static bool check_time(robot_t *r)
     return true;
 }
 
-/* Take the time; whatever is over by now has its effect first. */
-static bool look_at_clock(robot_t *r, uint64_t now_us)
+/* Take the time; whatever is over by now has its effect first. If that goes wrong, the robot comes to rest, but what
+   came is still taken: the end of a goal that were lost here would never come again. */
+static void look_at_clock(robot_t *r, uint64_t now_us)
 {
     r->now_us = now_us;
-    return !(r->is_started && now_us >= r->deadline_us) || check_time(r);
+    if (r->is_started && now_us >= r->deadline_us && !check_time(r)) {
+        fail(r, r->why);
+    }
 }

@@ -9,6 +9,7 @@ from random import Random
 import pytest
 
 from robosc.errors import UnsupportedModelError
+from robosc.execution.settings import Settings
 from robosc.expressions import Binary, BooleanType, Constant, DoubleType, Expression, Received
 from robosc.model.structure import (
     Behaviour,
@@ -26,7 +27,8 @@ from robosc.supervisor.structure import Supervisor
 from robosc.targets import GenerateOptions, generate
 from robosc.targets.c99.naming import member_name, prefix_for
 from robosc.targets.c99.text import safe, string_literal
-from support.c99 import GCC, SANITIZERS, WARNINGS, compare, compiled
+from support.c99 import GCC, SANITIZERS, WARNINGS, Reference, compare, compiled, replay
+from support.c99_main import events_back
 from support.generated import example_supervisor
 from support.models import EXAMPLE_NAMES, model_of
 from support.random_controllers import random_robot
@@ -157,6 +159,86 @@ def test_requests_of_every_kind_behave_as_the_reference(tmp_path: Path) -> None:
         assert seen[what] > 5, seen
 
 
+TWO_GOALS = """
+robot TwoGoals {
+    interface dock use Dock from some_msgs
+    interface check use Check from some_msgs
+    component P {
+        action one with request: none, response: none, feedback: none links dock
+        action two with request: none, response: none, feedback: none links dock
+        service ask with request: none, response: none links check
+        incoming message go with type: integer
+        behaviour {
+            initial marked state fine {
+                on request to one
+                on request to two
+                on request to ask
+                on request to go
+                on error from one goto broken
+                on error from ask goto broken
+            }
+            marked state broken { }
+        }
+    }
+    requirement two needs P.fine
+    requirement go needs P.fine
+    provide go with 1
+}
+"""
+
+
+@needs_gcc
+def test_goals_that_time_out_together_are_not_ended_twice(tmp_path: Path) -> None:
+    supervisor = supervisor_of_text(TWO_GOALS)
+    reference = Reference(supervisor, Random(1), Settings(action_timeout_s=2.0, release_identifiers=()))
+    executor = reference.executor
+    executor.start()
+    reference.tell("s")
+    for _ in range(2):
+        executor.tick()
+        reference.tell("t")
+    reference.clock.advance(3.0)
+    executor.watch()
+    reference.tell("w")
+    assert sum(line.startswith("goal") for line in reference.lines) == 2
+    assert executor.counters.unexpected == 0
+    cancelled = f"log event {reference.events['two.cancel']}"
+    assert cancelled in reference.lines
+    replay(compiled(supervisor, tmp_path), reference.commands, reference.lines)
+
+
+@needs_gcc
+@pytest.mark.parametrize("outcome", ["succeeded", "aborted"])
+def test_the_end_of_a_goal_is_taken_whatever_else_is_over(outcome: str, tmp_path: Path) -> None:
+    supervisor = supervisor_of_text(TWO_GOALS)
+    settings = Settings(service_timeout_s=2.0, release_identifiers=("go",))
+    reference = Reference(supervisor, Random(1), settings)
+    executor = reference.executor
+    executor.start()
+    reference.tell("s")
+    for _ in range(4):
+        executor.tick()
+        reference.tell("t")
+    number = next(number for number, name in reference.goals.items() if name == "one")
+    reference.clock.advance(2.0)
+    # The call is over its time, which makes a release due, which fails.
+    reference.let_fail("default")
+    executor.on_goal_ended(number, outcome)
+    if outcome == "succeeded":
+        reference.tell("b", events_back(reference.layout).index("one.response"), number)
+    else:
+        reference.tell("e", number)
+    assert executor.is_faulty
+    reference.let_fail()
+    executor.restart()
+    reference.tell("R")
+    for _ in range(4):
+        executor.tick()
+        reference.tell("t")
+    assert [name for number_, name in sorted(reference.goals.items())].count("one") == 2
+    replay(compiled(supervisor, tmp_path), reference.commands, reference.lines)
+
+
 @needs_gcc
 def test_random_robots_behave_as_the_reference(tmp_path: Path) -> None:
     """Robots in which silent steps are many and may not end."""
@@ -227,6 +309,30 @@ def test_names_that_are_words_of_c_work(tmp_path: Path) -> None:
     assert any(line.startswith("publish") for line in lines)
 
 
+# Beginnings of names of the library and of the generated code, names of headers, of other files, of targets of CMake.
+CLASHING = """
+    All Add Clean Double Equal Find Float Help Install Int32 Kleene M Main Math Notes Ptrdiff Robot Size State Stdbool
+    Stdint Stdio String Test Uint8 Value
+""".split()
+
+
+@needs_gcc
+def test_no_name_of_a_robot_clashes_with_anything(tmp_path: Path) -> None:
+    for robot in CLASHING:
+        files = generate(supervisor_of_text(EVERYTHING.replace("robot Everything", f"robot {robot}")), "c99")
+        assert len(files) == 5
+        folder = tmp_path / robot
+        folder.mkdir()
+        for path, text in files.items():
+            (folder / path).write_text(text, encoding="utf-8")
+        command = [str(GCC), *WARNINGS, "-I.", "-fsyntax-only", *(path for path in files if path.endswith(".c"))]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, (robot, done.stderr[:2000])
+        target = re.search(r"add_library\((\w+) ", files["CMakeLists.txt"])
+        assert target is not None
+        assert target[1].endswith("_supervisor")
+
+
 @needs_gcc
 def test_very_long_names_stay_apart(tmp_path: Path) -> None:
     long = "n" * 250
@@ -246,11 +352,15 @@ def test_very_long_names_stay_apart(tmp_path: Path) -> None:
 
 
 def test_prefixes_are_identifiers_that_c_leaves_to_programs() -> None:
-    assert prefix_for("LineFollower") == "line_follower"
-    assert prefix_for("Island") == "robot_island"
-    assert prefix_for("Sem") == "robot_sem"
-    assert prefix_for("Integer") == "robot_integer"
-    assert prefix_for("_") == "robot"
+    assert prefix_for("LineFollower") == "line_follower_supervisor"
+    assert prefix_for("line_supervisor") == "line_supervisor"
+    assert prefix_for("Supervisor") == "supervisor_supervisor"
+    assert prefix_for("Island") == "robot_island_supervisor"
+    assert prefix_for("Sem") == "robot_sem_supervisor"
+    assert prefix_for("Integer") == "robot_integer_supervisor"
+    assert prefix_for("Value") == "robot_value_supervisor"
+    assert prefix_for("_") == "robot_supervisor"
+    assert len(prefix_for("R" * 500)) < 80
     for name in ("int", "errno", "_x", "NULL", "class", "__"):
         assert re.fullmatch(r"[a-z]\w*_|[A-Z]\w*_", member_name(name)), member_name(name)
     assert member_name("x") == "x"
@@ -259,7 +369,8 @@ def test_prefixes_are_identifiers_that_c_leaves_to_programs() -> None:
 def test_texts_are_escaped() -> None:
     assert string_literal('a"\\\n?é') == '"a\\042\\134\\012\\077\\303\\251"'
     assert "*/" not in safe("*/ ??/")
-    assert "??" not in safe("*/ ??/")
+    for text in ("*/ ??/", "???/", "????", "?????/"):
+        assert "??" not in safe(text)
 
 
 @needs_gcc
@@ -283,7 +394,7 @@ def test_nothing_allocates_and_nothing_is_global(tmp_path: Path) -> None:
     kinds = {line.split()[-1]: line.split()[-2] for line in symbols.splitlines()}
     assert {name for name, kind in kinds.items() if kind == "U"} <= {"memset", "memcpy", "strcmp", "__stack_chk_fail"}
     assert not {name for name, kind in kinds.items() if kind in "bBdDC"}
-    assert all(name.startswith("navigation_") for name, kind in kinds.items() if kind == "T")
+    assert all(name.startswith("navigation_supervisor_") for name, kind in kinds.items() if kind == "T")
 
 
 def test_the_same_supervisor_gives_the_same_bytes() -> None:
@@ -295,7 +406,13 @@ def test_the_same_supervisor_gives_the_same_bytes() -> None:
 def test_every_file_says_where_it_comes_from() -> None:
     supervisor = example_supervisor("line_follower/line_follower")
     files = generate(supervisor, "c99")
-    assert set(files) == {"CMakeLists.txt", "README.md", "line_follower.c", "line_follower.h", "main.c"}
+    assert set(files) == {
+        "CMakeLists.txt",
+        "README.md",
+        "line_follower_supervisor.c",
+        "line_follower_supervisor.h",
+        "main.c",
+    }
     for path, text in files.items():
         head = text.splitlines()[:2]
         assert "Generated by RoboSC " in head[0], path
@@ -304,8 +421,8 @@ def test_every_file_says_where_it_comes_from() -> None:
 
 def test_the_prefix_may_be_chosen() -> None:
     files = generate(example_supervisor("line_follower/line_follower"), "c99", GenerateOptions("my_robot"))
-    assert "my_robot.c" in files
-    assert "my_robot_init" in files["my_robot.h"]
+    assert "my_robot_supervisor.c" in files
+    assert "my_robot_supervisor_init" in files["my_robot_supervisor.h"]
     with pytest.raises(UnsupportedModelError, match="is no name for a package"):
         generate(example_supervisor("line_follower/line_follower"), "c99", GenerateOptions("My-Robot"))
 
@@ -321,6 +438,21 @@ def test_what_is_not_done_is_refused() -> None:
     """
     with pytest.raises(UnsupportedModelError, match=r"received texts that are kept: the variable C\.v takes one"):
         generate(supervisor_of_text(text), "c99")
+
+
+@needs_gcc
+def test_texts_are_as_long_as_compilers_take_them(tmp_path: Path) -> None:
+    text = """
+        robot R { component C {
+            incoming message m with type: string
+            behaviour { variable v: string = "%s"  initial marked state s { on request to m } } }
+            provide m with "%s"
+        }
+    """
+    compiled(supervisor_of_text(text % ("x" * 4095, "é" * 2047)), tmp_path)
+    for variable, provided in (("x" * 4096, "x"), ("x", "x" * 4096), ("é" * 2048, "x")):
+        with pytest.raises(UnsupportedModelError, match="does not do texts of more than 4095 bytes"):
+            generate(supervisor_of_text(text % (variable, provided)), "c99")
 
 
 def test_an_expression_too_deep_for_c_is_one_clear_error() -> None:

@@ -179,10 +179,10 @@ class Layer(Runner):
     def _next_deadline(self, now: float) -> float:
         return min(super()._next_deadline(now), self._commands.deadline_s())
 
-    def _check_time(self, now: float) -> None:
+    def _end_what_is_over(self, now: float) -> None:
         for identifier in self._commands.silent(now):
             self._steps.release(identifier)
-        super()._check_time(now)
+        super()._end_what_is_over(now)
         # What is over ends for the caller before anything that comes at the same moment.
         self._finish()
 

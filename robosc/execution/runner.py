@@ -276,22 +276,26 @@ class Runner:
         self._update_may_request()
 
     def _look_at_clock(self) -> None:
-        """Take the time; whatever is over by now has its effect first.
-
-        Never raises: after a fault, too, what comes is handled; a goal whose end were lost would never have ended.
-        """
+        """Take the time; whatever is over by now has its effect first."""
         now = self._clock.monotonic()
         self._now_s = self._recorder.began_s = now
         if now >= self._deadline_s and self._is_started:
-            try:
-                self._check_time(now)
-            except Exception as error:
-                self._fail(describe_error(error))
+            self._check_time(now)
 
     def _next_deadline(self, now: float) -> float:
         return min(self._replies.deadline_s(), self._sensors.deadline_s(now))
 
     def _check_time(self, now: float) -> None:
+        """What is over by now has its effect.
+
+        Never raises: after a fault, too, what comes is handled; a goal whose end were lost would never have ended.
+        """
+        try:
+            self._end_what_is_over(now)
+        except Exception as error:
+            self._fail(describe_error(error))
+
+    def _end_what_is_over(self, now: float) -> None:
         """Replies that did not come in time, and stale sensors."""
         self._replies.expire(now)
         for name, identifier in self._sensors.stale(now):

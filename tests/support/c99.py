@@ -13,7 +13,6 @@ from robosc.execution.clock import ManualClock
 from robosc.execution.executor import Executor
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.protocol import DataDoesNotFit
-from robosc.execution.rest import describe_error
 from robosc.execution.runner import Status
 from robosc.execution.settings import Settings
 from robosc.expressions import (
@@ -126,16 +125,6 @@ class Reference:
         if settings.policy == "random":
             seed = settings.seed
             executor._new_policy = lambda: Splitmix(seed)  # type: ignore[method-assign]
-        look_at_clock = executor._look_at_clock
-
-        def look() -> None:
-            # What came is taken even if what was over by then brought up a fault.
-            try:
-                look_at_clock()
-            except Exception as error:
-                executor._fail(describe_error(error))
-
-        executor._look_at_clock = look  # type: ignore[method-assign]
         words: list[Any] = ["n", ("fair", "priority", "random").index(settings.policy), len(settings.priority)]
         words += [self.numbers[name] for name in settings.priority]
         words += [settings.seed, int(settings.every == "event")]

@@ -252,7 +252,7 @@ def test_watching_before_the_start_or_with_a_broken_clock_harms_nothing(monkeypa
     b.executor.watch()
     assert b.status() is Status.NEW
     b.executor.start()
-    monkeypatch.setattr(b.executor, "_check_time", None)
+    monkeypatch.setattr(b.executor, "_end_what_is_over", None)
     monkeypatch.setattr(b.executor, "_deadline_s", 0.0)
     b.executor.watch()
     assert b.executor.is_faulty

@@ -118,7 +118,9 @@ class Node:
 
 
 @pytest.mark.ros2
-def test_a_node_that_waits_for_its_servers_loses_nothing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_node_that_waits_for_its_servers_loses_nothing_and_its_stop_reaches_lost_goals(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     pytest.importorskip("rclpy", reason="ROS 2 (rclpy) is not installed")
     with warnings.catch_warnings():
         # As in support.ros2: a parser that rclpy loads uses a module that Python deprecates.
@@ -126,6 +128,7 @@ def test_a_node_that_waits_for_its_servers_loses_nothing(monkeypatch: pytest.Mon
         import rosidl_generator_py  # type: ignore[import-untyped]  # noqa: F401
     missing: list[str] = ["/ask"]
     published: list[str] = []
+    cancelled: list[str] = []
     supervisor = Supervisor(model_of(MODEL), Deployment.CONTROLLER, (), CERTIFICATE)
     with imported(generate(supervisor, "ros2"), tmp_path, "guarded_controller.node") as generated:
         callbacks: dict[str, Any] = {}
@@ -140,6 +143,9 @@ def test_a_node_that_waits_for_its_servers_loses_nothing(monkeypatch: pytest.Mon
             def subscribe(self, receive: Any) -> None:
                 callbacks.update((name, receive) for name in ("/beat", "/stop"))
 
+            def cancel_abandoned(self) -> None:
+                cancelled.append("lost goals")
+
             def publish(self, communication: str, message: Any) -> None:
                 published.append(communication)
 
@@ -152,5 +158,7 @@ def test_a_node_that_waits_for_its_servers_loses_nothing(monkeypatch: pytest.Mon
         missing.clear()
         controller._watch()
         controller._tick()
-    assert controller._executor.status.value == "running"
-    assert published == []
+        assert controller._executor.status.value == "running"
+        assert published == cancelled == []
+        controller.stop("SIGINT")
+    assert cancelled == ["lost goals"]

@@ -73,13 +73,16 @@ def report_generated(
     arguments: argparse.Namespace, made: "Made", files: "GeneratedFiles | None", bundle: Bundle
 ) -> ExitCode:
     """Write the files, print the outcome as asked and return the exit status."""
-    from robosc.targets import refusals, write_files
+    from robosc.targets import Removal, refusals, remove_earlier, write_files
 
     written: list[str] = []
     left_out: tuple[str, ...] = ()
+    removal = Removal()
     if files is not None:
         left_out = refusals(files, arguments.target)
         written = [str(path) for path in write_files(files, arguments.output, force=arguments.force)]
+        if left_out:
+            removal = remove_earlier(arguments.output, left_out)
     if arguments.json:
         print_json(
             {
@@ -89,6 +92,8 @@ def report_generated(
                 "folder": str(arguments.output),
                 "files": written,
                 "left_out": list(left_out),
+                "removed": [str(path) for path in removal.removed],
+                "kept": [str(path) for path in removal.kept],
                 **diagnostics_json(made.diagnostics),
             }
         )
@@ -98,4 +103,8 @@ def report_generated(
             sys.stdout.write(f"{path}\n")
         if left_out:
             sys.stderr.write(f"not generated: {', '.join(left_out)}; README.md says why\n")
+        for place in removal.removed:
+            sys.stderr.write(f"removed, because it was of an earlier model: {place}\n")
+        for place in removal.kept:
+            sys.stderr.write(f"not removed, because changed since generated; it is of an earlier model: {place}\n")
     return ExitCode.OK if files is not None else ExitCode.FAILED

@@ -5,7 +5,7 @@ that writes them. Same supervisor, same bytes: no time, no machine path, everyth
 """
 
 from robosc.targets.everything import ALL, generated, refusals, require_generatable
-from robosc.targets.files import GeneratedFiles, OverwriteError, write_files
+from robosc.targets.files import GeneratedFiles, OverwriteError, Removal, remove_earlier, write_files
 from robosc.targets.judgement import judged_for
 from robosc.targets.registry import (
     GenerateOptions,
@@ -22,6 +22,7 @@ __all__ = [
     "GenerateOptions",
     "GeneratedFiles",
     "OverwriteError",
+    "Removal",
     "TargetInfo",
     "UnknownTargetError",
     "available_targets",
@@ -30,6 +31,7 @@ __all__ = [
     "judged_for",
     "refusals",
     "register",
+    "remove_earlier",
     "require_generatable",
     "require_target",
     "write_files",

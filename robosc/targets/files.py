@@ -9,7 +9,8 @@ import hashlib
 import json
 import os
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from robosc.errors import RoboscError
@@ -27,6 +28,19 @@ class OverwriteError(RoboscError):
 
 class UnwritableError(OverwriteError, OSError):
     """The folder that files should go to cannot be written."""
+
+
+@dataclass(frozen=True, slots=True)
+class Removal:
+    """What became of an earlier run's files.
+
+    Attributes:
+        removed: Paths of the files that are gone, sorted.
+        kept: Paths of those that somebody changed, sorted; they are still there.
+    """
+
+    removed: tuple[Path, ...] = ()
+    kept: tuple[Path, ...] = ()
 
 
 class GeneratedFiles(Mapping[str, str]):
@@ -85,7 +99,7 @@ def write_files(files: GeneratedFiles, directory: Path, force: bool = False) -> 
 
     A file that is there is replaced if it is what an earlier run generated, or if `force` is set. One that
     already has the right content is left alone, and so are files that only an earlier run generated: several
-    packages may stand in one folder.
+    packages may stand in one folder (see `remove_earlier`).
 
     Returns:
         The path of every generated file, sorted.
@@ -101,20 +115,63 @@ def write_files(files: GeneratedFiles, directory: Path, force: bool = False) -> 
             _refuse_changed(files, directory, earlier)
         for path, text in files.items():
             _write_atomically(directory / path, text, path in files.executables)
-        _write_atomically(directory / MANIFEST, _manifest_text(files, earlier), is_executable=False)
+        _write_manifest(directory, {**earlier, **{path: _digest(text.encode("utf-8")) for path, text in files.items()}})
     except OSError as error:
-        place = error.filename or directory
-        raise UnwritableError(f"cannot write to {place}: {(error.strerror or str(error)).lower()}") from error
+        raise _unwritable(error, directory) from error
     return tuple(directory / path for path in files)
+
+
+def remove_earlier(directory: Path, folders: Iterable[str]) -> Removal:
+    """Remove what earlier runs generated in some folders below the one written to, and folders left empty by that.
+
+    Only what the manifest knows and nobody changed is removed, and nothing through a symbolic link.
+
+    Raises:
+        UnwritableError: Something cannot be removed.
+    """
+    wanted = frozenset(folders)
+    removed, kept = [], []
+    try:
+        manifest = _read_manifest(directory)
+        for path in sorted(path for path in manifest if PurePosixPath(path).parts[0] in wanted):
+            place = directory / path
+            if place.is_symlink() or _linked_folder(path, directory) is not None:
+                kept.append(place)
+            elif not place.exists():
+                del manifest[path]
+            elif place.is_file() and _digest(place.read_bytes()) == manifest[path]:
+                place.unlink()
+                del manifest[path]
+                removed.append(place)
+            else:
+                kept.append(place)
+        _remove_empty_folders(removed, directory)
+        if (directory / MANIFEST).exists():
+            _write_manifest(directory, manifest)
+    except OSError as error:
+        raise _unwritable(error, directory) from error
+    return Removal(tuple(removed), tuple(kept))
+
+
+def _remove_empty_folders(removed: Iterable[Path], directory: Path) -> None:
+    folders = {folder for place in removed for folder in place.parents if directory in folder.parents}
+    for folder in sorted(folders, key=lambda folder: len(folder.parts), reverse=True):
+        with contextlib.suppress(OSError):  # Something else is in it.
+            folder.rmdir()
+
+
+def _unwritable(error: OSError, directory: Path) -> UnwritableError:
+    place = error.filename or directory
+    return UnwritableError(f"cannot write to {place}: {(error.strerror or str(error)).lower()}")
 
 
 def _digest(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def _manifest_text(files: GeneratedFiles, earlier: Mapping[str, str]) -> str:
-    digests = {**earlier, **{path: _digest(text.encode("utf-8")) for path, text in files.items()}}
-    return json.dumps({"version": _MANIFEST_VERSION, "files": digests}, indent=2, sort_keys=True) + "\n"
+def _write_manifest(directory: Path, digests: Mapping[str, str]) -> None:
+    text = json.dumps({"version": _MANIFEST_VERSION, "files": digests}, indent=2, sort_keys=True) + "\n"
+    _write_atomically(directory / MANIFEST, text, is_executable=False)
 
 
 def _read_manifest(directory: Path) -> dict[str, str]:
@@ -149,9 +206,15 @@ def _content(place: Path) -> bytes | None:
 def _refuse_links(files: GeneratedFiles, directory: Path) -> None:
     """No folder below the target folder may be a link: it could lead anywhere."""
     for path in files:
-        for folder in list(PurePosixPath(path).parents)[:-1]:
-            if (directory / folder).is_symlink():
-                raise OverwriteError(f"{directory / folder} is a symbolic link; nothing was written")
+        folder = _linked_folder(path, directory)
+        if folder is not None:
+            raise OverwriteError(f"{folder} is a symbolic link; nothing was written")
+
+
+def _linked_folder(path: str, directory: Path) -> Path | None:
+    """A folder on the way to a file that is a link, if there is one."""
+    folders = (directory / folder for folder in list(PurePosixPath(path).parents)[:-1])
+    return next((folder for folder in folders if folder.is_symlink()), None)
 
 
 def _refuse_changed(files: GeneratedFiles, directory: Path, earlier: Mapping[str, str]) -> None:

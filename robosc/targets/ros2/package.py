@@ -34,7 +34,7 @@ _OWN_DEPENDENCIES = (
 )
 _MAXIMUM_STARTER = 100
 _DIAGNOSTICS = Interface("DiagnosticArray", "diagnostic_msgs")
-_RUNTIME_MODULES = ("clients.py", "health.py", "messages.py", "parameters.py", "scans.py")
+_RUNTIME_MODULES = ("clients.py", "early.py", "health.py", "messages.py", "parameters.py", "scans.py")
 _RELEASED_TYPES = frozenset({"Twist", "TwistStamped"})
 
 # Path of each file from a template: the template's name.

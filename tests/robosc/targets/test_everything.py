@@ -117,3 +117,27 @@ def test_the_command_tells_what_is_left_out(tmp_path: Path, capsys: pytest.Captu
     assert "not generated: cobol; README.md says why\n" in err
     assert main(["generate", str(MAZE), "--target", "all", "-o", str(tmp_path), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["left_out"] == ["cobol"]
+
+
+def test_a_target_that_refuses_now_leaves_nothing_of_an_earlier_model(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    spaces = tmp_path / "spaces.rscd"
+    spaces.write_text(SPACES, encoding="utf-8")
+    assert main(["generate", str(MAZE), "--target", "all", "-o", str(out)]) == 0
+    assert "is removed" not in (out / "README.md").read_text(encoding="utf-8")
+    (out / "ros2" / "README.md").write_text("mine", encoding="utf-8")
+    capsys.readouterr()
+    assert main(["generate", str(spaces), "--target", "all", "-o", str(out)]) == 0
+    err = capsys.readouterr().err
+    assert [path for path in (out / "ros2").rglob("*") if path.is_file()] == [out / "ros2" / "README.md"]
+    assert f"removed, because it was of an earlier model: {out / 'ros2' / 'package.xml'}\n" in err
+    assert (
+        f"not removed, because changed since generated; it is of an earlier model: {out / 'ros2' / 'README.md'}" in err
+    )
+    assert "now is removed" in (out / "README.md").read_text(encoding="utf-8")
+    assert (out / "python").is_dir()
+    assert main(["generate", str(spaces), "--target", "all", "-o", str(out), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert (document["removed"], document["kept"]) == ([], [str(out / "ros2" / "README.md")])

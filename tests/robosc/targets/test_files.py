@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from robosc.targets import GeneratedFiles, OverwriteError, write_files
+from robosc.targets import GeneratedFiles, OverwriteError, Removal, remove_earlier, write_files
 from robosc.targets.files import MANIFEST
 
 
@@ -142,3 +142,40 @@ def test_a_failed_write_leaves_no_temporary_file(tmp_path: Path, monkeypatch: py
     with pytest.raises(OverwriteError, match="no space left"):
         write_files(GeneratedFiles({"a": "1"}), tmp_path)
     assert not list(tmp_path.iterdir())
+
+
+def test_what_an_earlier_run_generated_in_a_folder_is_removed(tmp_path: Path) -> None:
+    write_files(GeneratedFiles({"a": "1", "one/a": "1", "one/deep/b": "2", "one/c": "3", "two/a": "1"}), tmp_path)
+    (tmp_path / "one/c").unlink()
+    assert remove_earlier(tmp_path, ["one", "three"]) == Removal((tmp_path / "one/a", tmp_path / "one/deep/b"))
+    assert contents(tmp_path) == {"a": "1", "two/a": "1"}
+    assert not (tmp_path / "one").exists()
+    assert remove_earlier(tmp_path, ["one"]) == Removal()
+    (tmp_path / "one").mkdir()
+    (tmp_path / "one/a").write_text("1")
+    assert remove_earlier(tmp_path, ["one"]) == Removal()
+
+
+def test_what_is_the_users_is_not_removed(tmp_path: Path) -> None:
+    out, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
+    write_files(GeneratedFiles({"one/a": "1", "one/b": "2", "one/l": "3", "two/a": "1"}), out)
+    (out / "one/b").write_text("mine")
+    (out / "one/new").write_text("mine")
+    (out / "one/l").rename(tmp_path / "target")
+    (out / "one/l").symlink_to(tmp_path / "target")
+    (out / "two").rename(elsewhere)
+    (out / "two").symlink_to(elsewhere)
+    removal = remove_earlier(out, ["one", "two"])
+    assert removal == Removal((out / "one/a",), (out / "one/b", out / "one/l", out / "two/a"))
+    assert (out / "one/b").read_text() == (out / "one/new").read_text() == "mine"
+    assert (out / "one/l").read_text() == "3"
+    assert (elsewhere / "a").read_text() == "1"
+    with pytest.raises(OverwriteError, match="one/b"):
+        write_files(GeneratedFiles({"one/a": "1", "one/b": "4"}), out)
+
+
+def test_without_a_manifest_nothing_is_removed(tmp_path: Path) -> None:
+    (tmp_path / "one").mkdir()
+    (tmp_path / "one/a").write_text("1")
+    assert remove_earlier(tmp_path, ["one"]) == Removal()
+    assert not (tmp_path / MANIFEST).exists()

@@ -254,6 +254,8 @@ def test_failures_in_the_client_are_losses() -> None:
     handle = world.accepted(2)
     handle.result_future.done(exception=ValueError("no"))
     assert world.told() == [("on_goal_ended", 2, "lost", None)]
+    world.pass_time(0.1)
+    assert len(handle.cancel_futures) == 1
 
 
 def test_a_goal_that_is_accepted_after_its_loss_is_cancelled() -> None:
@@ -265,6 +267,82 @@ def test_a_goal_that_is_accepted_after_its_loss_is_cancelled() -> None:
     handle = Handle()
     world.client.futures[0].done(handle)
     assert len(handle.cancel_futures) == 1
+    assert world.told() == []
+
+
+@pytest.mark.parametrize("late", ["error", "rejection"])
+def test_no_goal_ends_twice(late: str) -> None:
+    world = World()
+    world.goals.send(1, None)
+    world.client.is_there = False
+    world.pass_time(LOST_S + 0.1)
+    assert world.told() == [("on_goal_ended", 1, "lost", None)]
+    if late == "error":
+        world.client.futures[0].done(exception=ValueError("no"))
+    else:
+        world.client.futures[0].done(Handle(accepted=False))
+    assert world.told() == []
+    assert not world.goals.has_abandoned
+
+
+def lost(world: World) -> Handle:
+    """An accepted goal that was told to be lost."""
+    handle = world.accepted()
+    world.client.is_there = False
+    world.pass_time(LOST_S + 0.1)
+    assert world.told() == [("on_goal_ended", 1, "lost", None)]
+    assert handle.cancel_futures == []
+    assert world.goals.has_abandoned
+    return handle
+
+
+def test_a_lost_goal_is_cancelled_when_its_server_is_back() -> None:
+    world = World()
+    handle = lost(world)
+    world.client.is_there = True
+    world.pass_time(1.0)
+    assert len(handle.cancel_futures) == 1
+    handle.cancel_futures[0].done(answer(NONE, "the goal"))
+    assert not world.goals.has_abandoned
+    world.client.feedback(SimpleNamespace(feedback="near"))
+    handle.result_future.done(SimpleNamespace(status=CANCELED, result=None))
+    assert world.told() == []
+
+
+def test_the_cancel_of_a_lost_goal_is_asked_for_again_if_it_got_no_answer() -> None:
+    world = World()
+    handle = lost(world)
+    for count in (1, 2):
+        world.client.is_there = True
+        world.pass_time(0.5)
+        assert len(handle.cancel_futures) == count
+        world.client.is_there = False
+        world.pass_time(0.5)
+    handle.cancel_futures[1].done(exception=ValueError("no"))
+    assert world.goals.has_abandoned
+    world.client.is_there = True
+    world.pass_time(0.5)
+    assert len(handle.cancel_futures) == 3
+
+
+def test_a_stop_cancels_a_lost_goal_although_its_server_is_not_seen() -> None:
+    world = World()
+    handle = lost(world)
+    world.goals.cancel_abandoned()
+    assert len(handle.cancel_futures) == 1
+    handle.cancel_futures[0].done(answer(REJECTED))
+    assert not world.goals.has_abandoned
+    assert world.told() == []
+
+
+def test_a_lost_goal_that_ends_is_not_cancelled() -> None:
+    world = World()
+    handle = lost(world)
+    handle.result_future.done(SimpleNamespace(status=SUCCEEDED, result="there"))
+    assert not world.goals.has_abandoned
+    world.client.is_there = True
+    world.pass_time(1.0)
+    assert handle.cancel_futures == []
     assert world.told() == []
 
 
@@ -301,7 +379,7 @@ def test_a_refused_cancel_of_a_running_goal_is_told_when_no_result_follows(code:
     assert world.told() == []
 
 
-@pytest.mark.parametrize("code", [NONE, REJECTED])
+@pytest.mark.parametrize("code", [NONE, REJECTED, UNKNOWN_GOAL])
 def test_a_refused_cancel_of_a_goal_that_ends_at_that_moment_means_nothing(code: int) -> None:
     world = World()
     handle = world.accepted()
@@ -312,12 +390,17 @@ def test_a_refused_cancel_of_a_goal_that_ends_at_that_moment_means_nothing(code:
     assert world.told() == [("on_goal_ended", 1, "succeeded", "there")]
 
 
-def test_a_goal_that_its_server_does_not_know_is_lost() -> None:
+def test_a_goal_that_its_server_does_not_know_is_lost_when_no_result_follows() -> None:
     world = World()
     handle = world.accepted()
     world.goals.cancel(1)
     handle.cancel_futures[0].done(answer(UNKNOWN_GOAL))
+    world.pass_time(0.8 * REFUSAL_S)
+    assert world.told() == []
+    world.pass_time(REFUSAL_S)
     assert world.told() == [("on_goal_ended", 1, "lost", None)]
+    world.pass_time(2 * REFUSAL_S)
+    assert world.told() == []
 
 
 def test_cancels_and_their_answers_after_the_end_mean_nothing() -> None:

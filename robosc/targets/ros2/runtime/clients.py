@@ -151,13 +151,30 @@ class _Goal:
     Attributes:
         handle: What rclpy calls it by, once it was accepted.
         refused_s: When its cancel was refused although it may be running, or None.
+        is_unknown: Whether the refusal said that the server does not know it.
     """
 
-    __slots__ = ("handle", "refused_s")
+    __slots__ = ("handle", "is_unknown", "refused_s")
 
     def __init__(self) -> None:
         self.handle: Any = None
         self.refused_s: float | None = None
+        self.is_unknown = False
+
+
+class _Abandoned:
+    """A goal that was told to be lost although it may be running.
+
+    Attributes:
+        handle: What rclpy calls it by.
+        is_asked: Whether its cancel was asked for since its server was seen.
+    """
+
+    __slots__ = ("handle", "is_asked")
+
+    def __init__(self, handle: Any) -> None:
+        self.handle = handle
+        self.is_asked = False
 
 
 class ActionGoals:
@@ -177,6 +194,7 @@ class ActionGoals:
         self._monotonic = monotonic
         self._presence = _Presence(client.server_is_ready)
         self._goals: dict[int, _Goal] = {}
+        self._abandoned: dict[int, _Abandoned] = {}
 
     def is_ready(self) -> bool:
         """Whether there is a server."""
@@ -200,19 +218,63 @@ class ActionGoals:
             future.add_done_callback(lambda done: self._cancel_answered(goal_id, done))
 
     def check(self, now_s: float) -> None:
-        """Notice a lost server, and refused cancels of goals that do not end."""
+        """Notice a lost server, one that is back, and refused cancels of goals that do not end."""
         if not self._goals:
             self._presence.forget()
         elif self._presence.is_lost(now_s):
             for goal_id in list(self._goals):
-                self._end(goal_id, "lost")
-        for goal_id, goal in self._goals.items():
+                self._abandon(goal_id)
+        if self._abandoned:
+            self._look_for_server()
+        for goal_id, goal in list(self._goals.items()):
             if goal.refused_s is not None and now_s >= goal.refused_s + REFUSAL_S:
                 goal.refused_s = None
-                self._refuse(goal_id, is_ended=False)
+                if goal.is_unknown:
+                    self._end(goal_id, "lost")
+                else:
+                    self._refuse(goal_id, is_ended=False)
+
+    @property
+    def has_abandoned(self) -> bool:
+        """Whether a goal that was told to be lost may be running."""
+        return bool(self._abandoned)
+
+    def cancel_abandoned(self) -> None:
+        """Ask for the cancel of every goal that was told to be lost: its server may be there and only be unseen."""
+        for goal_id in list(self._abandoned):
+            self._cancel_abandoned(goal_id)
+
+    def _abandon(self, goal_id: int) -> None:
+        """Tell that a goal is lost; if it was accepted, it may be running, and it is not forgotten."""
+        handle = self._goals[goal_id].handle
+        if handle is not None:
+            self._abandoned[goal_id] = _Abandoned(handle)
+        self._end(goal_id, "lost")
+
+    def _look_for_server(self) -> None:
+        """Cancel lost goals as soon as their server is seen: nobody else would ever stop them."""
+        is_there = self.is_ready()
+        for goal_id, abandoned in list(self._abandoned.items()):
+            if not is_there:
+                abandoned.is_asked = False
+            elif not abandoned.is_asked:
+                self._cancel_abandoned(goal_id)
+
+    def _cancel_abandoned(self, goal_id: int) -> None:
+        abandoned = self._abandoned[goal_id]
+        abandoned.is_asked = True
+        future = abandoned.handle.cancel_goal_async()
+        future.add_done_callback(lambda done: self._abandoned_answered(goal_id, done))
+
+    def _abandoned_answered(self, goal_id: int, future: Any) -> None:
+        # Whatever the server says, it has heard; a client's failure is tried again when the server is seen anew.
+        if future.exception() is None:
+            self._abandoned.pop(goal_id, None)
 
     def _feedback(self, goal_id: int) -> Callable[[Any], None]:
         def receive(message: Any) -> None:
+            if goal_id not in self._goals:
+                return  # It was told to be lost.
             data = message.feedback
             self._reports.add(lambda executor: executor.on_feedback(goal_id, data))
 
@@ -220,27 +282,35 @@ class ActionGoals:
 
     def _answered(self, goal_id: int, future: Any) -> None:
         """The server accepted or rejected a goal."""
+        goal = self._goals.get(goal_id)
         if future.exception() is not None:
-            self._end(goal_id, "lost")
+            if goal is not None:
+                self._end(goal_id, "lost")
             return
         handle = future.result()
         if not handle.accepted:
             # rclpy keeps the callback of a rejected goal for ever.
             getattr(self._client, "_feedback_callbacks", {}).pop(bytes(handle.goal_id.uuid), None)
-            self._end(goal_id, "rejected")
+            if goal is not None:
+                self._end(goal_id, "rejected")
             return
-        goal = self._goals.get(goal_id)
         if goal is None:
             # Its server counted as lost: nobody would ever stop this one.
-            handle.cancel_goal_async()
+            self._abandoned[goal_id] = _Abandoned(handle)
+            self._cancel_abandoned(goal_id)
             return
         goal.handle = handle
         self._reports.add(lambda executor: executor.on_goal_accepted(goal_id))
         handle.get_result_async().add_done_callback(lambda done: self._result_came(goal_id, done))
 
     def _result_came(self, goal_id: int, future: Any) -> None:
+        if goal_id not in self._goals:
+            # It was told to be lost; now it has really ended, unless the client failed.
+            if future.exception() is None:
+                self._abandoned.pop(goal_id, None)
+            return
         if future.exception() is not None:
-            self._end(goal_id, "lost")
+            self._abandon(goal_id)
             return
         answer = future.result()
         # Any other status means that the server does not know the goal: it was started anew.
@@ -255,11 +325,11 @@ class ActionGoals:
             return
         if answer.return_code == _GOAL_TERMINATED:
             self._refuse(goal_id, is_ended=True)
-        elif answer.return_code == _UNKNOWN_GOAL:
-            self._end(goal_id, "lost")
         else:
-            # The server may say so because the goal has just ended.
-            self._goals[goal_id].refused_s = self._monotonic()
+            # The server may say so because the goal has just ended: its result may be on its way.
+            goal = self._goals[goal_id]
+            goal.refused_s = self._monotonic()
+            goal.is_unknown = answer.return_code == _UNKNOWN_GOAL
 
     def _refuse(self, goal_id: int, is_ended: bool) -> None:
         self._reports.add(lambda executor: executor.on_cancel_refused(goal_id, is_ended))

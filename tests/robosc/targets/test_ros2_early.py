@@ -1,0 +1,164 @@
+"""What comes while a node waits for its servers: held, and taken in before the first decision."""
+
+import warnings
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from robosc.execution.clock import ManualClock
+from robosc.execution.runner import Status
+from robosc.execution.settings import Settings
+from robosc.model.structure import Deployment
+from robosc.supervisor.structure import Supervisor
+from robosc.targets import generate
+from robosc.targets.ros2.runtime.early import HeldMessages, LateExecutor
+from support.execution import RecordingMiddleware, system_of
+from support.generated import imported
+from support.models import model_of
+from support.random_supervisors import CERTIFICATE
+
+MODEL = """
+robot Guarded {
+    interface trigger use Trigger from std_srvs
+    component Drive {
+        incoming message go with identifier: "/go", type: none
+        outgoing message beat with identifier: "/beat", type: none
+        outgoing message stop with identifier: "/stop", type: none
+        service ask with identifier: "/ask", request: none, response: none links trigger
+        behaviour {
+            on response from stop goto stopped
+            initial marked state fine { on request to go on request to ask }
+            marked state stopped { }
+        }
+    }
+}
+"""
+
+
+def executor_of(clock: ManualClock, **settings: Any) -> tuple[LateExecutor, RecordingMiddleware]:
+    middleware = RecordingMiddleware()
+    return LateExecutor(system_of(MODEL), middleware, Settings(**settings), clock), middleware
+
+
+def test_of_each_topic_the_last_messages_are_held_in_order() -> None:
+    held = HeldMessages({"/a": 2, "/b": 1})
+    for number, identifier in enumerate(("/a", "/b", "/a", "/b", "/a")):
+        held.hold(identifier, f"message {number}", float(number))
+    assert held.take() == [("/a", "message 2", 2.0), ("/b", "message 3", 3.0), ("/a", "message 4", 4.0)]
+    assert held.take() == []
+
+
+@pytest.mark.parametrize("every", ["period", "event"])
+def test_a_stop_that_came_early_comes_before_every_decision(every: str) -> None:
+    clock = ManualClock()
+    executor, middleware = executor_of(clock, every=every)
+    executor.start_with([("/beat", None, clock.monotonic()), ("/stop", None, clock.monotonic())])
+    executor.tick()
+    assert executor.status is Status.RUNNING
+    assert middleware.sent == []
+
+
+def test_after_the_start_each_event_brings_a_decision_as_before() -> None:
+    clock = ManualClock()
+    executor, middleware = executor_of(clock, every="event")
+    executor.start_with([("/beat", None, clock.monotonic())])
+    assert middleware.sent == []
+    executor.receive("/beat", None)
+    assert [sent[:2] for sent in middleware.sent] == [("publish", "go")]
+
+
+def test_the_age_of_what_came_early_counts_from_when_it_came() -> None:
+    clock = ManualClock()
+    executor, _ = executor_of(clock, max_age_s={"/beat": 1.0})
+    came_s = clock.monotonic()
+    clock.advance(0.7)
+    executor.start_with([("/beat", None, came_s)])
+    assert executor.status is Status.RUNNING
+    clock.advance(0.4)
+    executor.watch()
+    assert executor.reasons == ("beat on /beat is stale",)
+
+
+def test_what_is_too_old_at_the_start_is_stale_until_it_is_back() -> None:
+    clock = ManualClock()
+    executor, middleware = executor_of(clock, max_age_s={"/beat": 1.0})
+    came_s = clock.monotonic()
+    clock.advance(3.0)
+    executor.start_with([("/beat", None, came_s)])
+    assert executor.reasons == ("beat on /beat is stale",)
+    executor.tick()
+    assert not [sent for sent in middleware.sent if sent[0] == "publish"]
+    executor.receive("/beat", None)
+    assert executor.status is Status.RUNNING
+
+
+class Node:
+    """A node that makes nothing."""
+
+    def __init__(self) -> None:
+        self._values: dict[str, Any] = {}
+        self._parameter_overrides: dict[str, Any] = {}
+
+    def __getattr__(self, name: str) -> Any:
+        return lambda *arguments, **named: SimpleNamespace(publish=lambda message: None, warning=lambda text: None)
+
+    def has_parameter(self, name: str) -> bool:
+        return name in self._values
+
+    def declare_parameter(self, name: str, default: Any, descriptor: Any) -> None:
+        self._values[name] = default
+
+    def get_parameter(self, name: str) -> Any:
+        return SimpleNamespace(value=self._values[name])
+
+    def get_fully_qualified_name(self) -> str:
+        return "/node"
+
+
+@pytest.mark.ros2
+def test_a_node_that_waits_for_its_servers_loses_nothing_and_its_stop_reaches_lost_goals(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    pytest.importorskip("rclpy", reason="ROS 2 (rclpy) is not installed")
+    with warnings.catch_warnings():
+        # As in support.ros2: a parser that rclpy loads uses a module that Python deprecates.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        import rosidl_generator_py  # type: ignore[import-untyped]  # noqa: F401
+    missing: list[str] = ["/ask"]
+    published: list[str] = []
+    cancelled: list[str] = []
+    supervisor = Supervisor(model_of(MODEL), Deployment.CONTROLLER, (), CERTIFICATE)
+    with imported(generate(supervisor, "ros2"), tmp_path, "guarded_controller.node") as generated:
+        callbacks: dict[str, Any] = {}
+
+        class Middleware(generated.Middleware):  # type: ignore[misc, name-defined]
+            def _connect(self, *arguments: Any) -> None:
+                pass
+
+            def missing_servers(self) -> tuple[str, ...]:
+                return tuple(missing)
+
+            def subscribe(self, receive: Any) -> None:
+                callbacks.update((name, receive) for name in ("/beat", "/stop"))
+
+            def cancel_abandoned(self) -> None:
+                cancelled.append("lost goals")
+
+            def publish(self, communication: str, message: Any) -> None:
+                published.append(communication)
+
+        monkeypatch.setattr(generated, "Middleware", Middleware)
+        monkeypatch.setattr(generated, "Diagnostics", lambda node: SimpleNamespace(publish=lambda health: None))
+        controller = generated.Controller(Node())
+        controller.start()
+        callbacks["/stop"]("/stop", None)
+        controller._tick()
+        missing.clear()
+        controller._watch()
+        controller._tick()
+        assert controller._executor.status.value == "running"
+        assert published == cancelled == []
+        controller.stop("SIGINT")
+    assert cancelled == ["lost goals"]

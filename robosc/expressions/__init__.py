@@ -30,6 +30,7 @@ from robosc.expressions.tree import (
     conjunction,
     conjuncts,
     leaves,
+    simple_parts,
 )
 from robosc.expressions.types import (
     MAXIMUM_INTEGER,
@@ -97,5 +98,6 @@ __all__ = [
     "is_finite",
     "is_numeric",
     "leaves",
+    "simple_parts",
     "type_text",
 ]

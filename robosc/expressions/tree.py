@@ -206,3 +206,17 @@ def leaves(expression: Expression) -> tuple[Expression, ...]:
         else:
             result.append(node)
     return tuple(result)
+
+
+def simple_parts(condition: Expression) -> tuple[Expression, ...]:
+    """What logical operators join in a condition, and they themselves do not, left to right."""
+    stack, result = [condition], []
+    while stack:
+        match stack.pop():
+            case Binary(operator="and" | "or" | "implies", left=left, right=right):
+                stack += [right, left]
+            case Unary(operator="not" | "holds", operand=operand):
+                stack.append(operand)
+            case part:
+                result.append(part)
+    return tuple(result)

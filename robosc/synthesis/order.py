@@ -7,12 +7,20 @@ application of multi-level logic synthesis", EDAC 1991, pp. 50-54), judged by th
 """
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import permutations
 
 from robosc.automata.state import Subject
 from robosc.automata.structure import System
-from robosc.expressions import Binary, Expression, PathStep, Received, StateTest, Unary, VariableRead, leaves
+from robosc.expressions import (
+    Expression,
+    PathStep,
+    Received,
+    StateTest,
+    VariableRead,
+    leaves,
+    simple_parts,
+)
 
 _WINDOW = 4
 """Neighbours that are permuted together: 24 ways."""
@@ -51,22 +59,9 @@ def hyperedges(system: System) -> tuple[frozenset[Subject], ...]:
     for condition in (*(item.condition for item in system.conditions), *system.invariants):
         found[frozenset(_read(condition))] = None
         # What is compared belongs closer together than what a long condition merely lists.
-        for part in _parts(condition):
+        for part in simple_parts(condition):
             found[frozenset(_read(part))] = None
     return tuple(edge for edge in found if len(edge) > 1)
-
-
-def _parts(condition: Expression) -> Iterator[Expression]:
-    """What logical operators join, and they themselves do not."""
-    stack = [condition]
-    while stack:
-        match stack.pop():
-            case Binary(operator="and" | "or" | "implies", left=left, right=right):
-                stack += [right, left]
-            case Unary(operator="not" | "holds", operand=operand):
-                stack.append(operand)
-            case part:
-                yield part
 
 
 def _read(expression: Expression) -> set[Subject]:

@@ -1,5 +1,7 @@
 """What every generator asks of a model's events: their order, who causes them, how they move a plant."""
 
+from collections.abc import Iterable
+
 from robosc.model.structure import (
     CONTROLLABLE_KINDS,
     Behaviour,
@@ -51,3 +53,22 @@ def taken_transition(behaviour: Behaviour, event: str, state: str) -> Transition
     fitting = [item for item in behaviour.transitions if item.event == event and item.source in (state, None)]
     own = [item for item in fitting if item.source is not None]
     return next(iter([*own, *fitting]), None)
+
+
+Branch = tuple[tuple[str, ...], Transition]
+"""States, and the transition that is taken in them."""
+
+
+def branches_of(behaviours: Iterable[tuple[str, Behaviour]], event: str) -> list[tuple[str, Behaviour, list[Branch]]]:
+    """Which transition each component takes, by state; components that take none are left out."""
+    found = []
+    for component, behaviour in behaviours:
+        by_transition: dict[int, list[str]] = {}
+        for state in behaviour.states:
+            transition = taken_transition(behaviour, event, state.name)
+            if transition is not None:
+                by_transition.setdefault(behaviour.transitions.index(transition), []).append(state.name)
+        if by_transition:
+            taken = [(tuple(states), behaviour.transitions[index]) for index, states in by_transition.items()]
+            found.append((component, behaviour, taken))
+    return found

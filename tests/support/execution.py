@@ -174,3 +174,17 @@ class Bench(Observed):
 def bench(text: str, **settings: Any) -> Bench:
     """A started executor of a model's text."""
     return Bench(system_of(text), **settings)
+
+
+class Broken:
+    """A system of which one method raises, once it is broken."""
+
+    def __init__(self, system: Any, method: str) -> None:
+        self._system = system
+        self._method = method
+        self.is_broken = False
+
+    def __getattr__(self, name: str) -> Any:
+        if self.is_broken and name == self._method:
+            raise RuntimeError(f"{name} broke")
+        return getattr(self._system, name)

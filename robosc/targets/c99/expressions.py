@@ -36,6 +36,7 @@ from robosc.expressions import (
     VariableRead,
 )
 from robosc.expressions.bounds import call_bounds
+from robosc.targets.arithmetic import arithmetic_bounds, is_safe_divisor
 from robosc.targets.c99.text import string_literal
 
 
@@ -123,7 +124,6 @@ class Scope:
     quantifier: Callable[[Quantifier], Code]
 
 
-_LEAST_NATIVE_DIVISOR = 1e-6
 _NATIVE = {"=": "==", "!=": "!=", "<": "<", "<=": "<=", ">": ">", ">=": ">="}
 _OPPOSITE = {"=": "!=", "!=": "=", "<": ">=", "<=": ">", ">": "<=", ">=": "<"}
 
@@ -382,35 +382,15 @@ def _arithmetic(operator: str, left: Code, right: Code, divisor: Expression) -> 
     is_known = not left.may_be_unknown and not right.may_be_unknown
     name = {"+": "add", "-": "subtract", "*": "multiply", "/": "divide"}[operator]
     if is_integer:
-        low, high = _interval(operator, left, right)
+        low, high = arithmetic_bounds(operator, (left.low, left.high), (right.low, right.high))
         if is_known and low >= MINIMUM_INTEGER and high <= MAXIMUM_INTEGER:
             return Code(f"{left.atom} {operator} {right.atom}", Sort.INTEGER, False, False, "", low, high)
         return _call(f"{name}_i", left, right, sort=Sort.INTEGER)
-    is_native = is_known and operator == "/" and left.sort is Sort.INTEGER and _is_safe_divisor(divisor)
+    is_native = is_known and operator == "/" and left.sort is Sort.INTEGER and is_safe_divisor(divisor)
     left, right = as_double(left), as_double(right)
     if is_native:
         return Code(f"{left.atom} / {right.atom}", Sort.DOUBLE, is_atom=False)
     return _call(f"{name}_d", left, right, sort=Sort.DOUBLE)
-
-
-def _is_safe_divisor(divisor: Expression) -> bool:
-    match divisor:
-        case Constant(value=int() | float() as constant):
-            return abs(constant) >= _LEAST_NATIVE_DIVISOR
-        case _:
-            return False
-
-
-def _interval(operator: str, left: Code, right: Code) -> tuple[int, int]:
-    """Least and greatest result of integer arithmetic."""
-    match operator:
-        case "+":
-            return left.low + right.low, left.high + right.high
-        case "-":
-            return left.low - right.high, left.high - right.low
-        case _:
-            products = [a * b for a in (left.low, left.high) for b in (right.low, right.high)]
-            return min(products), max(products)
 
 
 def _compare(operator: str, left: Code, right: Code) -> Code:

@@ -24,12 +24,9 @@ from robosc.targets.c99.naming import Namer
 from robosc.targets.c99.received import Reader
 from robosc.targets.c99.text import comment
 from robosc.targets.c99.unit import Reading, Unit, declared, low_text
-from robosc.targets.events import has_plant_location, is_controllable, plant_step, split, taken_transition
+from robosc.targets.events import Branch, branches_of, has_plant_location, is_controllable, plant_step, split
 from robosc.targets.paths import path_type
 from robosc.targets.python.text import indent
-
-_Branch = tuple[tuple[str, ...], Transition]
-"""States and the transition taken in them."""
 
 
 class Stepper:
@@ -67,7 +64,7 @@ class Stepper:
         """The function that takes the event: how many updates were skipped, or REFUSED."""
         parameters = self.parameters
         body = [*self._refusals(), *self._plant()]
-        for component, behaviour, branches in self._blocks():
+        for component, behaviour, branches in branches_of(self.unit.layout.behaviours, self.event):
             body += self._block(component, behaviour, branches)
         text = "\n".join(body)
         head = ", ".join(["state_t *s", *parameters])
@@ -163,21 +160,7 @@ class Stepper:
         layout = self.unit.layout
         return f"s->{layout.locations[automaton]} = {layout.location_names[automaton, target]};"
 
-    def _blocks(self) -> list[tuple[str, Behaviour, list[_Branch]]]:
-        """Which transition each component takes, by state."""
-        blocks = []
-        for component, behaviour in self.unit.layout.behaviours:
-            by_transition: dict[int, list[str]] = {}
-            for state in behaviour.states:
-                transition = taken_transition(behaviour, self.event, state.name)
-                if transition is not None:
-                    by_transition.setdefault(behaviour.transitions.index(transition), []).append(state.name)
-            branches = [(tuple(states), behaviour.transitions[index]) for index, states in by_transition.items()]
-            if branches:
-                blocks.append((component, behaviour, branches))
-        return blocks
-
-    def _block(self, component: str, behaviour: Behaviour, branches: list[_Branch]) -> list[str]:
+    def _block(self, component: str, behaviour: Behaviour, branches: list[Branch]) -> list[str]:
         """What one component does."""
         lines: list[str] = []
         for states, transition in branches:

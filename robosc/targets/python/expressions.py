@@ -40,6 +40,7 @@ from robosc.expressions import (
     VariableRead,
 )
 from robosc.expressions.bounds import call_bounds
+from robosc.targets.arithmetic import arithmetic_bounds, is_safe_divisor
 
 
 class Precedence(Enum):
@@ -142,8 +143,6 @@ _KLEENE = {
 }
 _NATIVE = {"=": "==", "!=": "!=", "<": "<", "<=": "<=", ">": ">", ">=": ">="}
 _OPPOSITE = {"=": "!=", "!=": "=", "<": ">=", "<=": ">", ">": "<=", ">=": "<"}
-_LEAST_NATIVE_DIVISOR = 1e-6
-"""A 32-bit integer divided by something this large or larger stays finite."""
 
 TRUE_CODE = Code("True")
 FALSE_CODE = Code("False")
@@ -407,32 +406,12 @@ def _arithmetic(operator: str, left: Code, right: Code, divisor: Expression, sco
     text = f"{left.within(product)} {operator} {right.within(tighter)}"
     if Unknown.NONE not in (left.unknown, right.unknown):
         if is_integer:
-            low, high = _interval(operator, left, right)
+            low, high = arithmetic_bounds(operator, (left.low, left.high), (right.low, right.high))
             if low >= MINIMUM_INTEGER and high <= MAXIMUM_INTEGER:
                 return Code(text, product, sort, unknown, low, high)
-        if operator == "/" and left.sort is Sort.INTEGER and _is_safe_divisor(divisor):
+        if operator == "/" and left.sort is Sort.INTEGER and is_safe_divisor(divisor):
             return Code(text, product, sort, unknown)
     return _call(_KLEENE[operator], left, right, sort=sort, scope=scope)
-
-
-def _is_safe_divisor(divisor: Expression) -> bool:
-    match divisor:
-        case Constant(value=int() | float() as constant):
-            return abs(constant) >= _LEAST_NATIVE_DIVISOR
-        case _:
-            return False
-
-
-def _interval(operator: str, left: Code, right: Code) -> tuple[int, int]:
-    """Least and greatest result of integer arithmetic."""
-    match operator:
-        case "+":
-            return left.low + right.low, left.high + right.high
-        case "-":
-            return left.low - right.high, left.high - right.low
-        case _:
-            products = [a * b for a in (left.low, left.high) for b in (right.low, right.high)]
-            return min(products), max(products)
 
 
 def _compare(operator: str, left: Code, right: Code) -> Code:

@@ -23,7 +23,7 @@ from robosc.expressions import (
 from robosc.expressions.text import expression_text
 from robosc.model.received import Path, converted_paths
 from robosc.model.structure import Behaviour, EventKind, Transition, Update, Variable, is_tau
-from robosc.targets.events import has_plant_location, is_controllable, plant_step, split, taken_transition
+from robosc.targets.events import Branch, branches_of, has_plant_location, is_controllable, plant_step, split
 from robosc.targets.paths import path_text, path_type
 from robosc.targets.python.allow import accepted
 from robosc.targets.python.expressions import TRUE_CODE, Code, Scope, Sort, Unknown, code_for, negated, value
@@ -32,7 +32,6 @@ from robosc.targets.python.received import Reader, received_unknown
 from robosc.targets.python.text import comment, docstring, indent
 from robosc.targets.python.writer import Writer
 
-_Branch = tuple[tuple[str, ...], Transition]
 """States (all of a behaviour's: no test is needed) and the transition taken in them."""
 
 
@@ -90,7 +89,7 @@ class _StepWriter:
     def method(self) -> list[str]:
         """The whole method."""
         self._name_received()
-        blocks = self._blocks()
+        blocks = branches_of(self.writer.layout.behaviours, self.event)
         self._copy_what_is_overwritten(blocks)
         body = [
             line for component, behaviour, branches in blocks for line in self._block(component, behaviour, branches)
@@ -136,21 +135,7 @@ class _StepWriter:
         location, _, target = self._protocol
         return [f"{location} = {target!r}"]
 
-    def _blocks(self) -> list[tuple[str, Behaviour, list[_Branch]]]:
-        """Which transition each component takes, by state."""
-        blocks = []
-        for component, behaviour in self.writer.layout.behaviours:
-            by_transition: dict[int, list[str]] = {}
-            for state in behaviour.states:
-                transition = taken_transition(behaviour, self.event, state.name)
-                if transition is not None:
-                    by_transition.setdefault(behaviour.transitions.index(transition), []).append(state.name)
-            branches = [(tuple(states), behaviour.transitions[index]) for index, states in by_transition.items()]
-            if branches:
-                blocks.append((component, behaviour, branches))
-        return blocks
-
-    def _copy_what_is_overwritten(self, blocks: list[tuple[str, Behaviour, list[_Branch]]]) -> None:
+    def _copy_what_is_overwritten(self, blocks: list[tuple[str, Behaviour, list[Branch]]]) -> None:
         """Find attributes that are read after a place that may write them; a superset is fine."""
         written: set[str] = set()
         overwritten: dict[str, None] = {}
@@ -197,7 +182,7 @@ class _StepWriter:
     def _type_below(self, type_: Type, path: Path) -> Type:
         return path_type(self.writer.model, type_, path)
 
-    def _block(self, component: str, behaviour: Behaviour, branches: list[_Branch]) -> list[str]:
+    def _block(self, component: str, behaviour: Behaviour, branches: list[Branch]) -> list[str]:
         """What one component does."""
         lines: list[str] = []
         location = self.writer.scope.location(component)

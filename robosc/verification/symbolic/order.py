@@ -11,7 +11,7 @@ from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence, Set
 from robosc.automata.compile import Path, paths_read, subjects_read
 from robosc.automata.state import Subject, subjects
 from robosc.automata.structure import System
-from robosc.expressions import Binary, Expression, Unary
+from robosc.expressions import Expression, simple_parts
 
 WIDE = 5
 """Digits from which an integer is wide."""
@@ -108,24 +108,11 @@ def _computed(system: System) -> Iterator[tuple[Expression, str, Subject | None]
     """Every simple condition and every update, with its event and the variable that it writes."""
     for automaton in system.automata:
         for edge in automaton.edges:
-            for part in _simple(edge.guard):
+            for part in simple_parts(edge.guard):
                 yield part, edge.event, None
             for update in edge.updates:
                 yield update.expression, edge.event, Subject(automaton.name, update.variable)
     conditions = [*system.invariants, system.initial, system.marker, *(item.condition for item in system.conditions)]
     for condition in conditions:
-        for part in _simple(condition):
+        for part in simple_parts(condition):
             yield part, "", None
-
-
-def _simple(condition: Expression) -> Iterator[Expression]:
-    """The parts of a condition that connectives join."""
-    stack = [condition]
-    while stack:
-        match stack.pop():
-            case Binary(operator="and" | "or" | "implies", left=left, right=right):
-                stack += [right, left]
-            case Unary(operator="not" | "holds", operand=operand):
-                stack.append(operand)
-            case part:
-                yield part

@@ -6,7 +6,7 @@ import pytest
 
 from robosc.execution.runner import Status
 from robosc.model.structure import Deployment
-from support.execution import Sent, system_of
+from support.execution import Broken, Sent, system_of
 from support.layers import LayerBench, layer
 
 ROBOT = """
@@ -128,20 +128,6 @@ def test_an_exception_of_either_side_stops_the_robot(method: str) -> None:
     b.middleware.failing.clear()
     b.executor.restart()
     assert b.request("/cmd_vel", ON) == [MOVE]
-
-
-class Broken:
-    """A system of which one method raises."""
-
-    def __init__(self, system: Any, method: str) -> None:
-        self._system = system
-        self._method = method
-        self.is_broken = False
-
-    def __getattr__(self, name: str) -> Any:
-        if self.is_broken and name == self._method:
-            raise RuntimeError(f"{name} broke")
-        return getattr(self._system, name)
 
 
 @pytest.mark.parametrize("method", ["enabled", "matches", "step", "signature", "conjuncts", "read"])

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from robosc.execution.runner import Status
-from support.execution import Bench, Sent, bench, system_of
+from support.execution import Bench, Broken, Sent, bench, system_of
 
 ROBOT = """
 robot Robot {
@@ -115,20 +115,6 @@ def test_a_call_that_cannot_be_made_stops_the_robot(request_: str, method: str) 
     b.middleware.failing.clear()
     b.executor.restart()
     assert b.tick()[0][:2] == ("goal" if request_ == "go" else "call", request_)
-
-
-class Broken:
-    """A system of which one method raises."""
-
-    def __init__(self, system: Any, method: str) -> None:
-        self._system = system
-        self._method = method
-        self.is_broken = False
-
-    def __getattr__(self, name: str) -> Any:
-        if self.is_broken and name == self._method:
-            raise RuntimeError(f"{name} broke")
-        return getattr(self._system, name)
 
 
 @pytest.mark.parametrize("method", ["enabled", "read", "step", "provide", "signature", "conjuncts", "state"])

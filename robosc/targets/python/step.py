@@ -32,8 +32,6 @@ from robosc.targets.python.received import Reader, received_unknown
 from robosc.targets.python.text import comment, docstring, indent
 from robosc.targets.python.writer import Writer
 
-"""States (all of a behaviour's: no test is needed) and the transition taken in them."""
-
 
 def read_method(writer: Writer, event: str) -> list[str]:
     """The method that converts what came with an uncontrollable event."""

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from robosc.automata import DiscreteVariable, Semantics, System
 from robosc.automata.compile import State
-from robosc.automata.state import subject_domain, subjects
+from robosc.automata.state import Subject, subject_domain, subjects
 from robosc.expressions import IntegerType
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
@@ -107,3 +107,16 @@ def test_edges_that_differ_are_told_apart(engine: str) -> None:
     encoding, functions = functions_of(engine, source, "turn")
     ((name, function),) = functions.items()
     assert function == ~encoding.manager.var(name)
+
+
+def test_under_other_conditions_it_reads_what_they_read(engine: str) -> None:
+    given = system(
+        automaton("A", ["off -go-> on"], marked=["off"]),
+        automaton("B", ["off -other-> on"], marked=["off"]),
+    )
+    encoding = Encoding(given, make_manager(engine))
+    steps = Steps(encoding, transition_of(encoding, next(event for event in given.events if event.name == "go")))
+    elsewhere = encoding.in_location("B", "on")
+    added = steps.under(elsewhere).names - steps.names
+    assert added == set(encoding.subjects[Subject("B")].names)
+    assert steps.under(encoding.manager.true).names == steps.names

@@ -1,5 +1,6 @@
 """The target `python`: a package with the supervisor, the executor and nothing else to install."""
 
+import re
 from importlib import resources
 
 from robosc.errors import UnsupportedModelError
@@ -49,13 +50,9 @@ files for the event log in `{package}.runtime.event_log`.
 _NOT_COPIED = frozenset({"__init__.py"})
 _MAXIMUM_NAME = 100
 
-# How the copies import each other.
-_REWRITES = (
-    ("from robosc.execution import ", "from . import "),
-    ("from robosc.execution.", "from ."),
-    ("from robosc.expressions import values", "from . import values"),
-    ("from robosc.expressions.values import ", "from .values import "),
-)
+# How modules import each other here, and how their copies do: all copies stand in one folder.
+_FROM_FOLDER = re.compile(r"from robosc\.(execution|expressions) import ")
+_FROM_MODULE = re.compile(r"from robosc(\.[a-z0-9_]+)*\.(?P<module>[a-z0-9_]+) import ")
 
 
 def package_name(supervisor: Supervisor, options: GenerateOptions, suffix: str) -> str:
@@ -114,9 +111,7 @@ def with_relative_imports(text: str) -> str:
     """A runtime module's text as it stands in a generated package: importing its neighbours, not RoboSC."""
     lines = []
     for line in text.splitlines(keepends=True):
-        for old, new in _REWRITES:
-            if line.lstrip().startswith(old):
-                line = line.replace(old, new, 1)
-                break
-        lines.append(line)
+        start = len(line) - len(line.lstrip())
+        within = _FROM_FOLDER.sub("from . import ", line[start:], count=1)
+        lines.append(line[:start] + _FROM_MODULE.sub(r"from .\g<module> import ", within, count=1))
     return "".join(lines)

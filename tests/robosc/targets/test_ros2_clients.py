@@ -6,14 +6,8 @@ from typing import Any
 
 import pytest
 
-from robosc.targets.ros2.runtime.clients import (
-    LOST_S,
-    MAXIMUM_PENDING,
-    REFUSAL_S,
-    ActionGoals,
-    Reports,
-    ServiceCalls,
-)
+from robosc.targets.ros.runtime.reports import Reports
+from robosc.targets.ros2.runtime.clients import LOST_S, MAXIMUM_PENDING, REFUSAL_S, ActionGoals, ServiceCalls
 
 SUCCEEDED, CANCELED, ABORTED, UNKNOWN = 4, 5, 6, 0
 NONE, REJECTED, UNKNOWN_GOAL, TERMINATED = 0, 1, 2, 3

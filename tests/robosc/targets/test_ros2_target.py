@@ -16,8 +16,8 @@ from robosc.execution.interpreter import InterpretedSystem, describe
 from robosc.model.structure import Deployment
 from robosc.supervisor.structure import Supervisor
 from robosc.targets import GeneratedFiles, GenerateOptions, generate, write_files
-from robosc.targets.ros2.runtime.parameters import ParameterError, declarations, prefixed, validate
-from robosc.targets.ros2.state_topic import state_topic
+from robosc.targets.ros.runtime.parameters import ParameterError, declarations, prefixed, validate
+from robosc.targets.ros.state_topic import state_topic
 from support.generated import example_supervisor, imported
 from support.launch_stub import launch_actions
 from support.models import model_of
@@ -231,14 +231,14 @@ def test_a_package_may_be_called_as_one_likes() -> None:
     [
         (
             'component C { outgoing message m with identifier: "/a b", type: none }',
-            "the identifier '/a b' of 'm' is no ROS 2 name",
+            "the identifier '/a b' of 'm' is no ROS name",
         ),
         ('component C { outgoing message m with identifier: "/1", type: none }', "identifier '/1' of 'm'"),
         ('component C { outgoing message m with identifier: "/a/", type: none }', "identifier '/a/' of 'm'"),
         ('component C { outgoing message m with identifier: "/a//b", type: none }', "identifier '/a//b' of 'm'"),
         ('component C { outgoing message m with identifier: "/a\\n", type: none }', "identifier '/a\\n' of 'm'"),
         ('component C { outgoing message m with identifier: "{x}", type: none }', "identifier '{x}' of 'm'"),
-        ('component C { outgoing message m with identifier: "/' + "x" * 220 + '", type: none }', "no ROS 2 name"),
+        ('component C { outgoing message m with identifier: "/' + "x" * 220 + '", type: none }', "no ROS name"),
         (
             'component C { outgoing message m with identifier: "/t", type: none'
             '              outgoing message n with identifier: "/t", type: double }',
@@ -252,7 +252,7 @@ def test_a_package_may_be_called_as_one_likes() -> None:
         ),
         (
             "interface i use twist from geometry_msgs component C { outgoing message m with type: none links i }",
-            "twist from geometry_msgs, linked by 'm', is no name of a ROS 2 type",
+            "twist from geometry_msgs, linked by 'm', is no name of a ROS type",
         ),
         (
             "interface i use Twist from Geometry_Msgs component C { outgoing message m with type: none links i }",
@@ -272,7 +272,7 @@ def test_a_package_may_be_called_as_one_likes() -> None:
         (
             "interface i use Go from x_msgs component C {"
             '  action a with identifier: "/a b", request: none, response: none, feedback: none links i }',
-            "the identifier '/a b' of 'a' is no ROS 2 name",
+            "the identifier '/a b' of 'a' is no ROS name",
         ),
         (
             "datatype enum E from double to { value > 1.0 -> a default -> b } datatype object O { e: E }"

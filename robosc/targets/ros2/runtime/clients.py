@@ -9,11 +9,10 @@ A copy of this module stands in generated packages, which run on Python 3.8 and 
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from robosc.execution.executor import Executor
+from robosc.targets.ros.runtime.reports import Reports
 
 LOST_S = 1.0
 """A server that was not seen for so long is lost; discovery may lose sight of it for a moment."""
@@ -31,24 +30,6 @@ _OUTCOMES = {4: "succeeded", 5: "cancelled", 6: "aborted"}
 # own server answers instead.
 _UNKNOWN_GOAL = 2
 _GOAL_TERMINATED = 3
-
-
-class Reports:
-    """What became of calls and goals, kept until the executor may be told."""
-
-    def __init__(self) -> None:
-        self._waiting: deque[Callable[[Executor], None]] = deque()
-
-    def add(self, report: Callable[[Executor], None]) -> None:
-        """Keep a report for the executor."""
-        self._waiting.append(report)
-
-    def deliver(self, executor: Executor) -> bool:
-        """Tell what was kept until now; what that brings about waits for the next time. Whether there was anything."""
-        count = len(self._waiting)
-        for _ in range(count):
-            self._waiting.popleft()(executor)
-        return count > 0
 
 
 class _Presence:

@@ -8,7 +8,7 @@ from robosc.execution.clock import ManualClock
 from robosc.execution.executor import Executor
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.settings import Settings
-from robosc.targets.ros2.runtime.health import HealthMonitor, Level
+from robosc.targets.ros.runtime.health import HealthMonitor, Level
 from support.generated import example_supervisor
 
 

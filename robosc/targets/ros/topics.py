@@ -1,4 +1,4 @@
-"""What a model means on ROS 2 topics, services and actions, and what of it this target cannot do."""
+"""What a model means on the topics, services and actions of ROS, and what of it has no meaning there."""
 
 import re
 from dataclasses import dataclass
@@ -19,16 +19,14 @@ from robosc.expressions import (
 from robosc.model.structure import (
     Communication,
     CommunicationKind,
-    Deployment,
     Interface,
     Model,
     ObjectValue,
     ProvidedValue,
 )
-from robosc.supervisor.structure import Supervisor
 
 Shape = None | str | dict[str, "Shape"] | list["Shape"]
-"""See `robosc.targets.ros2.runtime.messages`."""
+"""See `robosc.targets.ros.runtime.messages`."""
 
 _BASIC_INTERFACES: dict[type[Type], Interface] = {
     NoneType: Interface("Empty", "std_msgs"),
@@ -98,14 +96,12 @@ def _quality(items: tuple[Communication, ...]) -> tuple[str, int] | None:
     return (items[0].effective_quality, items[0].effective_depth) if items else None
 
 
-def topics(supervisor: Supervisor) -> tuple[Topic, ...]:
-    """Every topic of a controller, in source order of first use.
+def topics(model: Model) -> tuple[Topic, ...]:
+    """Every topic, in source order of first use.
 
     Raises:
-        UnsupportedModelError: The model has something that this target cannot do; the message names it.
+        UnsupportedModelError: The model has something that has no meaning on ROS; the message names it.
     """
-    model = supervisor.model
-    _require_supported(supervisor)
     by_identifier: dict[str, list[Communication]] = {}
     for communication in model.communications:
         _require_valid(communication)
@@ -124,36 +120,28 @@ def servers(model: Model) -> tuple[Communication, ...]:
     asked = tuple(item for item in model.communications if item.kind in _SERVER_KINDS)
     for item in asked:
         if item.interface is None:
-            raise UnsupportedModelError(f"target ros2: '{item.name}' needs a link to the type of its {item.kind}")
+            raise UnsupportedModelError(f"'{item.name}' needs a link to the type of its {item.kind}")
         first = found.setdefault((item.kind, item.identifier), item)
         if first.interface is not None and first.interface != item.interface:
             raise UnsupportedModelError(
-                f"target ros2: the {item.kind} {item.identifier} has two types: "
+                f"the {item.kind} {item.identifier} has two types: "
                 f"{first.interface.package}/{first.interface.type} for '{first.name}' and "
                 f"{item.interface.package}/{item.interface.type} for '{item.name}'"
             )
     return asked
 
 
-def _require_supported(supervisor: Supervisor) -> None:
-    if supervisor.deployment is not Deployment.CONTROLLER:
-        raise UnsupportedModelError(
-            f"target ros2: the supervisor of {supervisor.model.name} was made for the deployment "
-            f"'{supervisor.deployment}', and this version generates controllers only"
-        )
-
-
 def _require_valid(communication: Communication) -> None:
     identifier, interface = communication.identifier, communication.interface
     if not _TOPIC.match(identifier) or len(identifier) > _MAXIMUM_TOPIC:
         raise UnsupportedModelError(
-            f"target ros2: the identifier {_quoted(identifier)} of '{communication.name}' is no ROS 2 name: "
+            f"the identifier {_quoted(identifier)} of '{communication.name}' is no ROS name: "
             "letters, digits and underscores between slashes, no part starting with a digit"
         )
     if interface and not (_PACKAGE.match(interface.package) and _MESSAGE.match(interface.type)):
         raise UnsupportedModelError(
-            f"target ros2: {interface.type} from {interface.package}, linked by '{communication.name}', is no name of "
-            "a ROS 2 type such as Twist from geometry_msgs"
+            f"{interface.type} from {interface.package}, linked by '{communication.name}', is no name of "
+            "a ROS type such as Twist from geometry_msgs"
         )
 
 
@@ -175,9 +163,7 @@ def message_interface(model: Model, communication: Communication) -> Interface:
     type_ = message_data_type(communication)
     source = model.enum(type_.name).source if isinstance(type_, EnumType) else type_
     if type(source) not in _BASIC_INTERFACES:
-        raise UnsupportedModelError(
-            f"target ros2: '{communication.name}' of type {type_text(type_)} needs a link to a message type"
-        )
+        raise UnsupportedModelError(f"'{communication.name}' of type {type_text(type_)} needs a link to a message type")
     return _BASIC_INTERFACES[type(source)]
 
 
@@ -187,7 +173,7 @@ def _topic(model: Model, identifier: str, items: list[Communication]) -> Topic:
         other = message_interface(model, item)
         if other != interface:
             raise UnsupportedModelError(
-                f"target ros2: the topic {identifier} has two types: {interface.package}/{interface.type} for "
+                f"the topic {identifier} has two types: {interface.package}/{interface.type} for "
                 f"'{items[0].name}' and {other.package}/{other.type} for '{item.name}'"
             )
     topic = Topic(
@@ -208,7 +194,7 @@ def _require_one_quality(identifier: str, items: list[Communication]) -> None:
     for item in items[1:]:
         if _quality((item,)) != _quality((first,)):
             raise UnsupportedModelError(
-                f"target ros2: the topic {identifier} has two qualities of service: {first.effective_quality} with "
+                f"the topic {identifier} has two qualities of service: {first.effective_quality} with "
                 f"depth {first.effective_depth} for '{first.name}' and {item.effective_quality} with depth "
                 f"{item.effective_depth} for '{item.name}'"
             )
@@ -234,7 +220,7 @@ def _shape(model: Model, communication: Communication, type_: Type, inside: tupl
             return None
         case EnumType(name=name) if sends:
             raise UnsupportedModelError(
-                f"target ros2: '{communication.name}' sends the enum {name}, which is made from received data and "
+                f"'{communication.name}' sends the enum {name}, which is made from received data and "
                 "cannot be turned back into it"
             )
         case EnumType(name=name):
@@ -243,7 +229,7 @@ def _shape(model: Model, communication: Communication, type_: Type, inside: tupl
             return [_shape(model, communication, element, inside, sends)]
         case ObjectType(name=name):
             if name in inside:
-                raise UnsupportedModelError(f"target ros2: the object type {name} contains itself, as no message can")
+                raise UnsupportedModelError(f"the object type {name} contains itself, as no message can")
             return {
                 item.name: _shape(model, communication, item.type, (*inside, name), sends)
                 for item in model.object(name).properties

@@ -13,7 +13,7 @@ from robosc.execution.settings import Settings
 from robosc.model.structure import Deployment
 from robosc.supervisor.structure import Supervisor
 from robosc.targets import generate
-from robosc.targets.ros2.runtime.early import HeldMessages, LateExecutor
+from robosc.targets.ros.runtime.early import HeldMessages, LateExecutor
 from support.execution import RecordingMiddleware, system_of
 from support.generated import imported
 from support.models import model_of

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from robosc.execution.protocol import DataDoesNotFit
-from robosc.targets.ros2.runtime.messages import (
+from robosc.targets.ros.runtime.messages import (
     Sender,
     SetupError,
     basic_field,

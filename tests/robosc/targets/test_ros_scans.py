@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from robosc.targets.ros2.runtime.scans import BIN_COUNT, Resampler, bin_numbers
+from robosc.targets.ros.runtime.scans import BIN_COUNT, Resampler, bin_numbers
 
 NAN, INFINITY = math.nan, math.inf
 

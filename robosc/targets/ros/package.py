@@ -1,0 +1,139 @@
+"""What the packages for ROS 2 and ROS 1 are made from: what templates speak of, filters that escape, copied modules."""
+
+import json
+import pprint
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib import resources
+
+import jinja2
+
+from robosc._version import __version__
+from robosc.errors import UnsupportedModelError
+from robosc.model.structure import Communication, CommunicationKind, Interface, Model
+from robosc.supervisor.structure import Supervisor
+from robosc.targets.python.generate import header
+from robosc.targets.python.layout import make_layout
+from robosc.targets.python.naming import snake_case
+from robosc.targets.python.package import with_relative_imports
+from robosc.targets.python.text import printable
+from robosc.targets.ros.state_topic import state_topic
+from robosc.targets.ros.topics import Topic, sent_paths, shapes_of
+from robosc.targets.words import requirement_text
+
+MAXIMUM_STARTER = 100
+
+_DIAGNOSTICS = Interface("DiagnosticArray", "diagnostic_msgs")
+_RELEASED_TYPES = frozenset({"Twist", "TwistStamped"})
+
+
+@contextmanager
+def told_by(target: str) -> Iterator[None]:
+    """Errors about the model name the target.
+
+    Raises:
+        UnsupportedModelError: One was raised inside.
+    """
+    try:
+        yield
+    except UnsupportedModelError as error:
+        raise UnsupportedModelError(f"target {target}: {error}") from error
+
+
+def require_own_names(package: str, found: tuple[Topic, ...], asked: tuple[Communication, ...]) -> None:
+    """Do nothing if neither the package nor the topics that a node has anyway are called like something of the model's.
+
+    Raises:
+        UnsupportedModelError: They are; says which.
+    """
+    if package in packages(found, asked):
+        raise UnsupportedModelError(
+            f"the generated package would be called {package}, like a package whose types it uses"
+        )
+    for topic in found:
+        if topic.identifier.lstrip("/") == "diagnostics" and topic.interface != _DIAGNOSTICS:
+            raise UnsupportedModelError(
+                f"the topic {topic.identifier} is of the type {topic.interface.package}/"
+                f"{topic.interface.type}, but every generated node publishes diagnostic_msgs/DiagnosticArray there"
+            )
+
+
+def packages(found: tuple[Topic, ...], asked: tuple[Communication, ...]) -> set[str]:
+    """The packages of all types."""
+    return {topic.interface.package for topic in found} | {item.interface.package for item in asked if item.interface}
+
+
+def release_identifiers(found: tuple[Topic, ...]) -> tuple[str, ...]:
+    """The identifiers that keep acting after a message: velocities (semantics 3.6)."""
+    return tuple(
+        topic.identifier
+        for topic in found
+        if topic.published and topic.interface.package == "geometry_msgs" and topic.interface.type in _RELEASED_TYPES
+    )
+
+
+def context(
+    supervisor: Supervisor, package: str, found: tuple[Topic, ...], asked: tuple[Communication, ...]
+) -> dict[str, object]:
+    """What the templates of every kind of package speak of."""
+    model = supervisor.model
+    layout = make_layout(supervisor)
+    tables = state_topic(model)
+    requested = [item for item in model.communications if item.kind is not CommunicationKind.OUTGOING_MESSAGE]
+    return {
+        "version": __version__,
+        "model": model.name,
+        "package": package,
+        "digest": supervisor.certificate.bundle_sha256,
+        "header": header(supervisor),
+        "certificate": {
+            field: printable(str(getattr(supervisor.certificate, field)))
+            for field in ("safe", "controllable", "nonblocking", "maximally_permissive", "method", "states")
+        },
+        "requirements": [printable(requirement_text(item)) for item in model.requirements],
+        "topics": found,
+        "release_identifiers": release_identifiers(found),
+        "servers": asked,
+        "shapes": _shapes(model),
+        "sent": {item.name: sent_paths(model, item) for item in requested},
+        "starter": f"start_{snake_case(model.name)[:MAXIMUM_STARTER]}",
+        "requests": tuple(f"{item.name}.request" for item in requested),
+        "controllable": layout.controllable,
+        "uncontrollable": layout.uncontrollable,
+        "definition": tables.definition,
+        "transitions": tables.transitions,
+    }
+
+
+def _shapes(model: Model) -> dict[str, object]:
+    return {event: shape for item in model.communications for event, shape in shapes_of(model, item).items()}
+
+
+def copied_module(supervisor: Supervisor, folder: str, module: str) -> str:
+    """The text of a module, such as `early` of `robosc.targets.ros.runtime`, as it stands in a generated package."""
+    text = resources.files(folder).joinpath(f"{module}.py").read_text(encoding="utf-8")
+    return header(supervisor) + with_relative_imports(text)
+
+
+def environment(target: str) -> jinja2.Environment:
+    """Templates of a target's package, and those that all packages share."""
+    found = jinja2.Environment(
+        loader=jinja2.ChoiceLoader([jinja2.PackageLoader(target), jinja2.PackageLoader(__package__)]),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        # Escapes what goes into XML; every other value is escaped by a filter or is a checked name.
+        autoescape=jinja2.select_autoescape(enabled_extensions=("xml.j2", "launch.j2")),
+    )
+    filters: dict[str, Callable[..., object]] = {
+        "json": json.dumps,
+        "literal": ascii,
+        "names": lambda communications: tuple(item.name for item in communications),
+        "printable": printable,
+        "quality": lambda quality: f"{quality[0].replace('_', ' ')}, depth {quality[1]}",
+        "pretty": lambda value: pprint.pformat(value, width=110, sort_dicts=False),
+        "split_lines": str.splitlines,
+    }
+    found.filters.update(filters)
+    return found

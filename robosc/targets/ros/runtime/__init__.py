@@ -1,0 +1,1 @@
+"""Modules that generated ROS packages carry copies of; none of them imports ROS."""

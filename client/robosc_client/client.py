@@ -11,6 +11,7 @@ import grpc
 from robosc.errors import Diagnostic
 from robosc.model.structure import Deployment
 from robosc.source import Bundle
+from robosc.targets import GenerateOptions
 from robosc_client import convert
 from robosc_client.errors import (
     ClientError,
@@ -104,13 +105,26 @@ class Client:
         bundle: Bundle,
         *,
         target: str,
+        options: GenerateOptions | None = None,
         deployment: Deployment = Deployment.CONTROLLER,
         engine: str = "auto",
         allow_livelock: bool = False,
         deadline_s: float | None = None,
     ) -> Generation:
-        """Synthesize a supervisor and generate the files of a target around it; arguments as in `synthesize`."""
-        request = convert.generate_request(bundle, deployment, engine, target, allow_livelock=allow_livelock)
+        """Synthesize a supervisor and generate the files of a target around it; other arguments as in `synthesize`.
+
+        Args:
+            bundle: The model and its libraries.
+            target: Name of the target.
+            options: What is chosen about the files; the defaults if None.
+            deployment: Where the supervisor will stand.
+            engine: Engine for decision diagrams.
+            allow_livelock: Whether silent steps may never end.
+            deadline_s: Give up after so many seconds.
+        """
+        request = convert.generate_request(
+            bundle, deployment, engine, target, options or GenerateOptions(), allow_livelock=allow_livelock
+        )
         with self._translated(deadline_s):
             return convert.generation(self._stub.Generate(request, timeout=deadline_s))
 

@@ -9,7 +9,7 @@ from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.explanation import EmptyExplanation, from_text
 from robosc.model.structure import Deployment
 from robosc.source import Bundle, Location, SourceFile
-from robosc.targets import GeneratedFiles
+from robosc.targets import GeneratedFiles, GenerateOptions
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_api.v1 import synthesis_pb2_grpc
 from robosc_client.errors import RequestRefusedError, ServiceError
@@ -51,11 +51,35 @@ def synthesize_request(
 
 
 def generate_request(
-    bundle: Bundle, deployment: Deployment, engine: str, target: str, *, allow_livelock: bool = False
+    bundle: Bundle,
+    deployment: Deployment,
+    engine: str,
+    target: str,
+    generation: GenerateOptions,
+    *,
+    allow_livelock: bool = False,
 ) -> pb.GenerateRequest:
     """Ask for generated files; raises as `check_request`."""
     options = _options(deployment, engine, allow_livelock)
-    return pb.GenerateRequest(bundle=_bundle(bundle), options=options, target=target)
+    return pb.GenerateRequest(
+        bundle=_bundle(bundle), options=options, target=target, generation=_generate_options(generation)
+    )
+
+
+def _generate_options(options: GenerateOptions) -> pb.GenerateOptions:
+    supervised = None
+    if options.supervised is not None:
+        supervised = pb.SupervisedController(
+            package=options.supervised.package,
+            executable=options.supervised.executable or "",
+            launch_file=options.supervised.launch_file or "",
+        )
+    return pb.GenerateOptions(
+        package=options.package or "",
+        publish_state=options.publish_state,
+        log_events=options.log_events,
+        supervised=supervised,
+    )
 
 
 def diagnostics(messages: Iterable[pb.Diagnostic]) -> tuple[Diagnostic, ...]:

@@ -19,7 +19,7 @@ from robosc.cli.arguments import (
     read_bundle,
 )
 from robosc.cli.check import report_check
-from robosc.cli.generate import add_generate_arguments, report_generated
+from robosc.cli.generate import add_generate_arguments, generate_options, report_generated
 from robosc.cli.main import guarded, parse
 from robosc.cli.output import CommandError, ExitCode, ProgressLine, require_other_file
 from robosc.cli.synth import add_output_argument, report_synthesis
@@ -150,10 +150,12 @@ def _synth(arguments: argparse.Namespace, client: Client) -> int:
 
 
 def _generate(arguments: argparse.Namespace, client: Client) -> int:
+    options = generate_options(arguments)
     bundle: Bundle = read_bundle(arguments)
     generation = client.generate(
         bundle,
         target=arguments.target,
+        options=options,
         deployment=Deployment(arguments.deployment),
         engine=arguments.engine,
         allow_livelock=arguments.allow_livelock,

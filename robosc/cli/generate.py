@@ -13,12 +13,12 @@ from robosc.cli.arguments import (
     add_model_arguments,
     read_bundle,
 )
-from robosc.cli.output import ExitCode, diagnostics_json, print_json
+from robosc.cli.output import ExitCode, UsageError, diagnostics_json, print_json
 from robosc.source import Bundle
 
 if TYPE_CHECKING:
     from robosc.supervisor import Made
-    from robosc.targets import GeneratedFiles
+    from robosc.targets import GeneratedFiles, GenerateOptions
 
 
 class _ListTargets(argparse.Action):
@@ -54,7 +54,16 @@ def add_generate_arguments(parser: argparse.ArgumentParser) -> None:
         "--target", required=True, metavar="NAME", help="what to generate: see --list-targets; all for everything"
     )
     parser.add_argument("--list-targets", action=_ListTargets, nargs=0, help="list what can be generated")
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="folder to write to")
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="DIR",
+        help="folder to write to (default: the target's in outputLocations of controller-config.json beside the model)",
+    )
+    parser.add_argument(
+        "--package", metavar="NAME", help="name of the generated package (default: made from the robot's name)"
+    )
     parser.add_argument("--force", action="store_true", help="overwrite generated files even where you changed them")
 
 
@@ -63,10 +72,32 @@ def run(arguments: argparse.Namespace) -> int:
     from robosc.targets import generated, require_generatable
 
     require_generatable(arguments.target)
+    options = generate_options(arguments)
     bundle = read_bundle(arguments)
     made = synth.make(arguments, bundle, allow_livelock=arguments.allow_livelock)
-    made, files = generated(made, arguments.target)
+    made, files = generated(made, arguments.target, options)
     return report_generated(arguments, made, files, bundle)
+
+
+def generate_options(arguments: argparse.Namespace) -> "GenerateOptions":
+    """What is asked of the target; the folder to write to is set where it is not given.
+
+    Raises:
+        UsageError: The file beside the model cannot be used, or there is no folder to write to.
+    """
+    from robosc.targets import CONFIG_FILE, ControllerConfigError, read_controller_config
+
+    try:
+        config = read_controller_config(arguments.model.parent)
+    except ControllerConfigError as error:
+        raise UsageError(str(error)) from error
+    for warning in config.warnings:
+        sys.stderr.write(f"warning: {warning}\n")
+    if arguments.output is None:
+        arguments.output = config.locations.get(arguments.target)
+    if arguments.output is None:
+        raise UsageError(f"no folder to write to: -o DIR, or outputLocations.{arguments.target} of {CONFIG_FILE}")
+    return config.options(arguments.package)
 
 
 def report_generated(

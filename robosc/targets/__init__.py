@@ -4,11 +4,18 @@ A target reads a supervisor and returns files as text (`GeneratedFiles`); `write
 that writes them. Same supervisor, same bytes: no time, no machine path, everything sorted.
 """
 
+from robosc.targets.controller_config import (
+    CONFIG_FILE,
+    ControllerConfig,
+    ControllerConfigError,
+    read_controller_config,
+)
 from robosc.targets.everything import ALL, generated, refusals, require_generatable
 from robosc.targets.files import GeneratedFiles, OverwriteError, Removal, remove_earlier, write_files
 from robosc.targets.judgement import judged_for
 from robosc.targets.registry import (
     GenerateOptions,
+    SupervisedController,
     TargetInfo,
     UnknownTargetError,
     available_targets,
@@ -19,16 +26,21 @@ from robosc.targets.registry import (
 
 __all__ = [
     "ALL",
+    "CONFIG_FILE",
+    "ControllerConfig",
+    "ControllerConfigError",
     "GenerateOptions",
     "GeneratedFiles",
     "OverwriteError",
     "Removal",
+    "SupervisedController",
     "TargetInfo",
     "UnknownTargetError",
     "available_targets",
     "generate",
     "generated",
     "judged_for",
+    "read_controller_config",
     "refusals",
     "register",
     "remove_earlier",

@@ -6,7 +6,14 @@ from robosc.supervisor.make import Made
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.judgement import judged_for
-from robosc.targets.registry import GENERAL_ERRORS, available_targets, errors_for, generate, require_target
+from robosc.targets.registry import (
+    GENERAL_ERRORS,
+    GenerateOptions,
+    available_targets,
+    errors_for,
+    generate,
+    require_target,
+)
 
 ALL = "all"
 """Stands for every target."""
@@ -37,7 +44,7 @@ def require_generatable(name: str) -> None:
         require_target(name)
 
 
-def generated(made: Made, target: str) -> tuple[Made, GeneratedFiles | None]:
+def generated(made: Made, target: str, options: GenerateOptions | None = None) -> tuple[Made, GeneratedFiles | None]:
     """The files of a target, or of all of them; and what was made as the target sees it.
 
     Where all are asked for, one that refuses the model is left out, and the bundle's `README.md` says why.
@@ -45,6 +52,7 @@ def generated(made: Made, target: str) -> tuple[Made, GeneratedFiles | None]:
     Args:
         made: The outcome of `make_supervisor`.
         target: Name of a target, or `ALL`.
+        options: What the user chose; the defaults if None.
 
     Returns:
         The outcome with the target's own errors, and the files: none where the outcome has no supervisor.
@@ -55,22 +63,22 @@ def generated(made: Made, target: str) -> tuple[Made, GeneratedFiles | None]:
     """
     if target != ALL:
         judged = judged_for(made, target)
-        return judged, None if judged.supervisor is None else generate(judged.supervisor, target)
+        return judged, None if judged.supervisor is None else generate(judged.supervisor, target, options)
     names = [info.name for info in available_targets()]
     outcomes = [judged_for(made, name) for name in names]
     if made.supervisor is None or all(outcome.supervisor is None for outcome in outcomes):
         return outcomes[0], None
-    return made, _of_all(made, made.supervisor)
+    return made, _of_all(made, made.supervisor, options)
 
 
-def _of_all(made: Made, supervisor: Supervisor) -> GeneratedFiles:
+def _of_all(made: Made, supervisor: Supervisor, options: GenerateOptions | None) -> GeneratedFiles:
     texts: dict[str, str] = {}
     executables: set[str] = set()
     rows: list[str] = []
     is_incomplete = False
     for info in available_targets():
         try:
-            files = _of_one(made, supervisor, info.name)
+            files = _of_one(made, supervisor, info.name, options)
         except UnsupportedModelError as error:
             rows.append(f"| {info.name} | {info.description} | not generated: {_cell(str(error))} |")
             is_incomplete = True
@@ -90,12 +98,12 @@ def _of_all(made: Made, supervisor: Supervisor) -> GeneratedFiles:
     return GeneratedFiles(texts, frozenset(executables))
 
 
-def _of_one(made: Made, supervisor: Supervisor, name: str) -> GeneratedFiles:
+def _of_one(made: Made, supervisor: Supervisor, name: str, options: GenerateOptions | None) -> GeneratedFiles:
     codes = errors_for(name) - GENERAL_ERRORS
     against = [item for item in made.diagnostics if item.code in codes]
     if against:
         raise UnsupportedModelError("; ".join(f"{item.message} [{item.code}]" for item in against))
-    return generate(supervisor, name)
+    return generate(supervisor, name, options)
 
 
 def _cell(text: str) -> str:

@@ -5,6 +5,7 @@ Built-in targets are listed here; an installed distribution adds its own through
 """
 
 import importlib
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -16,6 +17,36 @@ from robosc.targets.files import GeneratedFiles
 
 ENTRY_POINT_GROUP = "robosc.targets"
 
+_PACKAGE = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,199}\Z")
+_FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+-]{0,199}\Z")
+
+
+@dataclass(frozen=True, slots=True)
+class SupervisedController:
+    """An existing controller that a supervision layer stands before: what to start.
+
+    Attributes:
+        package: Its package.
+        executable: Its program, or None where a launch file starts it.
+        launch_file: Its launch file, or None where it is a program.
+
+    Raises:
+        ValueError: A name is none of a package or a file, or there is not exactly one file; says which.
+    """
+
+    package: str
+    executable: str | None = None
+    launch_file: str | None = None
+
+    def __post_init__(self) -> None:
+        if not _PACKAGE.match(self.package):
+            raise ValueError("'package' must be the name of a package")
+        if (self.executable is None) == (self.launch_file is None):
+            raise ValueError("it must have either an executable or a launch file")
+        for name in (self.executable, self.launch_file):
+            if name is not None and not _FILE.match(name):
+                raise ValueError("an executable or launch file must be the name of a file, without a path")
+
 
 @dataclass(frozen=True, slots=True)
 class GenerateOptions:
@@ -23,9 +54,16 @@ class GenerateOptions:
 
     Attributes:
         package: Name of the generated package, or None for one made from the robot's name.
+        publish_state: Whether a generated node publishes `/state` unless its parameters say otherwise.
+        log_events: Whether a generated node writes its event log unless its parameters say otherwise.
+        supervised: The existing controller that a generated layer's launch file starts, or None to leave that to its
+            arguments.
     """
 
     package: str | None = None
+    publish_state: bool = False
+    log_events: bool = False
+    supervised: SupervisedController | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.model.structure import Deployment
 from robosc.source import Bundle, Location, SourceFile
 from robosc.synthesis import Statistics
+from robosc.targets import GenerateOptions, SupervisedController
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_api.v1 import synthesis_pb2_grpc
 from robosc_server.work import (
@@ -80,7 +81,18 @@ def generate_job(request: pb.GenerateRequest, max_bundle_bytes: int) -> Generate
     """The job that a request asks for; raises as `check_job`."""
     if not request.target:
         raise RequestError("the request names no target")
-    return GenerateJob(synthesize_job(request, max_bundle_bytes), request.target)
+    return GenerateJob(synthesize_job(request, max_bundle_bytes), request.target, _generate_options(request.generation))
+
+
+def _generate_options(options: pb.GenerateOptions) -> GenerateOptions:
+    supervised = None
+    if options.HasField("supervised"):
+        given = options.supervised
+        try:
+            supervised = SupervisedController(given.package, given.executable or None, given.launch_file or None)
+        except ValueError as error:
+            raise RequestError(f"the supervised controller: {error}") from error
+    return GenerateOptions(options.package or None, options.publish_state, options.log_events, supervised)
 
 
 def check_response(outcome: CheckOutcome) -> pb.CheckResponse:

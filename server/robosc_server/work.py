@@ -15,6 +15,7 @@ from robosc.source import Bundle
 if TYPE_CHECKING:
     from robosc.supervisor import Made, Supervisor
     from robosc.synthesis import Statistics
+    from robosc.targets import GenerateOptions
 
 UNSUPPORTED_MODEL = "unsupported model"
 """The status of a correct model that cannot be handled; the other statuses are those of `MadeStatus`."""
@@ -43,6 +44,7 @@ class GenerateJob:
 
     synthesis: SynthesizeJob
     target: str
+    options: "GenerateOptions"
 
 
 Job = CheckJob | SynthesizeJob | GenerateJob
@@ -236,7 +238,7 @@ def _generate(job: GenerateJob, on_report: Callable[[Report], None]) -> Generate
     if isinstance(made, SynthesizeOutcome):
         return GenerateOutcome(str(made.status), made.diagnostics, made.reason)
     try:
-        made, files = generated(made, job.target)
+        made, files = generated(made, job.target, job.options)
     except UnsupportedModelError as error:
         return GenerateOutcome(UNSUPPORTED_MODEL, made.diagnostics, str(error))
     if files is None:

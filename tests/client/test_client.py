@@ -14,6 +14,7 @@ from robosc.model import check
 from robosc.model.structure import Deployment
 from robosc.source import Bundle, Location, SourceFile
 from robosc.synthesis import Statistics
+from robosc.targets import GenerateOptions, SupervisedController
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client import (
     Client,
@@ -227,11 +228,36 @@ class TestConversion:
         assert not job.allow_livelock
         allowing = client_convert.synthesize_request(bundle, Deployment.LAYER, "autoref", allow_livelock=True)
         assert server_convert.synthesize_job(allowing, 1000).allow_livelock
-        generate = client_convert.generate_request(bundle, Deployment.CONTROLLER, "auto", "ros2")
+        plain = (bundle, Deployment.CONTROLLER, "auto", "ros2", GenerateOptions())
+        generate = client_convert.generate_request(*plain)
         assert server_convert.generate_job(generate, 1000).target == "ros2"
-        generate = client_convert.generate_request(bundle, Deployment.CONTROLLER, "auto", "ros2", allow_livelock=True)
+        assert server_convert.generate_job(generate, 1000).options == GenerateOptions()
+        generate = client_convert.generate_request(*plain, allow_livelock=True)
         assert server_convert.generate_job(generate, 1000).synthesis.allow_livelock
         assert server_convert.check_job(client_convert.check_request(bundle), 1000).bundle == bundle
+
+    @pytest.mark.parametrize(
+        "options",
+        [
+            GenerateOptions("walker"),
+            GenerateOptions(publish_state=True),
+            GenerateOptions(log_events=True),
+            GenerateOptions(supervised=SupervisedController("p", executable="x")),
+            GenerateOptions(supervised=SupervisedController("p", launch_file="x.launch.py")),
+        ],
+    )
+    def test_what_is_chosen_about_the_files(self, options: GenerateOptions) -> None:
+        bundle = Bundle(SourceFile("robot.rscd", ""))
+        request = client_convert.generate_request(bundle, Deployment.LAYER, "auto", "ros2", options)
+        assert server_convert.generate_job(request, 1000).options == options
+
+    def test_a_supervised_controller_with_a_path_is_refused(self) -> None:
+        request = pb.GenerateRequest(target="ros2", bundle=pb.Bundle(main=pb.SourceFile(name="m")))
+        request.options.deployment = pb.DEPLOYMENT_LAYER
+        request.generation.supervised.package = "p"
+        request.generation.supervised.executable = "/bin/sh"
+        with pytest.raises(server_convert.RequestError, match="without a path"):
+            server_convert.generate_job(request, 1000)
 
     def test_libraries_are_sorted_for_the_core(self) -> None:
         files = [pb.SourceFile(name=name) for name in ("b", "a")]

@@ -197,14 +197,38 @@ class AddedCondition(_message.Message):
     def __init__(self, event: _Optional[str] = ..., condition: _Optional[str] = ...) -> None: ...
 
 class GenerateRequest(_message.Message):
-    __slots__ = ("bundle", "options", "target")
+    __slots__ = ("bundle", "options", "target", "generation")
     BUNDLE_FIELD_NUMBER: _ClassVar[int]
     OPTIONS_FIELD_NUMBER: _ClassVar[int]
     TARGET_FIELD_NUMBER: _ClassVar[int]
+    GENERATION_FIELD_NUMBER: _ClassVar[int]
     bundle: Bundle
     options: SynthesisOptions
     target: str
-    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., target: _Optional[str] = ...) -> None: ...
+    generation: GenerateOptions
+    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., target: _Optional[str] = ..., generation: _Optional[_Union[GenerateOptions, _Mapping]] = ...) -> None: ...
+
+class GenerateOptions(_message.Message):
+    __slots__ = ("package", "publish_state", "log_events", "supervised")
+    PACKAGE_FIELD_NUMBER: _ClassVar[int]
+    PUBLISH_STATE_FIELD_NUMBER: _ClassVar[int]
+    LOG_EVENTS_FIELD_NUMBER: _ClassVar[int]
+    SUPERVISED_FIELD_NUMBER: _ClassVar[int]
+    package: str
+    publish_state: bool
+    log_events: bool
+    supervised: SupervisedController
+    def __init__(self, package: _Optional[str] = ..., publish_state: _Optional[bool] = ..., log_events: _Optional[bool] = ..., supervised: _Optional[_Union[SupervisedController, _Mapping]] = ...) -> None: ...
+
+class SupervisedController(_message.Message):
+    __slots__ = ("package", "executable", "launch_file")
+    PACKAGE_FIELD_NUMBER: _ClassVar[int]
+    EXECUTABLE_FIELD_NUMBER: _ClassVar[int]
+    LAUNCH_FILE_FIELD_NUMBER: _ClassVar[int]
+    package: str
+    executable: str
+    launch_file: str
+    def __init__(self, package: _Optional[str] = ..., executable: _Optional[str] = ..., launch_file: _Optional[str] = ...) -> None: ...
 
 class GenerateResponse(_message.Message):
     __slots__ = ("status", "diagnostics", "reason", "files", "explanation")

@@ -17,11 +17,16 @@ from robosc.targets.python.layout import make_layout
 from robosc.targets.python.naming import snake_case
 from robosc.targets.python.package import with_relative_imports
 from robosc.targets.python.text import printable
+from robosc.targets.registry import GenerateOptions
+from robosc.targets.ros.runtime.parameters import Parameter
 from robosc.targets.ros.state_topic import state_topic
 from robosc.targets.ros.topics import Topic, sent_paths, shapes_of
 from robosc.targets.words import requirement_text
 
 MAXIMUM_STARTER = 100
+
+EVENT_LOG_FOLDER = "event_log"
+"""Where events are logged if the user asked for it without a folder: in the folder that the node is started in."""
 
 _DIAGNOSTICS = Interface("DiagnosticArray", "diagnostic_msgs")
 _RELEASED_TYPES = frozenset({"Twist", "TwistStamped"})
@@ -107,6 +112,16 @@ def context(
 
 def _shapes(model: Model) -> dict[str, object]:
     return {event: shape for item in model.communications for event, shape in shapes_of(model, item).items()}
+
+
+def chosen(parameters: tuple[Parameter, ...], options: GenerateOptions) -> tuple[Parameter, ...]:
+    """Parameters as a package's parameter file sets them: with what the user chose about generated nodes."""
+    values: dict[str, object] = {}
+    if options.publish_state:
+        values["publish_state"] = True
+    if options.log_events:
+        values["log_folder"] = EVENT_LOG_FOLDER
+    return tuple(item._replace(default=values.get(item.name, item.default)) for item in parameters)
 
 
 def copied_module(supervisor: Supervisor, folder: str, module: str) -> str:

@@ -7,6 +7,7 @@ from robosc.targets.files import GeneratedFiles
 from robosc.targets.python.package import package_name, python_files
 from robosc.targets.registry import GenerateOptions
 from robosc.targets.ros.package import (
+    chosen,
     context,
     copied_module,
     environment,
@@ -69,7 +70,7 @@ def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles
         require_own_names(name, found, asked)
         values = context(supervisor, name, found, asked)
     values["dependencies"] = sorted({*_OWN_DEPENDENCIES, *packages(found, asked)})
-    values["parameters"] = declarations(release_identifiers(found))
+    values["parameters"] = chosen(declarations(release_identifiers(found)), options)
     files = {f"{name}/{path}": text for path, text in python_files(supervisor).items()}
     for module, folder in _RUNTIME_MODULES.items():
         files[f"{name}/runtime/{module}.py"] = copied_module(supervisor, folder, module)

@@ -1,0 +1,165 @@
+"""`controller-config.json` beside a model: the original tool's settings of what is generated (semantics 3.11)."""
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from robosc.errors import RoboscError
+from robosc.targets.registry import GenerateOptions, SupervisedController
+
+CONFIG_FILE = "controller-config.json"
+MAXIMUM_BYTES = 64 * 1024
+
+_PUBLISHES = "publishStateInformation"
+_WRITES = "writeEventsToLog"
+_LOCATIONS = "outputLocations"
+_SUPERVISED = "supervisedController"
+_SUPERVISED_KEYS = ("package", "executable", "launchFile")
+_KEYS = (_PUBLISHES, _WRITES, _LOCATIONS, _SUPERVISED)
+
+_TARGET = re.compile(r"[a-z0-9-]{1,40}\Z")
+
+
+class ControllerConfigError(RoboscError, ValueError):
+    """A `controller-config.json` cannot be used; says which file, where in it, and what is wrong."""
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerConfig:
+    """What such a file says.
+
+    Attributes:
+        publish_state: Whether `/state` is published.
+        log_events: Whether the event log is written.
+        locations: Folder to generate into by target, below the folder of the file.
+        supervised: The existing controller, or None.
+        warnings: What was found and not understood, one sentence each.
+    """
+
+    publish_state: bool = False
+    log_events: bool = False
+    locations: Mapping[str, Path] = field(default_factory=dict)
+    supervised: SupervisedController | None = None
+    warnings: tuple[str, ...] = ()
+
+    def options(self, package: str | None) -> GenerateOptions:
+        """What a target is asked for."""
+        return GenerateOptions(package, self.publish_state, self.log_events, self.supervised)
+
+
+def read_controller_config(folder: Path) -> ControllerConfig:
+    """What the file in a folder says; the defaults where there is none.
+
+    Raises:
+        ControllerConfigError: It is there and cannot be used.
+    """
+    path = folder / CONFIG_FILE
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAXIMUM_BYTES + 1)
+    except FileNotFoundError:
+        return ControllerConfig()
+    except OSError as error:
+        raise ControllerConfigError(f"{path}: {error.strerror or error}") from error
+    if len(content) > MAXIMUM_BYTES:
+        raise ControllerConfigError(f"{path}: more than {MAXIMUM_BYTES} bytes")
+    return _Reader(path).config(_document(path, content))
+
+
+def _document(path: Path, content: bytes) -> dict[str, Any]:
+    try:
+        document = json.loads(content.decode("utf-8"), object_pairs_hook=_without_repetition)
+    except RecursionError:
+        raise ControllerConfigError(f"{path}: nested too deeply") from None
+    except ValueError as error:
+        raise ControllerConfigError(f"{path}: no JSON: {error}") from error
+    if not isinstance(document, dict):
+        raise ControllerConfigError(f"{path}: it must hold an object")
+    return document
+
+
+def _without_repetition(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        raise ValueError("a name stands twice in one object")
+    return found
+
+
+class _Reader:
+    """Reads one file's document; every error names the file and the place in it."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._warnings: list[str] = []
+
+    def config(self, document: dict[str, Any]) -> ControllerConfig:
+        self._warn_of_unknown(document, _KEYS, "")
+        return ControllerConfig(
+            publish_state=self._boolean(document, _PUBLISHES),
+            log_events=self._boolean(document, _WRITES),
+            locations=self._locations(document.get(_LOCATIONS, {})),
+            supervised=self._supervised(document.get(_SUPERVISED)),
+            warnings=tuple(self._warnings),
+        )
+
+    def _wrong(self, place: str, expected: str) -> ControllerConfigError:
+        return ControllerConfigError(f"{self._path}: '{place}' must be {expected}")
+
+    def _warn_of_unknown(self, found: Mapping[str, Any], known: tuple[str, ...], place: str) -> None:
+        for name in found:
+            if name not in known:
+                near = get_close_matches(name, known, n=1)
+                hint = f"; did you mean '{near[0]}'?" if near else f"; there is {', '.join(known)}"
+                self._warnings.append(f"{self._path}: '{place}{name[:60]}' is not known{hint}")
+
+    def _boolean(self, document: Mapping[str, Any], name: str) -> bool:
+        value = document.get(name, False)
+        if not isinstance(value, bool):
+            raise self._wrong(name, "true or false")
+        return value
+
+    def _locations(self, value: object) -> dict[str, Path]:
+        if not isinstance(value, dict):
+            raise self._wrong(_LOCATIONS, "an object: a folder for each target")
+        found: dict[str, Path] = {}
+        for name, folder in value.items():
+            # The original writes ROS1 and ROS2.
+            target = name.lower()
+            if not _TARGET.match(target) or target in found:
+                raise self._wrong(_LOCATIONS, "an object whose names are those of targets, each once")
+            if not isinstance(folder, str) or not _is_below(folder):
+                raise self._wrong(
+                    f"{_LOCATIONS}.{target}", "the relative path of a folder, with `/` and without `..`; see also -o"
+                )
+            found[target] = self._path.parent / folder
+        return found
+
+    def _supervised(self, value: object) -> SupervisedController | None:
+        if value is None:
+            return None
+        if not isinstance(value, dict):
+            raise self._wrong(_SUPERVISED, "an object with package and executable or launchFile")
+        self._warn_of_unknown(value, _SUPERVISED_KEYS, f"{_SUPERVISED}.")
+        given = [value.get(name) for name in _SUPERVISED_KEYS]
+        if not all(item is None or isinstance(item, str) for item in given):
+            raise self._wrong(_SUPERVISED, "an object of texts")
+        try:
+            return SupervisedController(given[0] or "", given[1], given[2])
+        except ValueError as error:
+            raise ControllerConfigError(f"{self._path}: '{_SUPERVISED}': {error}") from error
+
+
+def _is_below(folder: str) -> bool:
+    """Whether a path stays below where it starts, links apart."""
+    path = PurePosixPath(folder)
+    return (
+        bool(folder)
+        and "\\" not in folder
+        and folder.isprintable()
+        and not path.is_absolute()
+        and ".." not in path.parts
+    )

@@ -1,0 +1,172 @@
+"""`controller-config.json`: what it may say, what is refused, and what becomes of it."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml  # type: ignore[import-untyped]
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robosc.cli.main import main
+from robosc.targets.controller_config import (
+    CONFIG_FILE,
+    MAXIMUM_BYTES,
+    ControllerConfig,
+    ControllerConfigError,
+    read_controller_config,
+)
+from robosc.targets.registry import SupervisedController
+
+MODEL = """\
+robot Blinker {
+    component Lamp {
+        incoming message blink with identifier: "/blink", type: none
+        outgoing message blinked with identifier: "/blinked", type: none
+        behaviour { initial marked state lit { } }
+    }
+}
+"""
+
+
+def written(folder: Path, content: Any) -> Path:
+    text = content if isinstance(content, str) else json.dumps(content)
+    (folder / CONFIG_FILE).write_text(text, encoding="utf-8")
+    return folder
+
+
+def test_no_file_stands_for_the_defaults(tmp_path: Path) -> None:
+    assert read_controller_config(tmp_path) == ControllerConfig()
+
+
+def test_everything_that_it_may_say(tmp_path: Path) -> None:
+    written(
+        tmp_path,
+        {
+            "publishStateInformation": True,
+            "writeEventsToLog": True,
+            "outputLocations": {"ROS1": "catkin_ws/src/x", "ros2": "ws"},
+            "supervisedController": {"package": "turtlebot3_example", "launchFile": "drive.launch.py"},
+        },
+    )
+    config = read_controller_config(tmp_path)
+    assert config.warnings == ()
+    assert config.locations == {"ros1": tmp_path / "catkin_ws/src/x", "ros2": tmp_path / "ws"}
+    options = config.options("name")
+    assert (options.package, options.publish_state, options.log_events) == ("name", True, True)
+    assert options.supervised == SupervisedController("turtlebot3_example", launch_file="drive.launch.py")
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        ("{", "no JSON"),
+        ("[" * 30_000, "nested too deeply"),
+        ('"\ud800"'.encode("utf-16", "surrogatepass").decode("latin-1"), "no JSON"),
+        ([], "must hold an object"),
+        ('{"publishStateInformation": true, "publishStateInformation": false}', "stands twice"),
+        ({"publishStateInformation": 1}, "'publishStateInformation' must be true or false"),
+        ({"writeEventsToLog": "yes"}, "'writeEventsToLog' must be true or false"),
+        ({"outputLocations": "out"}, "'outputLocations' must be an object"),
+        ({"outputLocations": {"ros2": "/etc"}}, "'outputLocations.ros2' must be the relative path"),
+        ({"outputLocations": {"ros2": "../x"}}, "'outputLocations.ros2' must be the relative path"),
+        ({"outputLocations": {"ros2": "a\\..\\b"}}, "'outputLocations.ros2' must be the relative path"),
+        ({"outputLocations": {"ros2": ""}}, "'outputLocations.ros2' must be the relative path"),
+        ({"outputLocations": {"ros2": "a", "ROS2": "b"}}, "each once"),
+        ({"outputLocations": {"../x": "a"}}, "names are those of targets"),
+        ({"supervisedController": "x"}, "'supervisedController' must be an object"),
+        ({"supervisedController": {"executable": "x"}}, "'package' must be the name of a package"),
+        ({"supervisedController": {"package": "p; rm", "executable": "x"}}, "'package' must be the name of a package"),
+        ({"supervisedController": {"package": "p"}}, "either an executable or a launch file"),
+        ({"supervisedController": {"package": "p", "executable": "x", "launchFile": "y"}}, "either an executable"),
+        ({"supervisedController": {"package": "p", "executable": "../x"}}, "without a path"),
+        ({"supervisedController": {"package": "p", "executable": 3}}, "an object of texts"),
+        (" " * (MAXIMUM_BYTES + 1), "more than"),
+    ],
+)
+def test_what_is_wrong_is_told_with_its_place(tmp_path: Path, content: Any, problem: str) -> None:
+    with pytest.raises(ControllerConfigError) as raised:
+        read_controller_config(written(tmp_path, content))
+    assert problem in str(raised.value)
+    assert CONFIG_FILE in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_what_is_not_known_is_a_warning(tmp_path: Path) -> None:
+    written(
+        tmp_path,
+        {"publishStateInformations": True, "supervisedController": {"package": "p", "executable": "x", "a": 1}},
+    )
+    config = read_controller_config(tmp_path)
+    assert not config.publish_state
+    assert len(config.warnings) == 2
+    assert "did you mean 'publishStateInformation'?" in config.warnings[0]
+    assert "'supervisedController.a' is not known" in config.warnings[1]
+
+
+_JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.text(max_size=8),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner, max_size=3),
+    max_leaves=8,
+)
+_KEYS = st.sampled_from(["publishStateInformation", "writeEventsToLog", "outputLocations", "supervisedController", "x"])
+
+
+@given(st.dictionaries(_KEYS, _JSON))
+def test_any_document_is_read_or_refused(tmp_path_factory: pytest.TempPathFactory, document: dict[str, Any]) -> None:
+    folder = tmp_path_factory.mktemp("config")
+    try:
+        config = read_controller_config(written(folder, document))
+    except ControllerConfigError:
+        return
+    for place in config.locations.values():
+        assert place.resolve().is_relative_to(folder.resolve())
+
+
+class TestCommand:
+    """`robosc generate` beside such a file."""
+
+    @pytest.fixture
+    def model(self, tmp_path: Path) -> Path:
+        path = tmp_path / "blinker.rscd"
+        path.write_text(MODEL)
+        return path
+
+    def test_it_chooses_the_folder_and_the_node_s_parameters(
+        self, model: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        written(
+            model.parent,
+            {"publishStateInformation": True, "writeEventsToLog": True, "outputLocations": {"ros2": "ws/src/b"}},
+        )
+        assert main(["generate", str(model), "--target", "ros2"]) == 0
+        file = model.parent / "ws/src/b/config/parameters.yaml"
+        assert str(file) in capsys.readouterr().out
+        parameters = yaml.safe_load(file.read_text())["/**"]["ros__parameters"]
+        assert parameters["publish_state"] is True
+        assert parameters["log_folder"] == "event_log"
+
+    def test_what_is_given_on_the_command_line_has_the_last_word(self, model: Path, tmp_path: Path) -> None:
+        written(model.parent, {"outputLocations": {"python": "there"}})
+        chosen = ["--package", "blinks", "-o", str(tmp_path / "here")]
+        assert main(["generate", str(model), "--target", "python", *chosen]) == 0
+        assert (tmp_path / "here/blinks/supervisor.py").is_file()
+        assert not (tmp_path / "there").exists()
+
+    def test_without_any_folder_it_says_where_one_can_be_given(
+        self, model: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        assert main(["generate", str(model), "--target", "python"]) == 2
+        error = capsys.readouterr().err
+        assert "-o DIR, or outputLocations.python of controller-config.json" in error
+
+    def test_a_wrong_file_is_one_error(self, model: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        written(model.parent, {"writeEventsToLog": 1})
+        assert main(["generate", str(model), "--target", "python", "-o", str(model.parent / "out")]) == 2
+        assert capsys.readouterr().err.count("\n") == 1
+
+    def test_what_is_not_known_is_told(self, model: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        written(model.parent, {"nonsense": 1})
+        assert main(["generate", str(model), "--target", "python", "-o", str(model.parent / "out")]) == 0
+        assert "warning: " in capsys.readouterr().err

@@ -21,9 +21,9 @@ from robosc.execution.runner import DeploymentError, Runner, Status, guarded
 from robosc.execution.settings import Settings
 from robosc.execution.steps import ExecutionError
 
-_MESSAGE = "incoming message"
+_INCOMING_MESSAGE = "incoming message"
 
-_FAULT = "a fault"
+_A_FAULT = "a fault"
 _NOT_ALLOWED = "not allowed now"
 _NOT_FINITE = "a NaN or an infinity"
 _NOT_KNOWN = "no message of the model"
@@ -83,7 +83,7 @@ class Layer(Runner):
         if names is None:
             self._recorder.unexpected({"what": "a request on {}".format(identifier)})
             return
-        why: Optional[str] = _FAULT
+        why: Optional[str] = _A_FAULT
         try:
             self._look_at_clock()
             self._commands.arrived(identifier, self._now_s)
@@ -104,7 +104,7 @@ class Layer(Runner):
         request = self._request_of(service, "service")
         if request is None:
             return
-        why: Optional[str] = _FAULT
+        why: Optional[str] = _A_FAULT
         try:
             self._look_at_clock()
             why = self._let_call_through(request, call_id, message)
@@ -125,7 +125,7 @@ class Layer(Runner):
         request = self._request_of(action, "action")
         if request is None:
             return
-        why: Optional[str] = _FAULT
+        why: Optional[str] = _A_FAULT
         try:
             self._look_at_clock()
             why = self._let_goal_through(request, goal_id, message)
@@ -320,7 +320,7 @@ def _messages(infos: Sequence[CommunicationInfo]) -> Dict[str, Tuple[str, ...]]:
     """
     found: Dict[str, Tuple[CommunicationInfo, ...]] = {}
     for info in infos:
-        if info.kind == _MESSAGE:
+        if info.kind == _INCOMING_MESSAGE:
             found[info.identifier] = (*found.get(info.identifier, ()), info)
     for identifier, sharing in found.items():
         for info in sharing[:-1]:

@@ -112,7 +112,7 @@ _BUILT_IN: dict[str, tuple[str, str]] = {
         "robosc.targets.promela:TARGET",
     ),
     "python": (
-        "the supervisor and its executor as a Python package without any dependency",
+        "the supervisor and its executor as one Python file without any dependency",
         "robosc.targets.python:TARGET",
     ),
     "ros2": (

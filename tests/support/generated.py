@@ -14,7 +14,8 @@ from typing import Any
 from robosc.model.structure import Deployment
 from robosc.supervisor.structure import Supervisor
 from robosc.targets import GeneratedFiles, generate, write_files
-from robosc.targets.python.package import python_files
+from robosc.targets.python.bundle import bundle
+from robosc.targets.python.generate import RUNTIME, model_part
 
 _numbers = itertools.count()
 
@@ -45,39 +46,36 @@ def imported(files: GeneratedFiles, folder: Path, module: str) -> Iterator[Any]:
             del sys.modules[name]
 
 
-def load_system(supervisor: Supervisor) -> Any:
-    """An instance of the generated class, in memory.
+@cache
+def _runtime_code(deployment: Deployment) -> types.CodeType:
+    """What every generated module of a deployment begins with, compiled once."""
+    runtime = bundle(RUNTIME[deployment])
+    lines = ["from __future__ import annotations", *runtime.imports, "", runtime.text()]
+    return compile("\n".join(lines), "runtime", "exec", dont_inherit=True)
 
-    The runtime modules are executed from their generated texts as well, in a package of their own name.
-    """
-    package = f"generated_{next(_numbers)}"
-    root = types.ModuleType(package)
-    root.__path__ = []
-    sys.modules[package] = root
-    runtime = types.ModuleType(f"{package}.runtime")
-    runtime.__path__ = []
-    sys.modules[runtime.__name__] = runtime
-    texts = python_files(supervisor)
+
+def load_module(supervisor: Supervisor) -> types.ModuleType:
+    """The generated module, in memory."""
+    module = types.ModuleType(f"generated_{next(_numbers)}")
+    # Python looks a module up by its name when it makes named tuples and protocols.
+    sys.modules[module.__name__] = module
     try:
-        for name in ("values", "reading", "protocol"):
-            module = types.ModuleType(f"{package}.runtime.{name}")
-            module.__package__ = runtime.__name__
-            sys.modules[module.__name__] = module
-            setattr(runtime, name, module)
-            exec(compile(texts[f"runtime/{name}.py"], f"{name}.py", "exec"), module.__dict__)
-        module = types.ModuleType(f"{package}.supervisor")
-        module.__package__ = package
-        exec(compile(texts["supervisor.py"], "supervisor.py", "exec"), module.__dict__)
+        exec(_runtime_code(supervisor.deployment), module.__dict__)
+        exec(compile(model_part(supervisor), "supervisor.py", "exec", dont_inherit=True), module.__dict__)
     finally:
-        for name in [name for name in sys.modules if name == package or name.startswith(f"{package}.")]:
-            del sys.modules[name]
-    return module.Supervisor()
+        del sys.modules[module.__name__]
+    return module
+
+
+def load_system(supervisor: Supervisor) -> Any:
+    """An instance of the generated class, in memory."""
+    return load_module(supervisor).Supervisor()
 
 
 def python_text(supervisor: Supervisor) -> str:
-    """The generated `supervisor.py`."""
-    files = generate(supervisor, "python")
-    return files[next(path for path in files if path.endswith("/supervisor.py"))]
+    """The generated module."""
+    (text,) = generate(supervisor, "python").values()
+    return text
 
 
 def same(left: Any, right: Any) -> bool:

@@ -4,7 +4,7 @@ from robosc.targets.python.package import generate
 from robosc.targets.registry import Target, TargetInfo
 
 TARGET = Target(
-    TargetInfo("python", "the supervisor and its executor as a Python package without any dependency"), generate
+    TargetInfo("python", "the supervisor and its executor as one Python file without any dependency"), generate
 )
 
 __all__ = ["TARGET"]

@@ -2,13 +2,15 @@
 
 from robosc._version import __version__
 from robosc.automata.plants import communication_plant_name
-from robosc.errors import UnsupportedModelError
+from robosc.errors import InternalError, UnsupportedModelError
 from robosc.execution.interpreter import describe
 from robosc.execution.protocol import Description
-from robosc.expressions import DoubleType, values
+from robosc.expressions import DoubleType
+from robosc.model.structure import Deployment
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.events import has_plant_location
 from robosc.targets.python.allow import allow_method, conjuncts_method, requirements_method
+from robosc.targets.python.bundle import bundle, section_title
 from robosc.targets.python.provide import provide_method
 from robosc.targets.python.received import converter
 from robosc.targets.python.step import read_method, step_method
@@ -16,13 +18,6 @@ from robosc.targets.python.text import indent, printable
 from robosc.targets.python.when import matches_method
 from robosc.targets.python.writer import Writer, make_writer
 from robosc.targets.words import requirement_text
-
-_READING_FUNCTIONS = frozenset(
-    """
-    clamped elements flag_of integer known moved noted_enum noted_integer number number_at plain_elements
-    stays_in_range whole words_of
-    """.split()
-)
 
 OLDEST_PYTHON = (3, 8)
 """Generated code runs on this version of Python and later."""
@@ -36,49 +31,79 @@ def header(supervisor: Supervisor) -> str:
     )
 
 
-def supervisor_module(supervisor: Supervisor, package: str) -> str:
-    """The text of `supervisor.py`.
+RUNTIME = {
+    Deployment.CONTROLLER: ("robosc.targets.python.runtime.reading", "robosc.execution.asynchronous"),
+    Deployment.LAYER: ("robosc.targets.python.runtime.reading", "robosc.execution.layer"),
+}
+"""The modules that a supervisor runs on; they bring those that they need."""
+
+
+def supervisor_module(supervisor: Supervisor, usage: str) -> str:
+    """The whole text of the generated module.
 
     Args:
         supervisor: What to generate.
-        package: Relative name of the package with the runtime modules, e.g. `.runtime`.
+        usage: How it is used; stands at its top.
+
+    Raises:
+        UnsupportedModelError: An expression is nested too deeply for Python.
+    """
+    runtime = bundle(RUNTIME[supervisor.deployment])
+    contents = [f"  {name}: {title[0]}" for name, title, _ in runtime.sections]
+    lines = [
+        *header(supervisor).splitlines(),
+        f'"""The supervisor of the robot {supervisor.model.name}, and what it runs on.',
+        "",
+        *usage.splitlines(),
+        "",
+        "Below stand, none of which depends on the model:",
+        "",
+        *contents,
+        "",
+        "and at the end the supervisor itself.",
+        '"""',
+        "",
+        "from __future__ import annotations",
+        "",
+        *runtime.imports,
+        "",
+        "",
+    ]
+    return "\n".join(lines) + runtime.text() + "\n\n" + model_part(supervisor)
+
+
+def model_part(supervisor: Supervisor) -> str:
+    """The part of the generated module that depends on the model: it follows what it runs on.
 
     Raises:
         UnsupportedModelError: An expression is nested too deeply for Python.
     """
     too_deep = f"the model {supervisor.model.name} has an expression that is nested too deeply for Python"
     try:
-        text = _module(make_writer(supervisor), package)
+        text = _model_part(make_writer(supervisor))
         compile(text, "supervisor.py", "exec", dont_inherit=True)
     except (RecursionError, MemoryError, SyntaxError) as error:
         raise UnsupportedModelError(too_deep) from error
     return text
 
 
-def _module(writer: Writer, package: str) -> str:
+def _model_part(writer: Writer) -> str:
     functions = [converter(writer.layout, enum, writer.used) for enum in writer.model.enums]
     members = _class(writer)
-    lines = [
-        *header(writer.layout.supervisor).splitlines(),
-        *_module_docstring(writer),
-        "",
-        "from __future__ import annotations",
-        "",
-        *_imports(writer, package),
-        "",
-        "NO_DATA = Reading((), {}, (), False)",
-        "",
-    ]
+    missing = writer.used - bundle(RUNTIME[writer.layout.supervisor.deployment]).names
+    if missing:
+        raise InternalError(f"the runtime has no {', '.join(sorted(missing))}")
+    lines = [*section_title(_supervisor_title(writer)), "NO_DATA = Reading((), {}, (), False)", ""]
     for function in functions:
         lines += ["", *function, ""]
     return "\n".join([*lines, "", *members]) + "\n"
 
 
-def _module_docstring(writer: Writer) -> list[str]:
+def _supervisor_title(writer: Writer) -> list[str]:
     model = writer.model
     certificate = writer.layout.supervisor.certificate
     lines = [
-        f'"""The supervisor of the robot {model.name}, as Python.',
+        f"The supervisor of the robot {model.name}",
         "",
         "Attributes: `<Component>__state`, `<Component>__<variable>`, `<service or action>__location`.",
         "Methods: `allow_<event>` (is it allowed now?), `read_<event>` (convert its data), `step_<event>` (take it).",
@@ -93,19 +118,6 @@ def _module_docstring(writer: Writer) -> list[str]:
             "Requirements of the model:",
             *(f"  {printable(requirement_text(r))}" for r in model.requirements),
         ]
-    return [*lines, '"""']
-
-
-def _imports(writer: Writer, package: str) -> list[str]:
-    has_condition = any(item.when is not None for item in writer.model.communications)
-    protocol = ["MATCHES", "CommunicationInfo", "Description", *["Match"] * has_condition, "Reading"]
-    lines = [f"from {package}.protocol import {', '.join(protocol)}"]
-    reading = sorted(writer.used & _READING_FUNCTIONS)
-    kleene = sorted(name for name in writer.used - _READING_FUNCTIONS if hasattr(values, name))
-    if reading:
-        lines.append(f"from {package}.reading import {', '.join(reading)}")
-    if kleene:
-        lines.append(f"from {package}.values import {', '.join(kleene)}")
     return lines
 
 

@@ -2,7 +2,7 @@
 
 import json
 import pprint
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import resources
 
@@ -15,7 +15,7 @@ from robosc.supervisor.structure import Supervisor
 from robosc.targets.python.generate import header
 from robosc.targets.python.layout import make_layout
 from robosc.targets.python.naming import snake_case
-from robosc.targets.python.package import with_relative_imports
+from robosc.targets.python.package import beside_supervisor, python_text
 from robosc.targets.python.text import printable
 from robosc.targets.registry import GenerateOptions
 from robosc.targets.ros.runtime.parameters import Parameter
@@ -124,10 +124,24 @@ def chosen(parameters: tuple[Parameter, ...], options: GenerateOptions) -> tuple
     return tuple(item._replace(default=values.get(item.name, item.default)) for item in parameters)
 
 
-def copied_module(supervisor: Supervisor, folder: str, module: str) -> str:
-    """The text of a module, such as `early` of `robosc.targets.ros.runtime`, as it stands in a generated package."""
-    text = resources.files(folder).joinpath(f"{module}.py").read_text(encoding="utf-8")
-    return header(supervisor) + with_relative_imports(text)
+def python_files(supervisor: Supervisor, package: str, modules: Mapping[str, str]) -> dict[str, str]:
+    """A package's Python files that come from no template, by path: the supervisor, and what a node runs on.
+
+    Args:
+        supervisor: What to generate.
+        package: The package's name.
+        modules: Runtime modules, such as `early`, with the packages that they are copied from.
+    """
+    top = header(supervisor)
+    files = {
+        f"{package}/__init__.py": f'{top}"""The supervisor of the robot {supervisor.model.name} and its node."""\n',
+        f"{package}/supervisor.py": python_text(supervisor, f"{package}.supervisor"),
+        f"{package}/runtime/__init__.py": f'{top}"""What the node runs on: no part of it depends on the model."""\n',
+    }
+    for module, folder in modules.items():
+        text = resources.files(folder).joinpath(f"{module}.py").read_text(encoding="utf-8")
+        files[f"{package}/runtime/{module}.py"] = top + beside_supervisor(text)
+    return files
 
 
 def environment(target: str) -> jinja2.Environment:

@@ -4,14 +4,14 @@ from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Deployment
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.files import GeneratedFiles
-from robosc.targets.python.package import package_name, python_files
+from robosc.targets.python.package import package_name
 from robosc.targets.registry import GenerateOptions
 from robosc.targets.ros.package import (
     chosen,
     context,
-    copied_module,
     environment,
     packages,
+    python_files,
     release_identifiers,
     require_own_names,
     told_by,
@@ -29,7 +29,7 @@ _OWN_DEPENDENCIES = (
     "std_msgs",
 )
 
-# Where each module of a package's runtime comes from, beside those of the target `python`.
+# Where each module of a package's runtime comes from.
 _RUNTIME_MODULES = {
     "clients": "robosc.targets.ros2.runtime",
     "early": "robosc.targets.ros.runtime",
@@ -71,9 +71,7 @@ def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles
         values = context(supervisor, name, found, asked)
     values["dependencies"] = sorted({*_OWN_DEPENDENCIES, *packages(found, asked)})
     values["parameters"] = chosen(declarations(release_identifiers(found)), options)
-    files = {f"{name}/{path}": text for path, text in python_files(supervisor).items()}
-    for module, folder in _RUNTIME_MODULES.items():
-        files[f"{name}/runtime/{module}.py"] = copied_module(supervisor, folder, module)
+    files = python_files(supervisor, name, _RUNTIME_MODULES)
     templates = environment("robosc.targets.ros2")
     for path, template in _TEMPLATES.items():
         files[path.format(package=name)] = templates.get_template(template).render(values)

@@ -105,11 +105,9 @@ def test_what_is_not_known_is_a_warning(tmp_path: Path) -> None:
     assert "'supervisedController.a' is not known" in config.warnings[1]
 
 
-_JSON = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.text(max_size=8),
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner, max_size=3),
-    max_leaves=8,
-)
+_PLAIN = st.none() | st.booleans() | st.integers(-2, 2) | st.sampled_from(["", "a", "a/b", "..", "/a", "ros2", "a\nb"])
+_NAMES = st.sampled_from(["ros2", "ROS2", "c99", "..", "package", "executable", "launchFile", "x"])
+_JSON = _PLAIN | st.lists(_PLAIN, max_size=2) | st.dictionaries(_NAMES, _PLAIN, max_size=3)
 _KEYS = st.sampled_from(["publishStateInformation", "writeEventsToLog", "outputLocations", "supervisedController", "x"])
 
 
@@ -151,7 +149,7 @@ class TestCommand:
         written(model.parent, {"outputLocations": {"python": "there"}})
         chosen = ["--package", "blinks", "-o", str(tmp_path / "here")]
         assert main(["generate", str(model), "--target", "python", *chosen]) == 0
-        assert (tmp_path / "here/blinks/supervisor.py").is_file()
+        assert (tmp_path / "here/blinks.py").is_file()
         assert not (tmp_path / "there").exists()
 
     def test_without_any_folder_it_says_where_one_can_be_given(

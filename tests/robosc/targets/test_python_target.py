@@ -3,6 +3,8 @@
 import ast
 import itertools
 import re
+import subprocess
+import sys
 import textwrap
 from collections import Counter
 from pathlib import Path
@@ -32,7 +34,7 @@ from robosc.model.structure import (
 )
 from robosc.supervisor import decode, encode, make_supervisor
 from robosc.supervisor.structure import Supervisor
-from robosc.targets import GenerateOptions, generate
+from robosc.targets import GenerateOptions, generate, write_files
 from robosc.targets.events import events, is_controllable
 from support.generated import example_supervisor, imported, load_system, python_text, same
 from support.layers import BothSides
@@ -234,8 +236,8 @@ def test_every_file_says_where_it_comes_from() -> None:
         assert head[1] == f"# Model files SHA-256: {supervisor.certificate.bundle_sha256}", path
 
 
-def test_the_package_drives_an_executor_of_its_own(tmp_path: Path) -> None:
-    """Nothing of RoboSC is used but the files themselves."""
+def test_the_file_drives_an_executor_of_its_own(tmp_path: Path) -> None:
+    """Nothing of RoboSC is used but the file itself."""
     files = generate(example_supervisor("line_follower/line_follower"), "python", GenerateOptions(package="follower"))
     sent: list[tuple[str, Any]] = []
 
@@ -252,12 +254,9 @@ def test_the_package_drives_an_executor_of_its_own(tmp_path: Path) -> None:
         def publish_default(self, identifier: str) -> None:
             sent.append((identifier, None))
 
-    with (
-        imported(files, tmp_path, "follower.supervisor") as module,
-        imported(files, tmp_path, "follower.runtime.executor") as runtime,
-    ):
+    with imported(files, tmp_path, "follower") as module:
         log, clock = MemoryLog(), ManualClock()
-        executor = runtime.Executor(module.Supervisor(), Middleware(), None, clock, log)
+        executor = module.Executor(module.Supervisor(), Middleware(), None, clock, log)
         executor.start()
         executor.tick()
         executor.receive("/line/correction", 0.5)
@@ -270,17 +269,67 @@ def test_the_package_drives_an_executor_of_its_own(tmp_path: Path) -> None:
     assert happened == ["halt.request", "correction.response", "scan.response", "LidarSensor.tau_1", "move.request"]
 
 
-def test_the_package_of_a_layer_holds_back_what_is_not_allowed(tmp_path: Path) -> None:
+ASYNC_PROGRAM = """
+import asyncio, sys
+from maze import AsyncController, Supervisor
+
+class Robot:
+    def __init__(self): self.sent = []
+    def publish(self, message, data):
+        self.sent.append(message)
+        asyncio.get_event_loop().call_soon(self.controller.stop, "enough")
+    def publish_default(self, identifier): self.sent.append(identifier)
+
+async def main():
+    robot = Robot()
+    robot.controller = AsyncController(Supervisor(), robot)
+    await robot.controller.run()
+    print(robot.sent, [name for name in sys.modules if name.startswith("robosc")])
+
+asyncio.run(main())
+"""
+
+
+@pytest.mark.parametrize("interpreter", sorted({sys.executable, *map(str, Path("/usr/bin").glob("python3"))}))
+def test_the_file_alone_runs_in_another_program(interpreter: str, tmp_path: Path) -> None:
+    files = generate(example_supervisor("maze_solver/maze_solver"), "python", GenerateOptions(package="maze"))
+    write_files(files, tmp_path)
+    (tmp_path / "program.py").write_text(ASYNC_PROGRAM)
+    # Nothing of this environment is seen: no RoboSC, no installed package.
+    done = subprocess.run(
+        [interpreter, "-W", "error", "-s", "program.py"],
+        cwd=tmp_path,
+        env={},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("['rotate_left', '/cmd_vel'") and done.stdout.endswith("] []\n")
+
+
+def test_the_program_of_the_documentation_runs(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[3] / "docs/python.md").read_text(encoding="utf-8")
+    (program,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    assert "call_later(10.0," in program
+    write_files(generate(example_supervisor("maze_solver/maze_solver"), "python"), tmp_path)
+    (tmp_path / "program.py").write_text(program.replace("call_later(10.0,", "call_later(0.01,"))
+    done = subprocess.run([sys.executable, "program.py"], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.splitlines() == ["rotate_left 90", "/cmd_vel default"]
+
+
+def test_the_file_of_a_layer_holds_back_what_is_not_allowed(tmp_path: Path) -> None:
     """As its own text says it is used."""
     supervisor = example_supervisor("line_follower/line_follower_layer", Deployment.LAYER)
     files = generate(supervisor, "python", GenerateOptions(package="follower_layer"))
     sides = BothSides()
     with imported(files, tmp_path, "follower_layer") as package:
         names: dict[str, Any] = {"robot": sides, "caller": sides}
-        (code,) = re.findall(r"(?:^    .*\n|^\n(?=    ))+", package.__doc__, re.MULTILINE)
-        exec(textwrap.dedent(code), names)
+        (code,) = code_of(package)
+        exec(code, names)
         layer = names["layer"]
-        assert type(layer).__module__ == "follower_layer.runtime.layer"
+        assert type(layer).__module__ == "follower_layer"
         fast = {"linear": {"x": 0.2}}
         layer.on_request("/cmd_vel", fast)
         layer.receive("/line/correction", 0.5)
@@ -301,20 +350,25 @@ def test_the_package_of_a_layer_holds_back_what_is_not_allowed(tmp_path: Path) -
     ]
 
 
-def test_the_text_of_a_controllers_package_says_how_it_is_used(tmp_path: Path) -> None:
+def code_of(module: Any) -> list[str]:
+    """The pieces of code in a module's text."""
+    return [textwrap.dedent(code) for code in re.findall(r"(?:^    .*\n|^\n(?=    ))+", module.__doc__, re.MULTILINE)]
+
+
+def test_the_text_of_a_controllers_file_says_how_it_is_used(tmp_path: Path) -> None:
     files = generate(example_supervisor("maze_solver/maze_solver"), "python", GenerateOptions(package="maze"))
     with imported(files, tmp_path, "maze") as package:
+        _, code = code_of(package)
         names: dict[str, Any] = {"middleware": BothSides()}
-        (code,) = re.findall(r"(?:^    .*\n|^\n(?=    ))+", package.__doc__, re.MULTILINE)
-        exec(textwrap.dedent(code), names)
+        exec(code, names)
         names["executor"].tick()
     assert [sent[:2] for sent in names["middleware"].sent] == [("publish", "rotate_left")]
 
 
 def test_a_package_may_be_called_as_one_likes() -> None:
     supervisor = example_supervisor("line_follower/line_follower")
-    assert all(path.startswith("my_robot/") for path in generate(supervisor, "python", GenerateOptions("my_robot")))
-    for name in ("My", "1a", "a b", "../x", "a__b", "", "a" * 300):
+    assert list(generate(supervisor, "python", GenerateOptions("my_robot"))) == ["my_robot.py"]
+    for name in ("My", "1a", "a b", "../x", "a__b", "", "a" * 300, "class"):
         with pytest.raises(UnsupportedModelError, match="is no name for a package"):
             generate(supervisor, "python", GenerateOptions(name))
 

@@ -67,9 +67,7 @@ def test_a_plug_in_is_found_by_its_entry_point(monkeypatch: pytest.MonkeyPatch) 
 
     find("robosc.targets.python:TARGET")
     assert TargetInfo("plug", "plug-in robosc.targets.python:TARGET") in available_targets()
-    assert "line_follower_supervisor/supervisor.py" in generate(
-        example_supervisor("line_follower/line_follower"), "plug"
-    )
+    assert "line_follower_supervisor.py" in generate(example_supervisor("line_follower/line_follower"), "plug")
     find("json:dumps")
     with pytest.raises(UnknownTargetError, match="plug-in of target 'plug'"):
         generate(example_supervisor("line_follower/line_follower"), "plug")

@@ -67,7 +67,7 @@ def test_everything_that_a_package_needs_is_there(files: GeneratedFiles) -> None
         f"{PACKAGE}/node.py",
         f"{PACKAGE}/start.py",
         f"{PACKAGE}/supervisor.py",
-        f"{PACKAGE}/runtime/executor.py",
+        f"{PACKAGE}/runtime/early.py",
     } <= set(files)
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from robosc.expressions import values
+from robosc.expressions.values import array_part, read_double, read_integer, read_whole
 
 NAN = float("nan")
 
@@ -15,7 +15,7 @@ NAN = float("nan")
 def array(value: Any) -> Any:
     """The elements of a received array; None where something else came."""
     try:
-        return values.array_part(value)
+        return array_part(value)
     except Exception:  # Foreign objects may do anything when they are asked for a part.
         return None
 
@@ -43,7 +43,7 @@ def plain_elements(value: Any, convert: Any) -> Any:
 
 def noted_integer(value: Any, path: str, notes: Any, low: int, high: int) -> Any:
     """A received integer moved into its declared range, noted if it was; None where something else came."""
-    value = values.read_whole(value)
+    value = read_whole(value)
     if value is None:
         return None
     notes.append((moved(path, value, low, high), False))
@@ -71,7 +71,7 @@ def number(value: Any) -> Any:
     """A received number as a double; NaN where something else came."""
     if type(value) is float:
         return value
-    result = values.read_double(value)
+    result = read_double(value)
     return NAN if result is None else result
 
 
@@ -86,13 +86,13 @@ def number_at(array: Any, index: int) -> Any:
 
 def integer(value: Any) -> Any:
     """A received integer; NaN where something else came or it needs more than 32 bits."""
-    result = values.read_integer(value)
+    result = read_integer(value)
     return NAN if result is None else result
 
 
 def whole(value: Any) -> Any:
     """A received integer of any size, for a declared range; NaN where something else came."""
-    result = values.read_whole(value)
+    result = read_whole(value)
     return NAN if result is None else result
 
 

@@ -1,5 +1,6 @@
 """What comes while a node waits for its servers: held, and taken in before the first decision."""
 
+import importlib
 import warnings
 from pathlib import Path
 from types import SimpleNamespace
@@ -150,7 +151,8 @@ def test_a_node_that_waits_for_its_servers_loses_nothing_and_its_stop_reaches_lo
                 published.append(communication)
 
         monkeypatch.setattr(generated, "Middleware", Middleware)
-        monkeypatch.setattr(generated, "Diagnostics", lambda node: SimpleNamespace(publish=lambda health: None))
+        host = importlib.import_module("guarded_controller.host")
+        monkeypatch.setattr(host, "Diagnostics", lambda node: SimpleNamespace(publish=lambda health: None))
         controller = generated.Controller(Node())
         controller.start()
         callbacks["/stop"]("/stop", None)

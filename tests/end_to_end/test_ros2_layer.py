@@ -142,6 +142,16 @@ def test_a_controller_that_dies_leaves_a_robot_that_stands_still(porter: Porter)
     assert len(porter.commands) == stood
 
 
+def test_a_controller_that_falls_silent_after_a_zero_is_left_alone(porter: Porter) -> None:
+    porter.start("server_wait:=0.0", "command_timeout:=0.2")
+    porter.until(lambda: bool(porter.commands), "a halt", lambda: porter.send(0.0))
+    porter.peer.spin_for(0.6)
+    events = porter.end()
+    begin = next(index for index, entry in enumerate(events) if entry.get("event") == "halt.request")
+    end = next(index for index, entry in enumerate(events) if entry["kind"] == "stop")
+    assert "release" not in {entry["kind"] for entry in events[begin:end]}
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_a_signal_stops_the_robot_first(porter: Porter, number: signal.Signals) -> None:
     porter.start("server_wait:=0.0", "command_timeout:=0.0", command=("-m", f"{PACKAGE}.node"))

@@ -116,7 +116,7 @@ _BUILT_IN: dict[str, tuple[str, str]] = {
         "robosc.targets.python:TARGET",
     ),
     "ros2": (
-        "a complete ROS 2 package (ament_python): controller node, launch file, parameters",
+        "a complete ROS 2 package (ament_python): controller or layer node, launch file, parameters",
         "robosc.targets.ros2:TARGET",
     ),
 }

@@ -19,10 +19,12 @@ class Recorded:
 
 _CLASSES = {
     "launch": ["LaunchDescription"],
-    "launch.actions": ["DeclareLaunchArgument"],
-    "launch.substitutions": ["LaunchConfiguration"],
+    "launch.actions": ["DeclareLaunchArgument", "Shutdown"],
+    "launch.conditions": ["IfCondition"],
+    "launch.substitutions": ["LaunchConfiguration", "NotEqualsSubstitution"],
     "launch_ros": [],
     "launch_ros.actions": ["Node"],
+    "launch_ros.parameter_descriptions": ["ParameterValue"],
     "ament_index_python": [],
     "ament_index_python.packages": [],
 }

@@ -117,6 +117,11 @@ class RosProcess:
         """Whether it has not ended."""
         return self._process.poll() is None
 
+    def cpu_s(self) -> float:
+        """Seconds of a processor that it has used so far."""
+        fields = Path(f"/proc/{self._process.pid}/stat").read_text().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
     def signal(self, number: signal.Signals) -> None:
         """Send a signal."""
         self._process.send_signal(number)

@@ -10,7 +10,7 @@ import jinja2
 
 from robosc._version import __version__
 from robosc.errors import UnsupportedModelError
-from robosc.model.structure import Communication, CommunicationKind, Interface, Model
+from robosc.model.structure import Communication, CommunicationKind, Deployment, Interface, Model
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.python.generate import header
 from robosc.targets.python.layout import make_layout
@@ -99,7 +99,8 @@ def context(
         "topics": found,
         "release_identifiers": release_identifiers(found),
         "servers": asked,
-        "shapes": _shapes(model),
+        "deployment": str(supervisor.deployment),
+        "shapes": _shapes(model, supervisor.deployment),
         "sent": {item.name: sent_paths(model, item) for item in requested},
         "starter": f"start_{snake_case(model.name)[:MAXIMUM_STARTER]}",
         "requests": tuple(f"{item.name}.request" for item in requested),
@@ -110,8 +111,10 @@ def context(
     }
 
 
-def _shapes(model: Model) -> dict[str, object]:
-    return {event: shape for item in model.communications for event, shape in shapes_of(model, item).items()}
+def _shapes(model: Model, deployment: Deployment) -> dict[str, object]:
+    return {
+        event: shape for item in model.communications for event, shape in shapes_of(model, item, deployment).items()
+    }
 
 
 def chosen(parameters: tuple[Parameter, ...], options: GenerateOptions) -> tuple[Parameter, ...]:

@@ -19,6 +19,7 @@ from robosc.expressions import (
 from robosc.model.structure import (
     Communication,
     CommunicationKind,
+    Deployment,
     Interface,
     Model,
     ObjectValue,
@@ -200,15 +201,23 @@ def _require_one_quality(identifier: str, items: list[Communication]) -> None:
             )
 
 
-def shapes_of(model: Model, communication: Communication) -> dict[str, Shape]:
+def shapes_of(
+    model: Model, communication: Communication, deployment: Deployment = Deployment.CONTROLLER
+) -> dict[str, Shape]:
     """What the model says about data, by the event that carries it: every property that its types declare.
+
+    A controller makes the data of its requests; a layer receives it from an existing controller.
 
     Raises:
         UnsupportedModelError: A request sends an enum, or an object type contains itself.
     """
     return {
         f"{communication.name}.{part}": _shape(
-            model, communication, getattr(communication, part) or NoneType(), (), part == "request"
+            model,
+            communication,
+            getattr(communication, part) or NoneType(),
+            (),
+            part == "request" and deployment is Deployment.CONTROLLER,
         )
         for part in _PARTS[communication.kind]
     }

@@ -1,6 +1,7 @@
-"""The target `ros2`: a complete ament_python package around the generated supervisor."""
+"""The target `ros2`: a complete ament_python package around the generated supervisor, a controller or a layer."""
 
-from robosc.errors import UnsupportedModelError
+from functools import partial
+
 from robosc.model.structure import Deployment
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.files import GeneratedFiles
@@ -18,6 +19,8 @@ from robosc.targets.ros.package import (
 )
 from robosc.targets.ros.runtime.parameters import declarations
 from robosc.targets.ros.topics import servers, topics
+from robosc.targets.ros2.layer import remapped_names, require_names_of_a_layer
+from robosc.targets.ros2.runtime.supervised import callers_name, robots_name
 
 _OWN_DEPENDENCIES = (
     "ament_index_python",
@@ -28,6 +31,8 @@ _OWN_DEPENDENCIES = (
     "rclpy",
     "std_msgs",
 )
+
+_TITLES = {Deployment.CONTROLLER: "Supervisory controller", Deployment.LAYER: "Supervision layer"}
 
 # Where each module of a package's runtime comes from.
 _RUNTIME_MODULES = {
@@ -40,20 +45,49 @@ _RUNTIME_MODULES = {
     "scans": "robosc.targets.ros.runtime",
 }
 
+_RUNTIME_MODULES_OF = {
+    Deployment.CONTROLLER: {"late_controller": "robosc.targets.ros.runtime"},
+    Deployment.LAYER: {
+        "defaults": "robosc.targets.ros2.runtime",
+        "late_layer": "robosc.targets.ros.runtime",
+        "servers": "robosc.targets.ros2.runtime",
+        "supervised": "robosc.targets.ros2.runtime",
+    },
+}
+
 # Path of each file from a template: the template's name.
 _TEMPLATES = {
-    "README.md": "README.md.j2",
     "config/parameters.yaml": "parameters.yaml.j2",
-    "launch/controller.launch.py": "controller.launch.py.j2",
     "package.xml": "package.xml.j2",
     "setup.cfg": "setup.cfg.j2",
     "setup.py": "setup.py.j2",
     "test/test_supervisor.py": "test_supervisor.py.j2",
+    "{package}/connections.py": "connections.py.j2",
+    "{package}/diagnostics.py": "diagnostics.py.j2",
+    "{package}/host.py": "host.py.j2",
     "{package}/interfaces.py": "interfaces.py.j2",
-    "{package}/middleware.py": "middleware.py.j2",
-    "{package}/node.py": "node.py.j2",
-    "{package}/start.py": "start.py.j2",
+    "{package}/life.py": "life.py.j2",
+    "{package}/parameter_file.py": "parameter_file.py.j2",
     "{package}/state_topic.py": "state_topic.py.j2",
+}
+
+_TEMPLATES_OF = {
+    Deployment.CONTROLLER: {
+        "README.md": "README.md.j2",
+        "launch/controller.launch.py": "controller.launch.py.j2",
+        "{package}/middleware.py": "middleware.py.j2",
+        "{package}/node.py": "node.py.j2",
+        "{package}/start.py": "start.py.j2",
+    },
+    Deployment.LAYER: {
+        "README.md": "README_layer.md.j2",
+        "launch/layer.launch.py": "layer.launch.py.j2",
+        "test/test_layer.py": "test_layer.py.j2",
+        "{package}/caller.py": "caller.py.j2",
+        "{package}/node.py": "layer_node.py.j2",
+        "{package}/robot.py": "robot.py.j2",
+        "{package}/start.py": "start_layer.py.j2",
+    },
 }
 
 
@@ -63,25 +97,23 @@ def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles
     Raises:
         UnsupportedModelError: The model has something that this version cannot do on ROS 2.
     """
-    name = package_name(supervisor, options, "controller")
+    deployment = supervisor.deployment
+    name = package_name(supervisor, options, str(deployment))
     with told_by("ros2"):
-        _require_controller(supervisor)
         found, asked = topics(supervisor.model), servers(supervisor.model)
         require_own_names(name, found, asked)
+        if deployment is Deployment.LAYER:
+            require_names_of_a_layer(found, asked)
         values = context(supervisor, name, found, asked)
+    values["title"] = _TITLES[deployment]
     values["dependencies"] = sorted({*_OWN_DEPENDENCIES, *packages(found, asked)})
-    values["parameters"] = chosen(declarations(release_identifiers(found)), options)
-    files = python_files(supervisor, name, _RUNTIME_MODULES)
+    values["parameters"] = chosen(declarations(release_identifiers(found), str(deployment)), options)
+    values["remapped"] = remapped_names(found, asked)
+    files = python_files(supervisor, name, _RUNTIME_MODULES | _RUNTIME_MODULES_OF[deployment])
     templates = environment("robosc.targets.ros2")
-    for path, template in _TEMPLATES.items():
+    templates.filters["robots"] = partial(robots_name, "")
+    templates.filters["callers"] = partial(callers_name, "")
+    for path, template in (_TEMPLATES | _TEMPLATES_OF[deployment]).items():
         files[path.format(package=name)] = templates.get_template(template).render(values)
     files[f"resource/{name}"] = ""
     return GeneratedFiles(files)
-
-
-def _require_controller(supervisor: Supervisor) -> None:
-    if supervisor.deployment is not Deployment.CONTROLLER:
-        raise UnsupportedModelError(
-            f"the supervisor of {supervisor.model.name} was made for the deployment "
-            f"'{supervisor.deployment}', and this version generates controllers only"
-        )

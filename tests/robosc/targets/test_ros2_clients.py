@@ -228,7 +228,7 @@ def test_how_a_goal_ends(status: int, outcome: str) -> None:
     handle = world.accepted(3)
     world.client.feedback(SimpleNamespace(feedback="near"))
     handle.result_future.done(SimpleNamespace(status=status, result="there"))
-    result = "there" if outcome == "succeeded" else None
+    result = None if outcome == "lost" else "there"
     assert world.told() == [("on_feedback", 3, "near"), ("on_goal_ended", 3, outcome, result)]
 
 

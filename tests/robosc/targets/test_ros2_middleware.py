@@ -1,5 +1,6 @@
 """Goals with headers: no action in a package index has one, so the action is made of other real messages."""
 
+import importlib
 import sys
 import types
 import warnings
@@ -71,7 +72,7 @@ def test_every_stamped_field_of_a_goal_gets_time_and_frame(monkeypatch: pytest.M
     settings = SimpleNamespace(service_timeout_s=None)
     parameters = SimpleNamespace(topic_prefix="/r", resample_scans=False, settings=settings)
     with imported(generate(supervisor, "ros2"), tmp_path, "planner_controller.middleware") as generated:
-        monkeypatch.setattr(generated, "ActionClient", Client)
+        monkeypatch.setattr(importlib.import_module("planner_controller.connections"), "ActionClient", Client)
         middleware = generated.Middleware(node, parameters, lambda: 0.0)
         data = {"goal": {"pose": {"position": {"x": 2.5}}}, "tolerance": 0.5}
         middleware.send_goal("go", 1, middleware.prepare("go", data))

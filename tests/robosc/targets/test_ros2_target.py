@@ -304,14 +304,6 @@ def test_what_it_cannot_do_is_refused_with_its_name(body: str, problem: str) -> 
     assert "\n" not in message
 
 
-def test_a_layer_is_refused() -> None:
-    supervisor = example_supervisor("line_follower/line_follower_layer", Deployment.LAYER)
-    with pytest.raises(
-        UnsupportedModelError, match="was made for the deployment 'layer', and this version generates contr"
-    ):
-        generate(supervisor, "ros2")
-
-
 # Hostile texts.
 
 HOSTILE = r"""

@@ -1,5 +1,6 @@
 """What comes while a node waits for its servers: held, and taken in before the first decision."""
 
+import importlib
 import warnings
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,9 +14,12 @@ from robosc.execution.settings import Settings
 from robosc.model.structure import Deployment
 from robosc.supervisor.structure import Supervisor
 from robosc.targets import generate
-from robosc.targets.ros.runtime.early import HeldMessages, LateExecutor
+from robosc.targets.ros.runtime.early import HeldMessages
+from robosc.targets.ros.runtime.late_controller import LateExecutor
+from robosc.targets.ros.runtime.late_layer import LateLayer
 from support.execution import RecordingMiddleware, system_of
 from support.generated import imported
+from support.layers import BothSides
 from support.models import model_of
 from support.random_supervisors import CERTIFICATE
 
@@ -94,6 +98,30 @@ def test_what_is_too_old_at_the_start_is_stale_until_it_is_back() -> None:
     assert executor.status is Status.RUNNING
 
 
+def test_a_layer_holds_everything_back_before_it_begins_and_then_passes_on_what_came() -> None:
+    clock, sides = ManualClock(), BothSides()
+    text = """robot Gate { component C {
+        outgoing message open with identifier: "/open", type: none
+        incoming message go with identifier: "/go", type: none
+        behaviour {
+            initial marked state shut { on response from open goto wide }
+            marked state wide { on request to go }
+        } } }"""
+    layer = LateLayer(system_of(text, Deployment.LAYER), sides, sides, Settings(max_age_s={"/open": 1.0}), clock)
+    layer.on_request("/go", None)
+    assert sides.sent == [("blocked", "/go")]
+    came_s = clock.monotonic()
+    clock.advance(0.7)
+    layer.start_with([("/open", None, came_s)])
+    layer.on_request("/go", None)
+    assert sides.sent[1:] == [("pass", "/open", None), ("publish", "go", None)]
+    # Its age counts from when it came.
+    clock.advance(0.4)
+    layer.on_request("/go", None)
+    assert layer.reasons == ("open on /open is stale",)
+    assert sides.sent[-1] == ("blocked", "/go")
+
+
 class Node:
     """A node that makes nothing."""
 
@@ -150,7 +178,8 @@ def test_a_node_that_waits_for_its_servers_loses_nothing_and_its_stop_reaches_lo
                 published.append(communication)
 
         monkeypatch.setattr(generated, "Middleware", Middleware)
-        monkeypatch.setattr(generated, "Diagnostics", lambda node: SimpleNamespace(publish=lambda health: None))
+        host = importlib.import_module("guarded_controller.host")
+        monkeypatch.setattr(host, "Diagnostics", lambda node: SimpleNamespace(publish=lambda health: None))
         controller = generated.Controller(Node())
         controller.start()
         callbacks["/stop"]("/stop", None)

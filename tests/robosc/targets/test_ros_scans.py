@@ -4,6 +4,7 @@ import math
 import struct
 import time
 from array import array
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -133,3 +134,24 @@ def test_a_message_stays_a_valid_scan() -> None:
     assert (changed.range_min, changed.range_max, changed.scan_time) == (0.25, 8.0, 0.2)
     assert changed.header.frame_id == "laser"
     assert len(changed.intensities) == 0 and changed.time_increment == 0.0
+
+
+def test_a_resampled_copy_leaves_the_scan_as_it_is() -> None:
+    scan = SimpleNamespace(
+        ranges=array("f", [2.0, 1.0]),
+        intensities=array("f", [3.0, 4.0]),
+        angle_min=0.0,
+        angle_max=0.1,
+        angle_increment=0.1,
+        time_increment=0.5,
+        range_min=0.0,
+        range_max=9.0,
+    )
+    before = dict(vars(scan))
+    resampler = Resampler()
+    seen = resampler.resampled(scan)
+    assert vars(scan) == before
+    assert len(seen.ranges) == 360
+    assert (seen.ranges[0], seen.ranges[6]) == (2.0, 1.0)
+    assert resampler.resampled(scan) is seen
+    assert resampler.resampled(SimpleNamespace(**before)) is not seen

@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
-from robosc.execution.executor import Executor
+from robosc.execution.runner import Runner
 
 
 class HeldMessages:
@@ -41,28 +41,28 @@ class HeldMessages:
         return [entry[1:] for entry in held]
 
 
-class LateExecutor(Executor):
-    """An executor that starts with what came before."""
+class LateRunner(Runner):
+    """An executor of either deployment that starts with what came before."""
 
     _came_s: float | None = None
 
     def start_with(self, messages: list[tuple[str, Any, float]]) -> None:
-        """Begin in the initial state and take messages in; nothing is decided before the last one.
+        """Begin in the initial state and take messages in, before anything is requested.
 
         Args:
             messages: Identifier, message and time of each, in the order in which they came.
         """
         self.start()
-        decides = self._decides_after_batch
-        self._decides_after_batch = False
+        self._take_in(messages)
+        # A sensor whose last message is too old by now is stale already.
+        self._deadline_s = self._now_s
+        self.watch()
+
+    def _take_in(self, messages: list[tuple[str, Any, float]]) -> None:
         for identifier, message, came_s in messages:
             self._came_s = came_s
             self.receive(identifier, message)
         self._came_s = None
-        self._decides_after_batch = decides
-        # A sensor whose last message is too old by now is stale already.
-        self._deadline_s = self._now_s
-        self.watch()
 
     def _see(self, name: str) -> None:
         if self._came_s is None:

@@ -1,4 +1,4 @@
-"""What `/diagnostics` says about a controller.
+"""What `/diagnostics` says about a controller or a supervision layer.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -8,9 +8,8 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import NamedTuple
 
-from robosc.execution.executor import Executor
 from robosc.execution.recorder import Counters
-from robosc.execution.runner import Status
+from robosc.execution.runner import Runner, Status
 
 
 class Level(IntEnum):
@@ -45,7 +44,7 @@ class HealthMonitor:
         missing_servers: Servers that the start waits for.
     """
 
-    def __init__(self, executor: Executor) -> None:
+    def __init__(self, executor: Runner) -> None:
         self._executor = executor
         self._before = executor.counters
         self._decision_us: float | None = None

@@ -20,8 +20,11 @@ MAXIMUM_PERIOD_S = 3600.0
 USE_SIM_TIME = "use_sim_time"
 """Every ROS node has this parameter by itself."""
 
+CONTROLLER, LAYER = "controller", "layer"
+"""The deployments."""
+
 # Settings that have another name as parameters.
-_SETTING_NAMES = {"period": "period_s", "max_age": "max_age_s"}
+_SETTING_NAMES = {"period": "period_s", "max_age": "max_age_s", "command_timeout": "command_timeout_s"}
 
 
 class ParameterError(Exception):
@@ -34,6 +37,27 @@ class Parameter(NamedTuple):
     name: str
     default: Any
     description: str
+
+
+_OF_A_CONTROLLER = (
+    Parameter("period", 0.1, "Seconds between decisions: at most one request is issued each time."),
+    Parameter("policy", "fair", "Which enabled request is issued: fair, random, priority (the list, then fair)."),
+    Parameter("priority", [""], "Messages in order of urgency, for the policy priority."),
+    Parameter("seed", 0, "Seed of the policy random."),
+    Parameter("every", "period", "When to decide: each period, or after each event as well (event)."),
+)
+
+_OF_A_LAYER = (
+    Parameter("period", 0.1, "Seconds between messages on /state (publish_state): a layer decides nothing by itself."),
+    Parameter(
+        "command_timeout",
+        1.0,
+        "Seconds without a message from the existing controller on a release identifier after which its last one is "
+        "taken back with the all-default message; 0 for never.",
+    ),
+)
+
+_RESAMPLED_IN_A_LAYER = " Only the supervisor sees it so: what is passed on is unchanged."
 
 
 class Parameters(NamedTuple):
@@ -56,14 +80,11 @@ class Parameters(NamedTuple):
     resample_scans: bool
 
 
-def declarations(release_identifiers: Sequence[str]) -> tuple[Parameter, ...]:
-    """Every parameter, given the release identifiers that the model suggests."""
+def declarations(release_identifiers: Sequence[str], deployment: str = CONTROLLER) -> tuple[Parameter, ...]:
+    """Every parameter of a deployment, given the release identifiers that the model suggests."""
+    is_layer = deployment == LAYER
     return (
-        Parameter("period", 0.1, "Seconds between decisions: at most one request is issued each time."),
-        Parameter("policy", "fair", "Which enabled request is issued: fair, random, priority (the list, then fair)."),
-        Parameter("priority", [""], "Messages in order of urgency, for the policy priority."),
-        Parameter("seed", 0, "Seed of the policy random."),
-        Parameter("every", "period", "When to decide: each period, or after each event as well (event)."),
+        *(_OF_A_LAYER if is_layer else _OF_A_CONTROLLER),
         Parameter(
             "release_identifiers",
             list(release_identifiers) or [""],
@@ -95,7 +116,7 @@ def declarations(release_identifiers: Sequence[str]) -> tuple[Parameter, ...]:
         Parameter(
             "server_wait",
             5.0,
-            "Seconds that the start waits for the servers of all services and actions; the controller then starts "
+            f"Seconds that the start waits for the servers of all services and actions; the {deployment} then starts "
             "without those that are missing, and their requests fail until they are there.",
         ),
         Parameter(
@@ -103,12 +124,14 @@ def declarations(release_identifiers: Sequence[str]) -> tuple[Parameter, ...]:
             False,
             "Whether every received sensor_msgs/LaserScan is brought to 360 ranges, one for each degree "
             "counter-clockwise from straight ahead (the smallest valid one, NaN if there is none), so that ranges[270] "
-            "is what stands at 270 degrees whatever the LiDAR.",
+            "is what stands at 270 degrees whatever the LiDAR." + (_RESAMPLED_IN_A_LAYER if is_layer else ""),
         ),
         Parameter(
             "topic_prefix",
             "",
-            'Put before every topic, service and action name of the model and before /state, such as "/robot1".',
+            "Put before every topic, service and action name of the model"
+            + (", before /supervised, /blocked" if is_layer else "")
+            + ' and before /state, such as "/robot1".',
         ),
         Parameter("log_folder", "", "Folder for the event log (JSON Lines); empty for none."),
         Parameter("publish_state", False, "Whether state and transitions are published on /state each period."),
@@ -131,12 +154,8 @@ def validate(given: Mapping[str, Any], description: Description) -> Parameters:
     Raises:
         ParameterError: A value is wrong.
     """
-    settings = Settings(
+    settings = _of_deployment(given, description.deployment)._replace(
         period_s=given["period"],
-        policy=given["policy"],
-        priority=_texts(given, "priority"),
-        seed=given["seed"],
-        every=given["every"],
         release_identifiers=_texts(given, "release_identifiers"),
         max_age_s=_ages(given),
         service_timeout_s=_seconds(given, "service_timeout") or None,
@@ -157,6 +176,15 @@ def validate(given: Mapping[str, Any], description: Description) -> Parameters:
         publish_state=_boolean(given, "publish_state"),
         server_wait_s=_seconds(given, "server_wait"),
         resample_scans=_boolean(given, "resample_scans"),
+    )
+
+
+def _of_deployment(given: Mapping[str, Any], deployment: str) -> Settings:
+    """The settings that only one deployment has."""
+    if deployment == LAYER:
+        return Settings(command_timeout_s=given["command_timeout"])
+    return Settings(
+        policy=given["policy"], priority=_texts(given, "priority"), seed=given["seed"], every=given["every"]
     )
 
 
@@ -219,7 +247,16 @@ def _number(text: str) -> float | None:
 
 
 def _prefix(given: Mapping[str, Any]) -> str:
-    prefix = _text(given, "topic_prefix").rstrip("/")
+    return valid_prefix(_text(given, "topic_prefix"))
+
+
+def valid_prefix(text: str) -> str:
+    """A valid value of the parameter `topic_prefix`, without a slash at its end.
+
+    Raises:
+        ParameterError: The value is wrong.
+    """
+    prefix = text.rstrip("/")
     if prefix and not _PREFIX.match(prefix):
         raise _wrong("topic_prefix", prefix, 'empty or the beginning of a topic name, such as "/robot1"')
     return prefix

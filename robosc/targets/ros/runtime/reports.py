@@ -8,20 +8,20 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
-from robosc.execution.executor import Executor
+from robosc.execution.runner import Runner
 
 
 class Reports:
     """What became of calls and goals, kept until the executor may be told."""
 
     def __init__(self) -> None:
-        self._waiting: deque[Callable[[Executor], None]] = deque()
+        self._waiting: deque[Callable[[Runner], None]] = deque()
 
-    def add(self, report: Callable[[Executor], None]) -> None:
+    def add(self, report: Callable[[Runner], None]) -> None:
         """Keep a report for the executor."""
         self._waiting.append(report)
 
-    def deliver(self, executor: Executor) -> bool:
+    def deliver(self, executor: Runner) -> bool:
         """Tell what was kept until now; what that brings about waits for the next time. Whether there was anything."""
         count = len(self._waiting)
         for _ in range(count):

@@ -7,6 +7,7 @@ A copy of this module stands in generated packages, which run on Python 3.8 and 
 
 from __future__ import annotations
 
+import copy
 import math
 from array import array
 from typing import Any
@@ -32,6 +33,8 @@ class Resampler:
     def __init__(self) -> None:
         self._angles: tuple[float, float, int] = (_NAN, _NAN, 0)
         self._bins: list[int] = []
+        self._seen: Any = None
+        self._copy: Any = None
 
     def ranges(self, angle_min: float, angle_increment: float, ranges: Any, low: float, high: float) -> array[float]:
         """The smallest valid range of each bin; NaN where there is none.
@@ -63,3 +66,10 @@ class Resampler:
         scan.angle_increment = 1.0 / _BINS_PER_RADIAN
         scan.angle_max = (BIN_COUNT - 1) / _BINS_PER_RADIAN
         return scan
+
+    def resampled(self, scan: Any) -> Any:
+        """A copy with 360 ranges, the scan left as it is; asked for one scan several times, the same copy."""
+        if scan is not self._seen:
+            # A shallow one: whatever is resampled is replaced, not changed.
+            self._seen, self._copy = scan, self.resample(copy.copy(scan))
+        return self._copy

@@ -296,7 +296,7 @@ class ActionGoals:
         answer = future.result()
         # Any other status means that the server does not know the goal: it was started anew.
         outcome = _OUTCOMES.get(answer.status, "lost")
-        self._end(goal_id, outcome, answer.result if outcome == "succeeded" else None)
+        self._end(goal_id, outcome, None if outcome == "lost" else answer.result)
 
     def _cancel_answered(self, goal_id: int, future: Any) -> None:
         if goal_id not in self._goals or future.exception() is not None:

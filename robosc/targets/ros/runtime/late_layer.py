@@ -1,0 +1,13 @@
+"""A supervision layer that takes in what came before its start.
+
+A copy of this module stands in generated packages, which run on Python 3.8 and later.
+"""
+
+from __future__ import annotations
+
+from robosc.execution.layer import Layer
+from robosc.targets.ros.runtime.early import LateRunner
+
+
+class LateLayer(LateRunner, Layer):
+    """A supervision layer that starts with what came before, and passes it on then."""

@@ -1,0 +1,63 @@
+"""What a supervision layer means on ROS 2, and which names of a model have no meaning there."""
+
+from collections.abc import Iterable
+
+from robosc.errors import UnsupportedModelError
+from robosc.model.structure import Communication, CommunicationKind
+from robosc.targets.ros.topics import Topic
+from robosc.targets.ros2.runtime.supervised import BLOCKED, SUPERVISED, remapped, robots_name
+
+
+def remapped_names(found: tuple[Topic, ...], asked: tuple[Communication, ...]) -> tuple[tuple[str, str], ...]:
+    """Old and new name of everything that an existing controller has to call otherwise."""
+    services = [item.identifier for item in asked if item.kind is CommunicationKind.SERVICE]
+    actions = [item.identifier for item in asked if item.kind is CommunicationKind.ACTION]
+    return remapped([*(topic.identifier for topic in found), *services], actions)
+
+
+def require_names_of_a_layer(found: tuple[Topic, ...], asked: tuple[Communication, ...]) -> None:
+    """Do nothing if the names on both sides of a layer say which of the model's communications something is.
+
+    Raises:
+        UnsupportedModelError: They do not; says which and why.
+    """
+    for identifier in (*(topic.identifier for topic in found), *(item.identifier for item in asked)):
+        _require_own_sides(identifier)
+    for topic in found:
+        if robots_name("", topic.identifier) == BLOCKED:
+            raise UnsupportedModelError(
+                f"the topic {topic.identifier} is where a supervision layer tells what it holds back"
+            )
+        if topic.published and topic.received:
+            raise UnsupportedModelError(
+                f"'{topic.published[0].name}' goes to the topic {topic.identifier} and '{topic.received[0].name}' "
+                "comes from it: a supervision layer would take what it lets through for a message of the robot"
+            )
+    _require_one_each("topics", ((topic.identifier, topic.identifier) for topic in found))
+    for kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION):
+        _require_one_each(f"{kind}s", ((item.identifier, item.name) for item in asked if item.kind is kind))
+
+
+def _require_own_sides(identifier: str) -> None:
+    if identifier.startswith("~"):
+        raise UnsupportedModelError(
+            f"the name {identifier} belongs to one node, and a supervision layer stands between two: "
+            "give it a name such as /x"
+        )
+    if f"{robots_name('', identifier)}/".startswith(f"{SUPERVISED}/"):
+        raise UnsupportedModelError(
+            f"the name {identifier} is on the existing controller's side of a supervision layer"
+        )
+
+
+def _require_one_each(what: str, named: Iterable[tuple[str, str]]) -> None:
+    """A layer cannot tell apart what comes on one name, but for messages with `when`."""
+    first: dict[str, str] = {}
+    for identifier, text in named:
+        name = robots_name("", identifier)
+        other = first.setdefault(name, text)
+        if other != text:
+            raise UnsupportedModelError(
+                f"the {what} '{other}' and '{text}' have one name, {name}: a supervision layer could not tell which of "
+                "them is meant"
+            )

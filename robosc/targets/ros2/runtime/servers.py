@@ -1,0 +1,243 @@
+"""Services and actions that the existing controller asks a supervision layer for: answers and ends come later.
+
+The servers are handed in; what they must do is what rclpy's `Service`, `ActionServer` and `ServerGoalHandle` do.
+Everything runs in the node's one thread, and nothing in it waits: a coroutine that awaits an answer would be resumed
+by rclpy's executor again and again, without a pause, until the answer is there.
+
+A caller that is gone, so that it cannot be told anything, is worth a warning and no fault: the robot is not to stop
+for it.
+
+A copy of this module stands in generated packages, which run on Python 3.8 and later.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+
+class _Call:
+    """A call without an answer so far: what addresses the answer, or the answer that came before that is known."""
+
+    __slots__ = ("header", "number", "response")
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+        self.header: Any = None
+        self.response: Any = None
+
+
+class CalledService:
+    """The calls of one service.
+
+    Args:
+        name: The service's name on ROS, for warnings.
+        make_default: Makes the default response.
+        tell: Called with the number and the message of each call.
+        warn: Called with a text.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        make_default: Callable[[], Any],
+        tell: Callable[[int, Any], None],
+        warn: Callable[[str], None],
+    ) -> None:
+        self._name = name
+        self._make_default = make_default
+        self._tell = tell
+        self._warn = warn
+        self._calls: dict[int, _Call] = {}
+        self._count = 0
+        self._send: Callable[[Any, Any], None]
+
+    def attach(self, service: Any) -> None:
+        """Send through a service, whose callback is `handle`.
+
+        Args:
+            service: Has `send_response`, called with what `handle` returned and with what addresses the answer.
+        """
+        self._send = service.send_response
+        service.send_response = self._respond
+
+    def handle(self, request: Any, _: Any) -> Any:
+        """A call came: its answer, or a promise of one."""
+        self._count += 1
+        call = self._calls[self._count] = _Call(self._count)
+        self._tell(call.number, request)
+        return call if call.response is None else call.response
+
+    def _respond(self, response: Any, header: Any) -> None:
+        if isinstance(response, _Call):
+            response.header = header
+        else:
+            self._send_to(header, response)
+
+    def answer(self, number: int, response: Any) -> None:
+        """Answer a call."""
+        call = self._calls.pop(number)
+        if call.header is None:
+            call.response = response
+        else:
+            self._send_to(call.header, response)
+
+    def answer_default(self, number: int) -> None:
+        """Answer a call with the default response."""
+        self.answer(number, self._make_default())
+
+    def take_leave(self) -> None:
+        """Answer every call with the default response: nobody else would."""
+        for number in list(self._calls):
+            self.answer_default(number)
+
+    def _send_to(self, header: Any, response: Any) -> None:
+        try:
+            self._send(response, header)
+        except Exception as error:
+            self._warn(f"no answer to a call of {self._name}: {error}")
+
+
+class _Goal:
+    """A goal that was accepted.
+
+    Attributes:
+        handle: What rclpy calls it by, once it is known.
+        end: Outcome and result, if they came before that.
+    """
+
+    __slots__ = ("end", "handle")
+
+    def __init__(self) -> None:
+        self.handle: Any = None
+        self.end: tuple[str, Any] | None = None
+
+
+class ServedAction:
+    """The goals of one action.
+
+    Args:
+        name: The action's name on ROS, for warnings.
+        make_default: Makes the default result.
+        tell_goal: Called with the number and the message of each goal; `accept` is called meanwhile, or not.
+        tell_cancel: Called with the number of a goal whose cancel was asked for.
+        warn: Called with a text.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        make_default: Callable[[], Any],
+        tell_goal: Callable[[int, Any], None],
+        tell_cancel: Callable[[int], None],
+        warn: Callable[[str], None],
+    ) -> None:
+        self._name = name
+        self._make_default = make_default
+        self._tell_goal = tell_goal
+        self._tell_cancel = tell_cancel
+        self._warn = warn
+        self._goals: dict[int, _Goal] = {}
+        self._numbers: dict[bytes, int] = {}
+        self._count = 0
+        self._beginning: int | None = None
+        self._ending = 0
+        self._server: Any = None
+
+    def attach(self, server: Any) -> None:
+        """Serve through a server, whose callbacks are `decide`, `begin` and `cancel`.
+
+        Args:
+            server: Has `notify_execute`, which has a function end a goal.
+        """
+        self._server = server
+
+    # What the server asks.
+
+    def decide(self, message: Any) -> bool:
+        """A goal came: whether it is accepted."""
+        self._count += 1
+        number = self._count
+        self._tell_goal(number, message)
+        if number not in self._goals:
+            return False
+        self._beginning = number
+        return True
+
+    def begin(self, handle: Any) -> None:
+        """The goal that was just accepted has got its handle."""
+        number, self._beginning = self._beginning, None
+        if number is None or number not in self._goals:
+            return
+        goal = self._goals[number]
+        goal.handle = handle
+        self._numbers[bytes(handle.goal_id.uuid)] = number
+        handle.execute()
+        if goal.end is not None:
+            self.end(number, *goal.end)
+
+    def cancel(self, handle: Any) -> bool:
+        """A caller wants to cancel a goal: whether it is told that its goal is about to be."""
+        number = self._numbers.get(bytes(handle.goal_id.uuid))
+        if number is None:
+            return False  # Its end is on the way.
+        self._tell_cancel(number)
+        return True
+
+    def check(self) -> None:
+        """Cancel a goal whose caller was gone before it could be told that it is accepted: nobody else would."""
+        number, self._beginning = self._beginning, None
+        if number is not None:
+            del self._goals[number]
+            self._warn(f"a goal of {self._name} is cancelled: its caller is gone")
+            self._tell_cancel(number)
+
+    # What the layer tells.
+
+    def accept(self, number: int) -> None:
+        """The goal is let through."""
+        self._goals[number] = _Goal()
+
+    def feedback(self, number: int, data: Any) -> None:
+        """Tell how far a goal is."""
+        goal = self._goals.get(number)
+        if goal is None or goal.handle is None:
+            return
+        try:
+            goal.handle.publish_feedback(data)
+        except Exception as error:
+            self._warn(f"no feedback of a goal of {self._name}: {error}")
+
+    def end(self, number: int, outcome: str, result: Any) -> None:
+        """A goal has ended: `succeeded`, `aborted` or `cancelled`, with its result, or None for the default one."""
+        goal = self._goals.get(number)
+        if goal is None:
+            return  # Its caller was gone.
+        if goal.handle is None:
+            goal.end = (outcome, result)
+            return
+        del self._goals[number]
+        del self._numbers[bytes(goal.handle.goal_id.uuid)]
+        self._ending += 1
+        self._server.notify_execute(goal.handle, lambda handle: self._conclude(handle, outcome, result))
+
+    def _conclude(self, handle: Any, outcome: str, result: Any) -> Any:
+        """End a goal: its result."""
+        self._ending -= 1
+        if outcome == "succeeded":
+            handle.succeed()
+        elif outcome == "cancelled":
+            handle.canceled()
+        else:
+            handle.abort()
+        return self._make_default() if result is None else result
+
+    def take_leave(self) -> None:
+        """Abort every goal: nobody else would end it."""
+        for number in list(self._goals):
+            self.end(number, "aborted", None)
+
+    @property
+    def is_ending(self) -> bool:
+        """Whether the end of a goal has still to be told."""
+        return self._ending > 0

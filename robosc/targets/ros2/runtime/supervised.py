@@ -1,0 +1,51 @@
+"""Names of a supervision layer: `/x` on the robot's side is `/supervised/x` on the existing controller's.
+
+All of them are absolute, whatever the namespace of the node: the layer and the existing controller need not share one.
+
+A copy of this module stands in generated packages, which run on Python 3.8 and later.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+BLOCKED = "/blocked"
+"""Where the identifiers of requests that are held back are published."""
+
+SUPERVISED = "/supervised"
+
+_OF_AN_ACTION = ("send_goal", "cancel_goal", "get_result", "feedback", "status")
+
+
+def robots_name(prefix: str, identifier: str) -> str:
+    """A name on the robot's side.
+
+    Args:
+        prefix: What stands before every name; empty, or beginning with a slash.
+        identifier: A name of the model, `/x` or `x`.
+    """
+    return prefix + "/" + identifier.lstrip("/")
+
+
+def callers_name(prefix: str, identifier: str) -> str:
+    """A name on the existing controller's side."""
+    return robots_name(prefix + SUPERVISED, identifier)
+
+
+def remapped(messages_and_services: Iterable[str], actions: Iterable[str]) -> tuple[tuple[str, str], ...]:
+    """Old and new name, without a prefix, of everything that the existing controller has to call otherwise.
+
+    ROS remaps the services and topics that an action is made of, and not the action, so each of them is named.
+    """
+    identifiers = [
+        *messages_and_services,
+        *(f"{action}/_action/{part}" for action in actions for part in _OF_AN_ACTION),
+    ]
+    # A service may be called like a topic: one rule is for both.
+    return tuple(dict.fromkeys((robots_name("", item), callers_name("", item)) for item in identifiers))
+
+
+def remapping_arguments(names: Iterable[tuple[str, str]], prefix: str) -> list[str]:
+    """The arguments that make a program on ROS 2 use the new names."""
+    rules = [f"{prefix}{old}:={prefix}{new}" for old, new in names]
+    return ["--ros-args", *(argument for rule in rules for argument in ("-r", rule))]

@@ -1,0 +1,476 @@
+"""The generated supervision layer over DDS, between a robot and a controller that knows nothing of it."""
+
+import json
+import math
+import signal
+import sys
+from array import array
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from robosc.targets import generate, write_files
+from support.porter import CARELESS, LIMIT_S, PACKAGE, Porter, porter_robot, porter_supervisor
+from support.ros2_servers import End, HeldAction, HeldService
+
+pytest.importorskip("rclpy", reason="ROS 2 (rclpy) is not installed")
+pytest.importorskip("test_msgs", reason="test_msgs, with the only actions in a package index, is not installed")
+
+pytestmark = pytest.mark.ros2
+
+
+@pytest.fixture(scope="module")
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The generated package."""
+    folder = tmp_path_factory.mktemp("workspace")
+    write_files(generate(porter_supervisor(), "ros2"), folder)
+    return folder
+
+
+@pytest.fixture
+def porter(workspace: Path, tmp_path: Path) -> Iterator[Porter]:
+    with porter_robot(workspace, tmp_path) as made:
+        yield made
+
+
+# Messages.
+
+
+def test_whatever_a_careless_controller_sends_the_robot_stands_still_unless_it_may_move(porter: Porter) -> None:
+    porter.start_with_careless("server_wait:=0.0")
+    porter.blocks("/cmd_vel", 30)
+    assert porter.speed == 0.0
+    assert porter.commands == []
+
+    porter.allow(True)
+    porter.until(lambda: porter.speed == 0.3, "the robot to move")
+    porter.allow(False)
+    porter.until(lambda: porter.speed == 0.0, "the robot to stand still")
+    stood = len(porter.commands)
+    porter.blocks("/cmd_vel", 30)
+    assert porter.speed == 0.0
+    assert len(porter.commands) == stood
+    porter.end()
+    assert porter.speed == 0.0
+
+    events = porter.events()
+    walks = [entry for entry in events if entry.get("event") == "walk.request"]
+    assert walks
+    assert all(entry["state"]["Permission"]["state"] == "granted" for entry in walks)
+    reasons = {entry["why"] for entry in events if entry["kind"] == "blocked"}
+    assert "not allowed now" in reasons
+    assert {"kind": "release", "identifier": "/cmd_vel"}.items() <= next(
+        entry for entry in events if entry["kind"] == "release"
+    ).items()
+
+
+def test_messages_of_the_robot_come_through_as_they_are(porter: Porter) -> None:
+    from rclpy.qos import qos_profile_sensor_data
+    from sensor_msgs.msg import LaserScan
+
+    passed = porter.peer.receive(LaserScan, "/supervised/scan")
+    porter.start("server_wait:=0.0", "resample_scans:=true")
+    scan = LaserScan(angle_min=-0.125, angle_increment=0.125, range_max=9.0, ranges=array("f", [2.0, 0.75, math.inf]))
+    scan.header.frame_id = "laser"
+    scan.header.stamp.sec = 7
+    scan.intensities = array("f", [1.0, 2.0, 3.0])
+    porter.until(lambda: bool(passed), "a scan", lambda: porter.peer.publish(scan, "/scan", qos_profile_sensor_data))
+    assert all(message == scan for message in passed)
+    # The supervisor sees 360 ranges: the first is straight ahead, which the middle beam measured.
+    porter.until(lambda: porter.variable("Permission", "seen") == "far", "the scan to be seen")
+
+
+def test_every_field_of_a_message_goes_to_the_robot(porter: Porter) -> None:
+    porter.start("server_wait:=0.0")
+    porter.allow(True)
+    porter.until(lambda: porter.speed == 0.5, "the velocity", lambda: porter.send(0.5, x=1.5, y=-2.5, z=1e300))
+    turning = porter.commands[-1].angular
+    assert (turning.x, turning.y, turning.z) == (1.5, -2.5, 1e300)
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf])
+def test_what_is_no_number_is_held_back_also_where_the_model_does_not_look(porter: Porter, number: float) -> None:
+    porter.start("server_wait:=0.0")
+    porter.drive()
+    before = len(porter.blocked)
+    porter.until(lambda: len(porter.blocked) > before, "a message held back", lambda: porter.send(0.4, y=number))
+    porter.until(lambda: porter.speed == 0.2, "a sound message", lambda: porter.send(0.2))
+    assert all(math.isfinite(command.angular.y) for command in porter.commands)
+    assert 0.4 not in {command.linear.x for command in porter.commands}
+    assert "a NaN or an infinity" in {entry["why"] for entry in porter.end() if entry["kind"] == "blocked"}
+
+
+def test_messages_on_one_name_are_told_apart(porter: Porter) -> None:
+    from std_msgs.msg import Float32
+
+    porter.start("server_wait:=0.0")
+    # Walking is forbidden, standing is not; a loud sound is forbidden, a quiet one is not.
+    porter.until(lambda: bool(porter.commands), "a halt", lambda: porter.send(0.0, z=0.25))
+    assert (porter.speed, porter.commands[-1].angular.z) == (0.0, 0.25)
+    porter.until(lambda: bool(porter.blocked), "a walk held back", lambda: porter.send(0.1))
+    assert {command.linear.x for command in porter.commands} == {0.0}
+
+    def sound(level: float) -> None:
+        porter.peer.publish(Float32(data=level), "/supervised/volume")
+
+    porter.until(lambda: bool(porter.volumes), "a quiet sound", lambda: sound(0.5))
+    before = len(porter.blocked)
+    porter.until(lambda: len(porter.blocked) > before, "a loud sound held back", lambda: sound(2.0))
+    assert porter.blocked[-1].data == "volume"
+    assert {message.data for message in porter.volumes} == {0.5}
+    porter.allow(True)
+    porter.until(lambda: porter.volumes[-1].data == 2.0, "a loud sound", lambda: sound(2.0))
+
+
+# When wheels stop.
+
+
+def test_a_controller_that_dies_leaves_a_robot_that_stands_still(porter: Porter) -> None:
+    porter.start("server_wait:=0.0", "command_timeout:=0.3")
+    with porter.careless() as careless:
+        porter.allow(True)
+        porter.until(lambda: porter.speed == 0.3, "the robot to move")
+        careless.signal(signal.SIGKILL)
+        careless.wait()
+        porter.until(lambda: porter.speed == 0.0, "the robot to stand still")
+    assert porter.layer.is_running
+    # Once, and not again and again.
+    stood = len(porter.commands)
+    porter.peer.spin_for(0.5)
+    assert len(porter.commands) == stood
+
+
+def test_a_controller_that_falls_silent_after_a_zero_is_left_alone(porter: Porter) -> None:
+    porter.start("server_wait:=0.0", "command_timeout:=0.2")
+    porter.until(lambda: bool(porter.commands), "a halt", lambda: porter.send(0.0))
+    porter.peer.spin_for(0.6)
+    events = porter.end()
+    begin = next(index for index, entry in enumerate(events) if entry.get("event") == "halt.request")
+    end = next(index for index, entry in enumerate(events) if entry["kind"] == "stop")
+    assert "release" not in {entry["kind"] for entry in events[begin:end]}
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_a_signal_stops_the_robot_first(porter: Porter, number: signal.Signals) -> None:
+    porter.start("server_wait:=0.0", "command_timeout:=0.0", command=("-m", f"{PACKAGE}.node"))
+    porter.drive()
+    porter.layer.signal(number)
+    porter.peer.spin_until(lambda: not porter.layer.is_running and porter.speed == 0.0, LIMIT_S, "a zero and the end")
+    assert porter.layer.wait() == 0
+    assert all(line.startswith("[WARN]") for line in porter.layer.stderr.splitlines())
+
+
+@pytest.mark.parametrize(("place", "method"), [("caller.CallerSide", "pass_on"), ("robot.RobotSide", "check_servers")])
+def test_an_exception_stops_the_robot_first(porter: Porter, place: str, method: str) -> None:
+    from rclpy.qos import qos_profile_sensor_data
+    from sensor_msgs.msg import LaserScan
+
+    module, name = place.split(".")
+    # A scan, or the file, makes it fail: until then it does what it does.
+    broken = f"""
+import pathlib, sys
+from {PACKAGE} import node
+from {PACKAGE}.{module} import {name} as side
+before = side.{method}
+def fails(self, *arguments):
+    if '/scan' in arguments or pathlib.Path('broken').exists():
+        raise ValueError('no way')
+    return before(self, *arguments)
+side.{method} = fails
+sys.exit(node.main(sys.argv))
+"""
+    porter.start("server_wait:=0.0", "command_timeout:=0.0", command=("-c", broken))
+    porter.drive()
+    if method == "pass_on":
+        porter.peer.spin_until(
+            lambda: not porter.layer.is_running,
+            LIMIT_S,
+            "the end",
+            repeat=lambda: porter.peer.publish(LaserScan(), "/scan", qos_profile_sensor_data),
+        )
+    else:
+        (porter.folder / "layer" / "broken").touch()
+    porter.peer.spin_until(lambda: not porter.layer.is_running and porter.speed == 0.0, LIMIT_S, "a zero and the end")
+    assert porter.layer.wait() == 1
+    assert "no way" in porter.layer.stderr
+
+
+def test_layer_and_controller_end_together(porter: Porter) -> None:
+    porter.start_with_careless("server_wait:=0.0", "command_timeout:=0.0")
+    porter.allow(True)
+    porter.until(lambda: porter.speed == 0.3, "the robot to move")
+    porter.end()
+    assert porter.speed == 0.0
+    # Nobody drives any more: the controller has ended, too.
+    porter.peer.spin_until(
+        lambda: "careless" not in porter.peer.node.get_node_names(), 30.0, "the controller to be gone"
+    )
+
+
+def test_a_controller_that_fails_ends_the_layer_and_the_robot_stands_still(porter: Porter) -> None:
+    failing = f"""
+import os, sys, threading, time
+sys.path.insert(0, {str(CARELESS.parent)!r})
+import ros2_careless
+def fail():
+    while not os.path.exists('fail'):
+        time.sleep(0.02)
+    os._exit(3)
+threading.Thread(target=fail, daemon=True).start()
+ros2_careless.main()
+"""
+    porter.start("server_wait:=0.0", "command_timeout:=0.0", after=["--controller", sys.executable, "-c", failing])
+    porter.allow(True)
+    porter.until(lambda: porter.speed == 0.3, "the robot to move")
+    (porter.folder / "layer" / "fail").touch()
+    porter.peer.spin_until(lambda: not porter.layer.is_running, LIMIT_S, "the end of both")
+    assert porter.layer.wait() == 1
+    assert "the controller ended with status 3" in porter.layer.stderr
+    assert porter.speed == 0.0
+
+
+def test_a_command_that_does_not_exist_is_one_line(porter: Porter) -> None:
+    process = porter.process(["-m", f"{PACKAGE}.start", "--controller", "/no/such/program"], "nothing")
+    assert process.wait() == 2
+    assert "cannot start the controller: " in process.stderr
+    assert "Traceback" not in process.stderr
+
+
+def test_a_prefix_goes_before_both_sides(porter: Porter) -> None:
+    from geometry_msgs.msg import Twist
+    from std_msgs.msg import String
+
+    blocked = porter.peer.receive(String, "/robot1/blocked")
+    porter.layer = porter.process(
+        ["-m", f"{PACKAGE}.start", "--topic-prefix", "/robot1", "--ros-args", "-p", "server_wait:=0.0"], "layer"
+    )
+    porter.peer.wait_for_peers(["/robot1/cmd_vel", "/robot1/supervised/cmd_vel", "/robot1/supervised/scan"])
+    velocity = Twist()
+    velocity.linear.x = 1.0
+    porter.until(
+        lambda: bool(blocked),
+        "a message held back",
+        lambda: porter.peer.publish(velocity, "/robot1/supervised/cmd_vel"),
+    )
+    assert blocked[0].data == "/cmd_vel"
+    printing = porter.process(["-m", f"{PACKAGE}.start", "--topic-prefix", "/robot1", "--print-remappings"], "printing")
+    assert printing.wait() == 0
+    text = (porter.folder / "printing" / "stdout.txt").read_text()
+    assert "-r /robot1/cmd_vel:=/robot1/supervised/cmd_vel" in text
+    assert "-r /robot1/count/_action/send_goal:=/robot1/supervised/count/_action/send_goal" in text
+
+
+# Services.
+
+
+def test_a_service_call_goes_through_or_is_answered_at_once(porter: Porter) -> None:
+    from std_srvs.srv import SetBool
+
+    server = HeldService(porter.host, SetBool, "/power")
+    porter.start()
+    porter.until(lambda: porter.state("Power") is not None, "the layer to begin")
+    reply = porter.wait_for(porter.call(), "the answer to a call that is held back")
+    assert (reply.success, reply.message) == (False, "")
+    porter.until(lambda: porter.is_blocked("/power"), "a call to be told as held back", porter.call)
+    assert server.requests == []
+
+    porter.allow(True)
+    future = porter.call(data=True)
+    porter.until(lambda: bool(server.requests), "the call")
+    assert server.requests[0].data is True
+    # Another one meanwhile is held back, and the layer waits for nothing.
+    assert porter.wait_for(porter.call(), "the second answer").success is False
+    assert not future.done()
+    server.answer(success=True, message="every field")
+    reply = porter.wait_for(future, "the answer")
+    assert (reply.success, reply.message) == (True, "every field")
+    porter.until(lambda: porter.variable("Power", "is_on") == "true", "the answer to be seen")
+
+
+def test_a_call_that_fails_is_answered_with_the_default(porter: Porter) -> None:
+    from std_srvs.srv import SetBool
+
+    porter.start("server_wait:=0.0", "service_timeout:=0.5")
+    porter.allow(True)
+    assert porter.wait_for(porter.call(), "the answer without a server").success is False
+    server = HeldService(porter.host, SetBool, "/power")
+    porter.until(lambda: "/power" in dict(porter.peer.node.get_service_names_and_types()), "the server")
+    future = porter.call()
+    porter.until(lambda: bool(server.requests) or future.done(), "a call")
+    if not server.requests:  # The layer had not seen the server.
+        future = porter.call()
+        porter.until(lambda: bool(server.requests), "a call")
+    assert porter.wait_for(future, "the answer after the time is over").success is False
+    server.answer(success=True)
+    porter.peer.spin_for(0.2)
+    errors = [entry for entry in porter.end() if entry.get("event") == "power.error"]
+    assert len(errors) >= 2
+
+
+# Actions.
+
+SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
+
+
+def test_a_goal_is_rejected_or_served(porter: Porter) -> None:
+    from test_msgs.action import Fibonacci
+
+    server = HeldAction(porter.host, Fibonacci, "/count")
+    porter.start("server_wait:=2.0")
+    porter.until(lambda: porter.state("Counter") is not None, "the layer to begin")
+    assert not porter.send_goal().accepted
+    porter.until(lambda: porter.is_blocked("/count"), "a goal to be told as held back", porter.send_goal)
+    assert server.requests == []
+
+    porter.allow(True)
+    heard: list[Any] = []
+    handle = porter.send_goal(lambda message: heard.append(list(message.feedback.sequence)))
+    assert handle.accepted
+    porter.until(lambda: bool(server.handles), "the goal to reach the robot")
+    assert server.requests[0].order == 5
+    assert not porter.send_goal().accepted
+    porter.until(lambda: [4, 2] in heard, "feedback", lambda: server.feedback(sequence=[4, 2]))
+    porter.until(lambda: porter.variable("Counter", "steps") == "4", "the feedback to be seen")
+    server.end(End.SUCCEED, sequence=[1, 2, 3])
+    answer = porter.wait_for(handle.get_result_async(), "the result")
+    assert (answer.status, list(answer.result.sequence)) == (SUCCEEDED, [1, 2, 3])
+    porter.until(lambda: porter.state("Counter") == "idle", "the end to be seen")
+
+
+def test_a_goal_that_its_server_aborts_ends_so_with_its_result(porter: Porter) -> None:
+    from test_msgs.action import Fibonacci
+
+    server = HeldAction(porter.host, Fibonacci, "/count")
+    porter.start("server_wait:=2.0")
+    porter.allow(True)
+    handle = porter.send_goal()
+    porter.until(lambda: bool(server.handles), "the goal to reach the robot")
+    server.end(End.ABORT, sequence=[9])
+    answer = porter.wait_for(handle.get_result_async(), "the result")
+    assert (answer.status, list(answer.result.sequence)) == (ABORTED, [9])
+
+
+def test_a_goal_without_a_server_and_one_that_is_rejected_end_as_aborted(porter: Porter) -> None:
+    from test_msgs.action import Fibonacci
+
+    porter.start("server_wait:=0.0")
+    porter.allow(True)
+    handle = porter.send_goal()
+    assert handle.accepted
+    assert porter.wait_for(handle.get_result_async(), "the end without a server").status == ABORTED
+    server = HeldAction(porter.host, Fibonacci, "/count", accepts=False)
+
+    def attempt() -> None:
+        again = porter.send_goal()
+        assert again.accepted
+        assert porter.wait_for(again.get_result_async(), "the end").status == ABORTED
+
+    attempt()
+    while not server.requests:  # The layer had not seen the server.
+        attempt()
+
+
+def test_a_goal_that_turns_against_its_requirement_is_aborted_at_once_and_cancelled(porter: Porter) -> None:
+    from test_msgs.action import Fibonacci
+
+    server = HeldAction(porter.host, Fibonacci, "/count", ends_on_cancel=False)
+    porter.start("server_wait:=2.0")
+    porter.allow(True)
+    handle = porter.send_goal()
+    porter.until(lambda: bool(server.handles), "the goal to reach the robot")
+    result = handle.get_result_async()
+    porter.allow(False)
+    assert porter.wait_for(result, "the end").status == ABORTED
+    porter.until(lambda: server.cancels == 1, "the cancel to reach the robot")
+    # It is still winding down: another one has to wait.
+    porter.allow(True)
+    assert not porter.send_goal().accepted
+    server.end(End.CANCEL)
+    porter.until(lambda: porter.send_goal().accepted, "the next goal")
+
+
+def test_a_cancel_of_the_caller_is_always_forwarded(porter: Porter) -> None:
+    from test_msgs.action import Fibonacci
+
+    server = HeldAction(porter.host, Fibonacci, "/count", ends_on_cancel=False)
+    porter.start("server_wait:=2.0", "max_age:=['/allowed=3600.0']")
+    porter.allow(True)
+    handle = porter.send_goal()
+    porter.until(lambda: bool(server.handles), "the goal to reach the robot")
+    answer = porter.wait_for(handle.cancel_goal_async(), "the answer to the cancel")
+    assert len(answer.goals_canceling) == 1
+    porter.until(lambda: server.cancels == 1, "the cancel to reach the robot")
+    result = handle.get_result_async()
+    porter.peer.spin_for(0.2)
+    assert not result.done()
+    server.end(End.CANCEL, sequence=[7])
+    ended = porter.wait_for(result, "the end")
+    assert (ended.status, list(ended.result.sequence)) == (CANCELED, [7])
+
+
+def test_a_goal_under_way_is_cancelled_at_the_end_and_its_caller_is_told(porter: Porter) -> None:
+    from test_msgs.action import Fibonacci
+
+    server = HeldAction(porter.host, Fibonacci, "/count")
+    porter.start("server_wait:=2.0")
+    porter.drive()
+    handle = porter.send_goal()
+    porter.until(lambda: bool(server.handles), "the goal to reach the robot")
+    result = handle.get_result_async()
+    porter.peer.spin_for(0.2)
+    porter.end()
+    assert server.cancels == 1
+    assert porter.speed == 0.0
+    assert result.done()
+    assert result.result().status == ABORTED
+
+
+def test_nothing_runs_while_a_goal_and_a_call_are_under_way(porter: Porter) -> None:
+    from std_srvs.srv import SetBool
+    from test_msgs.action import Fibonacci
+
+    server, service = HeldAction(porter.host, Fibonacci, "/count"), HeldService(porter.host, SetBool, "/power")
+    porter.start("server_wait:=2.0", command=("-m", f"{PACKAGE}.node"))
+    porter.allow(True)
+    handle, reply = porter.send_goal(), porter.call()
+    porter.until(lambda: bool(server.handles and service.requests), "both to be under way")
+    before = porter.layer.cpu_s()
+    porter.peer.spin_for(2.0)
+    # A loop that asks again and again whether there is an answer would take all of it.
+    assert porter.layer.cpu_s() - before < 1.0
+    server.end(End.SUCCEED)
+    service.answer(success=True)
+    assert porter.wait_for(reply, "the reply").success
+    assert porter.wait_for(handle.get_result_async(), "the result").status == SUCCEEDED
+
+
+def test_services_and_actions_of_a_program_that_knows_of_no_layer_are_remapped(porter: Porter) -> None:
+    from rclpy.qos import qos_profile_sensor_data
+    from sensor_msgs.msg import LaserScan
+    from std_srvs.srv import SetBool
+    from test_msgs.action import Fibonacci
+
+    action, service = HeldAction(porter.host, Fibonacci, "/count"), HeldService(porter.host, SetBool, "/power")
+    porter.start("server_wait:=2.0")
+    porter.until(lambda: porter.state("Counter") is not None, "the layer to begin")
+    output = porter.folder / "careless" / "stdout.txt"
+    with porter.careless() as careless:
+
+        def told() -> list[Any]:
+            return [json.loads(line) for line in output.read_text().splitlines()]
+
+        scan = LaserScan(ranges=array("f", [0.5]))
+        porter.peer.spin_until(
+            lambda: {"reply", "goal", "scan"} <= {what for what, _ in told()},
+            LIMIT_S,
+            "what the controller is told",
+            careless,
+            lambda: porter.peer.publish(scan, "/scan", qos_profile_sensor_data),
+        )
+        assert ["reply", False] in told()
+        assert ["goal", False] in told()
+        assert ["scan", [0.5]] in told()
+    assert action.requests == service.requests == []
+    assert {"/power", "/count", "/cmd_vel"} <= {message.data for message in porter.blocked}

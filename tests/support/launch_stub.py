@@ -3,7 +3,7 @@
 import importlib.util
 import sys
 import types
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -19,12 +19,20 @@ class Recorded:
 
 _CLASSES = {
     "launch": ["LaunchDescription"],
-    "launch.actions": ["DeclareLaunchArgument", "Shutdown"],
+    "launch.actions": ["DeclareLaunchArgument", "GroupAction", "IncludeLaunchDescription", "Shutdown"],
     "launch.conditions": ["IfCondition"],
-    "launch.substitutions": ["LaunchConfiguration", "NotEqualsSubstitution"],
+    "launch.launch_description_sources": ["AnyLaunchDescriptionSource"],
+    "launch.substitutions": [
+        "AndSubstitution",
+        "EqualsSubstitution",
+        "LaunchConfiguration",
+        "NotEqualsSubstitution",
+        "PathJoinSubstitution",
+    ],
     "launch_ros": [],
-    "launch_ros.actions": ["Node"],
+    "launch_ros.actions": ["Node", "SetRemap"],
     "launch_ros.parameter_descriptions": ["ParameterValue"],
+    "launch_ros.substitutions": ["FindPackageShare"],
     "ament_index_python": [],
     "ament_index_python.packages": [],
 }
@@ -72,3 +80,26 @@ def launch_actions(file: Path, share: Path) -> dict[str, list[Recorded]]:
     for action in actions:
         found.setdefault(type(action).__name__, []).append(action)
     return found
+
+
+def evaluated(item: Any, arguments: Mapping[str, str]) -> str:
+    """What a substitution stands for, given the launch file's arguments."""
+    if isinstance(item, str):
+        return item
+    if isinstance(item, list | tuple):
+        return "".join(evaluated(part, arguments) for part in item)
+    first = item.positional[0]
+    match type(item).__name__:
+        case "LaunchConfiguration":
+            return arguments[first]
+        case "EqualsSubstitution":
+            return str(evaluated(first, arguments) == evaluated(item.positional[1], arguments)).lower()
+        case "NotEqualsSubstitution":
+            return str(evaluated(first, arguments) != evaluated(item.positional[1], arguments)).lower()
+        case "AndSubstitution":
+            return str(all(evaluated(part, arguments) == "true" for part in item.positional)).lower()
+        case "PathJoinSubstitution":
+            return "/".join(evaluated(part, arguments) for part in first)
+        case "FindPackageShare":
+            return f"share of {evaluated(first, arguments)}"
+    raise AssertionError(f"{type(item).__name__} is no substitution of a launch file that is known here")

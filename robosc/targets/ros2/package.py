@@ -20,6 +20,7 @@ from robosc.targets.ros.package import (
 from robosc.targets.ros.runtime.parameters import declarations
 from robosc.targets.ros.topics import servers, topics
 from robosc.targets.ros2.layer import remapped_names, require_names_of_a_layer
+from robosc.targets.ros2.runtime.lifecycle import AUTOSTART
 from robosc.targets.ros2.runtime.supervised import callers_name, robots_name
 
 _OWN_DEPENDENCIES = (
@@ -39,6 +40,7 @@ _RUNTIME_MODULES = {
     "clients": "robosc.targets.ros2.runtime",
     "early": "robosc.targets.ros.runtime",
     "health": "robosc.targets.ros.runtime",
+    "lifecycle": "robosc.targets.ros2.runtime",
     "messages": "robosc.targets.ros.runtime",
     "parameters": "robosc.targets.ros.runtime",
     "reports": "robosc.targets.ros.runtime",
@@ -107,7 +109,8 @@ def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles
         values = context(supervisor, name, found, asked)
     values["title"] = _TITLES[deployment]
     values["dependencies"] = sorted({*_OWN_DEPENDENCIES, *packages(found, asked)})
-    values["parameters"] = chosen(declarations(release_identifiers(found), str(deployment)), options)
+    values["parameters"] = chosen((*declarations(release_identifiers(found), str(deployment)), AUTOSTART), options)
+    values["supervised"] = options.supervised
     values["remapped"] = remapped_names(found, asked)
     files = python_files(supervisor, name, _RUNTIME_MODULES | _RUNTIME_MODULES_OF[deployment])
     templates = environment("robosc.targets.ros2")

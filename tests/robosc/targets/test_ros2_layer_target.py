@@ -14,11 +14,12 @@ from robosc.errors import UnsupportedModelError
 from robosc.execution.interpreter import describe
 from robosc.model.structure import Deployment
 from robosc.supervisor.structure import Supervisor
-from robosc.targets import GeneratedFiles, generate, write_files
+from robosc.targets import GeneratedFiles, GenerateOptions, generate, write_files
+from robosc.targets.registry import SupervisedController
 from robosc.targets.ros.runtime.parameters import ParameterError, declarations, validate
 from robosc.targets.ros2.runtime.supervised import callers_name, remapped, remapping_arguments, robots_name
 from support.generated import example_supervisor
-from support.launch_stub import launch_actions
+from support.launch_stub import evaluated, launch_actions
 from support.models import model_of
 from support.porter import MODEL
 from support.random_supervisors import CERTIFICATE
@@ -106,6 +107,8 @@ def own_tests(folder: Path) -> Any:
 
 # Names.
 
+CONTROLLER = ("controller_package", "controller_executable", "controller_launch_file")
+
 
 def test_every_name_of_an_existing_controller_is_remapped() -> None:
     assert robots_name("/r", "x") == robots_name("/r", "/x") == "/r/x"
@@ -125,13 +128,13 @@ def test_the_launch_file_starts_the_layer_and_an_existing_controller(folder: Pat
     assert set(arguments) == {
         "controller_package",
         "controller_executable",
+        "controller_launch_file",
         "topic_prefix",
         "parameters",
         "log_level",
     }
     assert all(item["description"].endswith(".") for item in arguments.values())
-    defaults = [arguments[name]["default_value"] for name in ("controller_package", "controller_executable")]
-    assert defaults == ["", "controller"]
+    assert [arguments[name]["default_value"] for name in CONTROLLER] == ["", "controller", ""]
     assert Path(arguments["parameters"]["default_value"]) == folder / "config/parameters.yaml"
     layer, controller = (node.named for node in found["Node"])
     assert (layer["package"], layer["executable"]) == (PACKAGE, "layer")
@@ -141,8 +144,6 @@ def test_the_launch_file_starts_the_layer_and_an_existing_controller(folder: Pat
     assert (value.positional[0].positional, value.named) == (("topic_prefix",), {"value_type": str})
     assert controller["package"].positional == ("controller_package",)
     assert controller["executable"].positional == ("controller_executable",)
-    (condition,) = controller["condition"].positional
-    assert (condition.positional[0].positional, condition.positional[1]) == (("controller_package",), "")
     assert type(layer["on_exit"]).__name__ == type(controller["on_exit"]).__name__ == "Shutdown"
     rules = []
     for old, new in controller["remappings"]:
@@ -150,6 +151,44 @@ def test_the_launch_file_starts_the_layer_and_an_existing_controller(folder: Pat
         rules.append((old[1], new[1]))
     topics, services = ["/allowed", "/scan", "/cmd_vel", "volume"], ["/power"]
     assert tuple(rules) == remapped([*topics, *services], ["/count"])
+    (group,) = found["GroupAction"]
+    *remaps, included = group.positional[0]
+    prefix = {"topic_prefix": "/r"}
+    expected = [("/r" + old, "/r" + new) for old, new in rules]
+    assert [tuple(evaluated(item.named[name], prefix) for name in ("src", "dst")) for item in remaps] == expected
+    (path,) = included.positional[0].positional
+    given = {"controller_package": "drives", "controller_launch_file": "drive.launch.py"}
+    assert evaluated(path, given) == "share of drives/launch/drive.launch.py"
+
+
+@pytest.mark.parametrize(
+    ("given", "started"), [(("", "x", ""), []), (("p", "x", ""), ["Node"]), (("p", "x", "y"), ["GroupAction"])]
+)
+def test_the_launch_file_starts_what_its_arguments_name(given: Any, started: list[str], folder: Path) -> None:
+    found = launch_actions(folder / "launch/layer.launch.py", folder)
+    conditions = {
+        "Node": found["Node"][1].named["condition"],
+        "GroupAction": found["GroupAction"][0].named["condition"],
+    }
+    arguments = dict(zip(CONTROLLER, given, strict=True))
+    assert [
+        name for name, condition in conditions.items() if evaluated(condition.positional[0], arguments) == "true"
+    ] == started
+
+
+@pytest.mark.parametrize(
+    "supervised", [SupervisedController("drives", "drive"), SupervisedController("drives", launch_file="d.launch.py")]
+)
+def test_the_controller_that_is_known_is_the_default(supervised: SupervisedController, tmp_path: Path) -> None:
+    files = generate(layer_of(MODEL), "ros2", GenerateOptions(supervised=supervised))
+    write_files(files, tmp_path)
+    found = launch_actions(tmp_path / "launch/layer.launch.py", tmp_path)
+    arguments = {item.positional[0]: item.named["default_value"] for item in found["DeclareLaunchArgument"]}
+    assert [arguments[name] for name in CONTROLLER] == [
+        "drives",
+        supervised.executable or "controller",
+        supervised.launch_file or "",
+    ]
 
 
 @pytest.mark.parametrize(

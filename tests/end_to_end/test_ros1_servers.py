@@ -392,7 +392,9 @@ def test_an_ignored_cancel_of_a_running_goal_is_a_fault(courier: Courier) -> Non
     courier.peer.publish("/allowed", "std_msgs/Bool", data=False)
     courier.stands_still(1)
     assert host.cancels["/count"] >= 1
-    assert courier.node.stderr.splitlines()[-1].endswith("the cancel of a running goal of count was refused")
+    assert courier.node.stderr.splitlines()[-1].endswith(
+        "the cancel of a running goal of count was refused; fault"
+    )
     health = courier.health()
     assert health is not None and health[0] == 2 and "refused" in health[1]
 
@@ -432,7 +434,7 @@ def test_a_prefix_moves_services_and_actions(courier: Courier) -> None:
     goal = "/robot_1/count/goal"
     courier.until(lambda: f"/{PACKAGE}" in courier.peer.names()["publishers"].get(goal, ()), "the client")
     # Private names belong to the node. It is still waiting for servers.
-    assert f"{MOVE}/goal" in courier.peer.names()["publishers"]
+    courier.until(lambda: f"{MOVE}/goal" in courier.peer.names()["publishers"], "the client of a private name")
     courier.node.signal(signal.SIGTERM)
     assert courier.node.wait() == 0
 

@@ -57,7 +57,8 @@ def plain(value):
 
 
 def filled(message, fields):
-    fill_message_args(message, [fields] if fields else [])
+    if fields:
+        fill_message_args(message, [fields])
     return message
 
 

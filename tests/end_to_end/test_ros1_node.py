@@ -291,12 +291,9 @@ def test_an_exception_stops_the_robot_and_ends_the_node(robot: Robot, tmp_path: 
     copy = tmp_path / "broken"
     write_files(generate(example_supervisor(FOLLOWER), "ros1"), copy)
     node = copy / PACKAGE / "node.py"
-    node.write_text(
-        node.read_text().replace(
-            "    def _receive(self, identifier, message):\n",
-            "    def _receive(self, identifier, message):\n        if identifier == '/line/lost': raise KeyError('x')\n",
-        )
-    )
+    start = "    def _receive(self, identifier, message):\n"
+    broken = start + "        if identifier == '/line/lost': raise KeyError('x')\n"
+    node.write_text(node.read_text().replace(start, broken))
     robot.package = copy
     robot.start("_period:=0.5")
     robot.drive()
@@ -315,7 +312,8 @@ def test_the_state_is_published_as_semantics_says(robot: Robot) -> None:
         return json.loads(robot.peer.values("/state")[-1]["data"])
 
     robot.until(
-        lambda: bool(robot.peer.values("/state")) and content()["current"]["LidarSensor"]["state"] == "safe", "the state"
+        lambda: bool(robot.peer.values("/state")) and content()["current"]["LidarSensor"]["state"] == "safe",
+        "the state",
     )
     state = content()
     assert state["current"]["LineDetector"] == {"state": "line_found", "variables": {"current_correction": "0.25"}}
@@ -446,7 +444,7 @@ def test_it_logs_what_the_reference_executor_logs(robot: Robot) -> None:
     )
     reference.start()
     for topic, fields in sequence:
-        data = fields["data"] if "data" in fields else fields or None
+        data = fields.get("data", fields or None)
         reference.receive(topic, data)
         robot.send(topic, **fields)
         # The decisions after one message are over before the next one: every message brings a command here.
@@ -481,7 +479,11 @@ class Recorded:
     def call(self, communication: str, request_id: int, message: Any) -> None:
         raise AssertionError
 
-    send_goal = cancel_goal = call
+    def send_goal(self, communication: str, goal_id: int, message: Any) -> None:
+        raise AssertionError
+
+    def cancel_goal(self, communication: str, goal_id: int) -> None:
+        raise AssertionError
 
 
 def told(entry: dict[str, Any]) -> dict[str, Any]:

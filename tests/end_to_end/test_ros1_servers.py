@@ -349,9 +349,7 @@ def test_a_goal_is_cancelled_before_its_server_accepts_it(courier: Courier) -> N
 
 def test_a_goal_that_somebody_else_cancels(courier: Courier) -> None:
     host = start_counting(courier)
-    courier.until(
-        lambda: host.cancels["/count"] > 0, "the cancel", lambda: courier.peer.do("cancel", name="/count")
-    )
+    courier.until(lambda: host.cancels["/count"] > 0, "the cancel", lambda: courier.peer.do("cancel", name="/count"))
     courier.reaches("Counter", "failed")
     assert courier.reasons_of("count.error")[-1] == "cancelled"
 
@@ -392,9 +390,7 @@ def test_an_ignored_cancel_of_a_running_goal_is_a_fault(courier: Courier) -> Non
     courier.peer.publish("/allowed", "std_msgs/Bool", data=False)
     courier.stands_still(1)
     assert host.cancels["/count"] >= 1
-    assert courier.node.stderr.splitlines()[-1].endswith(
-        "the cancel of a running goal of count was refused; fault"
-    )
+    assert courier.node.stderr.splitlines()[-1].endswith("the cancel of a running goal of count was refused; fault")
     health = courier.health()
     assert health is not None and health[0] == 2 and "refused" in health[1]
 

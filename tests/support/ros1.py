@@ -1,4 +1,4 @@
-"""Real ROS 1 in tests: a master, nodes under Debian's Python, and a peer that talks to them, each in its own process."""
+"""Real ROS 1 in tests: a master, nodes under Debian's Python, a peer that talks to them, all in own processes."""
 
 import contextlib
 import json

@@ -23,6 +23,7 @@ import os
 import sys
 import threading
 import time
+from typing import Any
 
 import genpy
 import rosgraph
@@ -33,19 +34,19 @@ from genpy.message import fill_message_args
 from roslib.message import get_message_class, get_service_class
 
 _writing = threading.Lock()
-_publishers = {}
-_subscribers = {}
-_waiting_calls = {}
-_servers = {}
+_publishers: dict[str, Any] = {}
+_subscribers: dict[str, Any] = {}
+_waiting_calls: dict[str, Any] = {}
+_servers: dict[str, Any] = {}
 
 
-def report(**what):
+def report(**what: Any) -> None:
     with _writing:
         sys.stdout.write(json.dumps(what) + "\n")
         sys.stdout.flush()
 
 
-def plain(value):
+def plain(value: Any) -> Any:
     """A message as JSON has it."""
     if isinstance(value, (genpy.Time, genpy.Duration)):
         return {"secs": value.secs, "nsecs": value.nsecs}
@@ -56,13 +57,13 @@ def plain(value):
     return value
 
 
-def filled(message, fields):
+def filled(message: Any, fields: Any) -> Any:
     if fields:
         fill_message_args(message, [fields])
     return message
 
 
-def publisher(topic, type_name, latch=False):
+def publisher(topic: str, type_name: str, latch: bool = False) -> Any:
     if topic not in _publishers:
         _publishers[topic] = rospy.Publisher(topic, get_message_class(type_name), queue_size=1000, latch=latch)
     return _publishers[topic]
@@ -71,20 +72,21 @@ def publisher(topic, type_name, latch=False):
 class Call:
     """A service call that waits for the test."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.is_over = threading.Event()
-        self.message = None
+        self.message: Any = None
 
-    def end(self, message):
+    def end(self, message: Any) -> None:
         self.message = message
         self.is_over.set()
 
 
-def serve(name, type_name):
+def serve(name: str, type_name: str) -> None:
     service_class = get_service_class(type_name)
-    waiting = _waiting_calls[name] = []
+    waiting: list[Call] = []
+    _waiting_calls[name] = waiting
 
-    def handle(request):
+    def handle(request: Any) -> Any:
         call = Call()
         waiting.append(call)
         report(service=name, request=plain(request))
@@ -96,16 +98,18 @@ def serve(name, type_name):
     rospy.Service(name, service_class, handle)
 
 
-class Server(ActionServer):
+class Server(ActionServer):  # type: ignore[misc]
     """An action whose goals end when the test says so, or when they are cancelled."""
 
-    def __init__(self, name, type_name, accepts=True, cancels=True, ends_on_cancel=True):
+    def __init__(
+        self, name: str, type_name: str, accepts: Any = True, cancels: bool = True, ends_on_cancel: bool = True
+    ) -> None:
         self.name = name
         self.accepts = accepts
         self.cancels = cancels
         self.ends_on_cancel = ends_on_cancel
-        self.pending = []
-        self.running = []
+        self.pending: list[Any] = []
+        self.running: list[Any] = []
         action_class = get_message_class(type_name + "Action")
         whole = action_class()
         self.result_class = type(whole.action_result.result)
@@ -113,7 +117,7 @@ class Server(ActionServer):
         super().__init__(name, action_class, self.goal_came, self.cancel_came, auto_start=False)
         self.start()
 
-    def goal_came(self, handle):
+    def goal_came(self, handle: Any) -> None:
         report(action=self.name, goal=plain(handle.get_goal()))
         if self.accepts == "later":
             self.pending.append(handle)
@@ -123,43 +127,43 @@ class Server(ActionServer):
         else:
             handle.set_rejected()
 
-    def cancel_came(self, handle):
+    def cancel_came(self, handle: Any) -> None:
         report(action=self.name, cancel=True)
         if self.ends_on_cancel:
             (self.running if handle in self.running else self.pending).remove(handle)
             handle.set_canceled()
 
-    def internal_cancel_callback(self, goal_id):
+    def internal_cancel_callback(self, goal_id: Any) -> None:
         if self.cancels:
             super().internal_cancel_callback(goal_id)
         else:
             report(action=self.name, cancel=True)
 
-    def end(self, how, fields):
+    def end(self, how: str, fields: Any) -> None:
         handle = self.pending.pop(0) if how == "rejected" else self.running.pop(0)
         getattr(handle, "set_" + how)(filled(self.result_class(), fields))
 
-    def feedback(self, fields):
+    def feedback(self, fields: Any) -> None:
         self.running[0].publish_feedback(filled(self.feedback_class(), fields))
 
-    def accept(self):
+    def accept(self) -> None:
         handle = self.pending.pop(0)
         handle.set_accepted()
         self.running.append(handle)
 
 
-def ends(topic):
+def ends(topic: str) -> None:
     out = _publishers[topic].impl.connections if topic in _publishers else []
     into = _subscribers[topic].impl.connections if topic in _subscribers else []
     report(ends=topic, subscribers=[item.endpoint_id for item in out], publishers=[item.callerid_pub for item in into])
 
 
-def names():
+def names() -> None:
     publishers, subscribers, services = rosgraph.Master("/test_peer").getSystemState()
     report(names={"publishers": dict(publishers), "subscribers": dict(subscribers), "services": dict(services)})
 
 
-def do(command):
+def do(command: Any) -> None:
     what, name = command["do"], command.get("name")
     if what == "subscribe":
         topic = command["topic"]
@@ -196,7 +200,7 @@ def do(command):
         raise ValueError(what)
 
 
-def main():
+def main() -> None:
     rospy.init_node(sys.argv[1], argv=sys.argv[:1], disable_signals=True)
     report(ready=True)
     for line in sys.stdin:

@@ -163,7 +163,7 @@ def fields_of(message: Any) -> dict[str, str]:
     """The type of each field of a message or of its class, in order."""
     if hasattr(message, "get_fields_and_field_types"):
         return dict(message.get_fields_and_field_types())
-    message_class = message if isinstance(message, type) else type(message)
+    message_class: Any = message if isinstance(message, type) else type(message)
     if _is_genpy_own(message_class):
         return dict(_GENPY_OWN[message_class.__name__])
     return dict(zip(message_class.__slots__, map(_translated, message_class._slot_types)))  # noqa: B905 - Python 3.8

@@ -10,11 +10,11 @@ A copy of this module stands in generated packages, which run on Python 3.8 and 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Optional
+from typing import Any
 
+from robosc.targets.ros.runtime.reports import Reports
 from robosc.targets.ros1.runtime.inbox import Action
 from robosc.targets.ros1.runtime.presence import Presence
-from robosc.targets.ros.runtime.reports import Reports
 
 REFUSAL_S = 1.0
 """A server that still reports a goal as running so long after its cancel does not mean to cancel it."""
@@ -47,7 +47,7 @@ DONE = 7
 _SILENT = (WAITING_FOR_GOAL_ACK, WAITING_FOR_RESULT)
 _CANCEL_HEARD = (WAITING_FOR_RESULT, RECALLING, PREEMPTING, DONE)
 
-Put = Callable[[Action, Optional[str]], None]
+Put = Callable[[Action, str | None], None]
 
 
 def feedback_kind(name: str) -> str:

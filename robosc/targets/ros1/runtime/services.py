@@ -12,8 +12,8 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-from robosc.targets.ros1.runtime.inbox import Action
 from robosc.targets.ros.runtime.reports import Reports
+from robosc.targets.ros1.runtime.inbox import Action
 
 MAXIMUM_PENDING = 16
 """Calls of one service whose reply is still listened for, so that a late one is noticed."""
@@ -33,9 +33,7 @@ class ServiceCalls:
         reports: Where replies go.
     """
 
-    def __init__(
-        self, name: str, connect: Callable[[], Any], put: Callable[[Action], None], reports: Reports
-    ) -> None:
+    def __init__(self, name: str, connect: Callable[[], Any], put: Callable[[Action], None], reports: Reports) -> None:
         self.name = name
         self.is_found = False
         self._connect = connect

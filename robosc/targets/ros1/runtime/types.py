@@ -59,6 +59,4 @@ def load_action(server: Server) -> ServerType:
 
 def _missing(server: Server, name: str) -> SetupError:
     kind = "action" if server.is_action else "service"
-    return SetupError(
-        f"the {kind} type {name} is not installed; build {server.package} and source its workspace"
-    )
+    return SetupError(f"the {kind} type {name} is not installed; build {server.package} and source its workspace")

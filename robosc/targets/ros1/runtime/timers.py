@@ -42,5 +42,6 @@ class Timers:
         for timer in self._timers:
             now_s = self._monotonic()
             if now_s >= timer.next_s:
-                timer.next_s = max(timer.next_s + timer.period_s, now_s)
+                next_s = timer.next_s + timer.period_s
+                timer.next_s = next_s if next_s > now_s else now_s + timer.period_s
                 timer.action()

@@ -394,7 +394,8 @@ class Odd:
 
     def __init__(self) -> None:
         self.data, self.fixed, self.flag, self.header = b"", [0.0] * 9, False, Header()
-        self.late, self.many, self.old, self.small, self.wide = Time(), [], 0, 0, 0.0
+        self.many: list[Any] = []
+        self.late, self.old, self.small, self.wide = Time(), 0, 0, 0.0
 
 
 def test_genpys_types_are_told_in_the_words_of_ros_2() -> None:

@@ -245,14 +245,14 @@ def test_it_waits_for_a_master_and_hears_signals(robot: Robot) -> None:
 
 
 def test_a_stuck_receiver_neither_delays_nor_keeps_the_node(robot: Robot, tmp_path: Path) -> None:
-    robot.start("_period:=0.001")
+    # The texts on /state are long: they fill the connection's buffers within seconds.
+    robot.start("_period:=0.001", "_publish_state:=true")
     with Peer(robot.master, tmp_path / "stuck", "stuck_peer") as stuck:
-        stuck.subscribe("/cmd_vel", "geometry_msgs/Twist")
-        robot.until(lambda: bool(stuck.values("/cmd_vel")), "the second receiver")
+        stuck.subscribe("/state", "std_msgs/String")
+        robot.until(lambda: bool(stuck.received["/state"]), "the second receiver")
         stuck.stop()
-        # Far more than its connection's buffers hold.
         robot.drive()
-        robot.next_commands(3000)
+        robot.next_commands(4000)
         robot.node.signal(signal.SIGTERM)
         robot.stands_still(0)
 

@@ -115,6 +115,10 @@ _BUILT_IN: dict[str, tuple[str, str]] = {
         "the supervisor and its executor as one Python file without any dependency",
         "robosc.targets.python:TARGET",
     ),
+    "ros1": (
+        "a complete ROS 1 package (catkin, rospy): controller node, launch file, parameters",
+        "robosc.targets.ros1:TARGET",
+    ),
     "ros2": (
         "a complete ROS 2 package (ament_python): controller or layer node, launch file, parameters",
         "robosc.targets.ros2:TARGET",

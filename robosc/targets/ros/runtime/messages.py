@@ -25,6 +25,24 @@ _SEQUENCE = re.compile(r"sequence<(?P<element>.+?)(, [0-9]+)?>\Z|(?P<fixed>.+)\[
 _NESTED = re.compile(r"[a-z0-9_]+/[A-Za-z0-9]+\Z")
 _STRING = re.compile(r"w?string(<(?P<bound>[0-9]+)>)?\Z")
 
+# What genpy, of ROS 1, calls the types of fields, in the words of ROS 2. Its own times and durations count as messages.
+_GENPY_ARRAY = re.compile(r"(?P<element>[^\[]+)\[(?P<length>[0-9]*)\]\Z")
+
+_GENPY_TYPES = {
+    "bool": "boolean",
+    "byte": "int8",
+    "char": "uint8",
+    "float32": "float",
+    "float64": "double",
+    "time": "genpy/Time",
+    "duration": "genpy/Duration",
+    "Header": "std_msgs/Header",
+}
+_GENPY_OWN = {
+    "Time": {"secs": "uint32", "nsecs": "uint32"},
+    "Duration": {"secs": "int32", "nsecs": "int32"},
+}
+
 
 class Topic(NamedTuple):
     """A topic of the node.
@@ -114,7 +132,7 @@ def require_header(message_class: Any, subject: str) -> None:
     Raises:
         SetupError: It has none.
     """
-    if message_class.get_fields_and_field_types().get("header") != "std_msgs/Header":
+    if fields_of(message_class).get("header") != "std_msgs/Header":
         raise SetupError(
             f"{subject}: it is stamped, but {message_name(message_class)} has no header of type std_msgs/Header"
         )
@@ -126,13 +144,13 @@ def headers_of(message: Any, subject: str) -> list[Any]:
     Raises:
         SetupError: There is none.
     """
-    fields = message.get_fields_and_field_types()
+    fields = fields_of(message)
     if fields.get("header") == "std_msgs/Header":
         return [message.header]
     found = []
     for name, field_type in fields.items():
         inner = getattr(message, name)
-        if _NESTED.match(field_type) and inner.get_fields_and_field_types().get("header") == "std_msgs/Header":
+        if _NESTED.match(field_type) and fields_of(inner).get("header") == "std_msgs/Header":
             found.append(inner.header)
     if not found:
         raise SetupError(
@@ -141,10 +159,36 @@ def headers_of(message: Any, subject: str) -> list[Any]:
     return found
 
 
+def fields_of(message: Any) -> dict[str, str]:
+    """The type of each field of a message or of its class, in order."""
+    if hasattr(message, "get_fields_and_field_types"):
+        return dict(message.get_fields_and_field_types())
+    message_class: Any = message if isinstance(message, type) else type(message)
+    if _is_genpy_own(message_class):
+        return dict(_GENPY_OWN[message_class.__name__])
+    return dict(zip(message_class.__slots__, map(_translated, message_class._slot_types)))  # noqa: B905 - Python 3.8
+
+
 def message_name(message_class: Any) -> str:
-    """A message class as ROS names it: `geometry_msgs/msg/Twist`, `std_srvs/srv/SetBool_Request`."""
-    package, folder = message_class.__module__.split(".")[:2]
-    return f"{package}/{folder}/{message_class.__name__}"
+    """A message class as its ROS names it: `geometry_msgs/msg/Twist`, in ROS 1 `geometry_msgs/Twist`."""
+    if hasattr(message_class, "get_fields_and_field_types"):
+        package, folder = message_class.__module__.split(".")[:2]
+        return f"{package}/{folder}/{message_class.__name__}"
+    if _is_genpy_own(message_class):
+        return f"genpy/{message_class.__name__}"
+    return str(message_class._type)
+
+
+def _is_genpy_own(message_class: Any) -> bool:
+    return message_class.__module__.split(".")[0] == "genpy" and message_class.__name__ in _GENPY_OWN
+
+
+def _translated(slot_type: str) -> str:
+    array = _GENPY_ARRAY.match(slot_type)
+    if array is None:
+        return _GENPY_TYPES.get(slot_type, slot_type)
+    element = _GENPY_TYPES.get(array.group("element"), array.group("element"))
+    return "{}[{}]".format(element, array.group("length")) if array.group("length") else f"sequence<{element}>"
 
 
 def basic_field(message_class: Any) -> str:
@@ -153,7 +197,7 @@ def basic_field(message_class: Any) -> str:
     Raises:
         SetupError: There are several, or none.
     """
-    fields = message_class.get_fields_and_field_types()
+    fields = fields_of(message_class)
     if "data" in fields:
         return "data"
     if len(fields) == 1:
@@ -180,12 +224,12 @@ def check_shape(message_class: Any, shape: Any, subject: str) -> None:
         _check_object(message_class, shape, subject, ())
     elif shape is not None:
         name = basic_field(message_class)
-        field_type = message_class.get_fields_and_field_types()[name]
+        field_type = fields_of(message_class)[name]
         _check_field(field_type, shape, subject, message_class, (name,))
 
 
 def _check_object(message_class: Any, shape: dict[str, Any], subject: str, path: tuple[str, ...]) -> None:
-    fields = message_class.get_fields_and_field_types()
+    fields = fields_of(message_class)
     for name, inner in shape.items():
         if name not in fields:
             raise SetupError(
@@ -220,7 +264,7 @@ def _misfit(field_type: str, shape: str, subject: str, message_class: Any, path:
 
 def _nested_class(field_type: str) -> Any:
     package, _, name = field_type.partition("/")
-    return load_message(package, name)
+    return getattr(importlib.import_module("genpy"), name) if package == "genpy" else load_message(package, name)
 
 
 def _fits(field_type: str, shape: str) -> bool:
@@ -371,7 +415,7 @@ def _slot(message: Any, shape: Any, path: tuple[str, ...]) -> _Slot:
     inner = shape
     for name in path:
         inner = inner[name]
-    field_type = owner.get_fields_and_field_types()[names[-1]]
+    field_type = fields_of(owner)[names[-1]]
     return _Slot(path, owner, names[-1], converter(field_type, inner), getattr(owner, names[-1]))
 
 

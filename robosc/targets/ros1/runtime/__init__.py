@@ -1,0 +1,1 @@
+"""Modules that generated ROS 1 packages carry copies of, beside those of all ROS packages; none of them imports ROS."""

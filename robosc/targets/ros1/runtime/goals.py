@@ -1,0 +1,234 @@
+"""Goals through actionlib's `ActionClient`: nothing waits, and every end is told to the executor.
+
+actionlib calls back in the threads of rospy; what it says goes through the inbox to the executor's thread, where
+everything here runs. A server of actionlib says in its status messages what became of each goal; there is no
+answer to a cancel. One that is ignored is noticed by status messages that go on without it.
+
+A copy of this module stands in generated packages, which run on Python 3.8 and later.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from robosc.targets.ros.runtime.reports import Reports
+from robosc.targets.ros1.runtime.inbox import Action
+from robosc.targets.ros1.runtime.presence import Presence
+
+REFUSAL_S = 1.0
+"""A server that still reports a goal as running so long after its cancel does not mean to cancel it."""
+
+SILENCE_S = 5.0
+"""A goal whose receipt, or whose result after its end, was not heard of for so long is lost."""
+
+# actionlib_msgs/GoalStatus.
+ACTIVE = 1
+PREEMPTED = 2
+SUCCEEDED = 3
+ABORTED = 4
+REJECTED = 5
+RECALLED = 8
+_OUTCOMES = {
+    PREEMPTED: "cancelled",
+    SUCCEEDED: "succeeded",
+    ABORTED: "aborted",
+    REJECTED: "rejected",
+    RECALLED: "cancelled",
+}
+
+# actionlib.CommState: how far client and server understand each other about a goal.
+WAITING_FOR_GOAL_ACK = 0
+WAITING_FOR_RESULT = 3
+WAITING_FOR_CANCEL_ACK = 4
+RECALLING = 5
+PREEMPTING = 6
+DONE = 7
+_SILENT = (WAITING_FOR_GOAL_ACK, WAITING_FOR_RESULT)
+_CANCEL_HEARD = (WAITING_FOR_RESULT, RECALLING, PREEMPTING, DONE)
+
+Put = Callable[[Action, str | None], None]
+
+
+def feedback_kind(name: str) -> str:
+    """As what the feedback of an action, by its name on ROS, waits in the inbox."""
+    return f"feedback of {name}"
+
+
+class _Goal:
+    """A goal whose end is not known.
+
+    Attributes:
+        handle: What actionlib calls it by.
+        state: How far it is, as heard last.
+        since_s: Since when.
+        is_accepted: Whether its server has received it without refusing it.
+        cancelled_s: When its cancel was asked for, until it is heard of; or None.
+    """
+
+    __slots__ = ("cancelled_s", "handle", "is_accepted", "since_s", "state")
+
+    def __init__(self, now_s: float) -> None:
+        self.handle: Any = None
+        self.state = WAITING_FOR_GOAL_ACK
+        self.since_s = now_s
+        self.is_accepted = False
+        self.cancelled_s: float | None = None
+
+
+class _Abandoned:
+    """A goal that was told to be lost although it may be running.
+
+    Attributes:
+        handle: What actionlib calls it by.
+        is_asked: Whether its cancel was asked for since its server was seen.
+    """
+
+    __slots__ = ("handle", "is_asked")
+
+    def __init__(self, handle: Any) -> None:
+        self.handle = handle
+        self.is_asked = False
+
+
+class ActionGoals:
+    """The goals of one action.
+
+    Args:
+        client: Has `send_goal` and `last_status_msg` as actionlib's `ActionClient`.
+        is_ready: Whether its server is connected.
+        name: The action's name on ROS.
+        put: The inbox's.
+        reports: Where what is heard of goals goes.
+        monotonic: The clock.
+    """
+
+    def __init__(
+        self,
+        client: Any,
+        is_ready: Callable[[], bool],
+        name: str,
+        put: Put,
+        reports: Reports,
+        monotonic: Callable[[], float],
+    ) -> None:
+        self.name = name
+        self.is_ready = is_ready
+        self._client = client
+        self._put = put
+        self._reports = reports
+        self._monotonic = monotonic
+        self._presence = Presence(is_ready)
+        self._last_status: Any = None
+        self._heard_s = 0.0
+        self._goals: dict[int, _Goal] = {}
+        self._abandoned: dict[int, _Abandoned] = {}
+
+    def send(self, goal_id: int, message: Any) -> None:
+        """Send a goal without waiting."""
+        if not self.is_ready():
+            self._end(goal_id, "lost")
+            return
+        goal = self._goals[goal_id] = _Goal(self._monotonic())
+        try:
+            goal.handle = self._client.send_goal(message, self._transition(goal_id), self._feedback(goal_id))
+        except Exception:
+            del self._goals[goal_id]
+            raise
+
+    def cancel(self, goal_id: int) -> None:
+        """Ask for the cancel of an accepted goal without waiting."""
+        goal = self._goals.get(goal_id)
+        # Its end may be known here and wait to be told.
+        if goal is not None:
+            goal.cancelled_s = self._monotonic()
+            goal.handle.cancel()
+
+    def check(self, now_s: float) -> None:
+        """Notice a lost server, one that is back, goals that nothing is heard of, and cancels that are ignored."""
+        status = self._client.last_status_msg
+        if status is not self._last_status:
+            self._last_status, self._heard_s = status, now_s
+        if not self._goals:
+            self._presence.forget()
+        elif self._presence.is_lost(now_s):
+            for goal_id in list(self._goals):
+                self._abandon(goal_id)
+        for goal_id, goal in list(self._goals.items()):
+            if goal.state in _SILENT and now_s >= goal.since_s + SILENCE_S:
+                self._abandon(goal_id)
+            elif goal.cancelled_s is not None and self._heard_s >= goal.cancelled_s + REFUSAL_S:
+                goal.cancelled_s = None
+                self._refuse(goal_id)
+        if self._abandoned:
+            self._look_for_server()
+
+    @property
+    def has_abandoned(self) -> bool:
+        """Whether a goal that was told to be lost may be running."""
+        return bool(self._abandoned)
+
+    def cancel_abandoned(self) -> None:
+        """Ask for the cancel of every goal that was told to be lost: its server may be there and only be unseen."""
+        for abandoned in list(self._abandoned.values()):
+            abandoned.is_asked = True
+            abandoned.handle.cancel()
+
+    def _abandon(self, goal_id: int) -> None:
+        """Tell that a goal is lost; it may be running, or on its way, and it is not forgotten."""
+        self._abandoned[goal_id] = _Abandoned(self._goals[goal_id].handle)
+        self._end(goal_id, "lost")
+
+    def _look_for_server(self) -> None:
+        """Cancel lost goals as soon as their server is seen: nobody else would ever stop them."""
+        is_there = self.is_ready()
+        for abandoned in list(self._abandoned.values()):
+            if not is_there:
+                abandoned.is_asked = False
+            elif not abandoned.is_asked:
+                abandoned.is_asked = True
+                abandoned.handle.cancel()
+
+    # What actionlib says, in the threads of rospy.
+
+    def _transition(self, goal_id: int) -> Callable[[Any], None]:
+        def tell(handle: Any) -> None:
+            state, status = handle.get_comm_state(), handle.get_goal_status()
+            result = handle.get_result() if state == DONE else None
+            self._put(lambda: self._changed(goal_id, state, status, result), None)
+
+        return tell
+
+    def _feedback(self, goal_id: int) -> Callable[[Any, Any], None]:
+        return lambda handle, data: self._put(lambda: self._told(goal_id, data), feedback_kind(self.name))
+
+    # The same in the executor's thread.
+
+    def _told(self, goal_id: int, data: Any) -> None:
+        if goal_id in self._goals:
+            self._reports.add(lambda executor: executor.on_feedback(goal_id, data))
+
+    def _changed(self, goal_id: int, state: int, status: int, result: Any) -> None:
+        goal = self._goals.get(goal_id)
+        if goal is None:
+            # It was told to be lost; now it has ended, or its server has heard the cancel.
+            if state in _CANCEL_HEARD:
+                self._abandoned.pop(goal_id, None)
+            return
+        goal.state, goal.since_s = state, self._monotonic()
+        if state in _CANCEL_HEARD:
+            goal.cancelled_s = None
+        if state == DONE:
+            # Any other status means that the server does not know the goal: it was started anew.
+            outcome = _OUTCOMES.get(status, "lost")
+            self._end(goal_id, outcome, result if outcome == "succeeded" else None)
+        elif not goal.is_accepted and state != WAITING_FOR_CANCEL_ACK and status not in (REJECTED, RECALLED):
+            goal.is_accepted = True
+            self._reports.add(lambda executor: executor.on_goal_accepted(goal_id))
+
+    def _refuse(self, goal_id: int) -> None:
+        self._reports.add(lambda executor: executor.on_cancel_refused(goal_id, False))
+
+    def _end(self, goal_id: int, outcome: str, result: Any = None) -> None:
+        self._goals.pop(goal_id, None)
+        self._reports.add(lambda executor: executor.on_goal_ended(goal_id, outcome, result))

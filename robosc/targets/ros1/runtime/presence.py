@@ -1,0 +1,36 @@
+"""When a server is lost.
+
+A copy of this module stands in generated packages, which run on Python 3.8 and later.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+LOST_S = 1.0
+"""A server that was not seen for so long is lost; a connection may be lost and made anew in between."""
+
+
+class Presence:
+    """Tells when a server is lost.
+
+    Args:
+        is_ready: Whether it is seen now.
+    """
+
+    def __init__(self, is_ready: Callable[[], bool]) -> None:
+        self._is_ready = is_ready
+        self._missed_since_s: float | None = None
+
+    def is_lost(self, now_s: float) -> bool:
+        """Whether it has not been seen for `LOST_S`, asked again and again."""
+        if self._is_ready():
+            self._missed_since_s = None
+            return False
+        if self._missed_since_s is None:
+            self._missed_since_s = now_s
+        return now_s >= self._missed_since_s + LOST_S
+
+    def forget(self) -> None:
+        """Nobody asks any more."""
+        self._missed_since_s = None

@@ -1,0 +1,72 @@
+"""The generated middleware of ROS 1 without ROS 1: names on the wire, and when a last message has arrived."""
+
+import socket
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import pytest
+
+from robosc.targets import generate, write_files
+from support.generated import example_supervisor
+
+PACKAGE = "line_follower_controller"
+
+
+@pytest.fixture(scope="module")
+def middleware(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """The generated module, with stand-ins for what it imports of ROS."""
+    folder = tmp_path_factory.mktemp("package")
+    write_files(generate(example_supervisor("line_follower/line_follower"), "ros1"), folder)
+    with pytest.MonkeyPatch.context() as patch:
+        for name, members in (("rospy", {}), ("actionlib", {"ActionClient": None})):
+            stub = ModuleType(name)
+            vars(stub).update(members)
+            patch.setitem(sys.modules, name, stub)
+        patch.syspath_prepend(str(folder))
+        __import__(f"{PACKAGE}.middleware")
+        yield sys.modules[f"{PACKAGE}.middleware"]
+        for name in [name for name in sys.modules if name.split(".")[0] == PACKAGE]:
+            del sys.modules[name]
+
+
+def publisher(*connections: Any) -> Any:
+    return SimpleNamespace(impl=SimpleNamespace(connections=list(connections)))
+
+
+@pytest.mark.parametrize(
+    ("prefix", "identifier", "name"),
+    [("", "/a", "/a"), ("", "a/b", "a/b"), ("/p", "a", "/p/a"), ("/p", "/a", "/p/a"), ("/p", "~/a/b", "~a/b")],
+)
+def test_names_on_the_wire(middleware: Any, prefix: str, identifier: str, name: str) -> None:
+    assert middleware.wire_name(prefix, identifier) == name
+
+
+def test_what_waits_in_a_queue_is_awaited(middleware: Any) -> None:
+    connection = SimpleNamespace(_queue=[b"zero"], socket=None)
+    threading.Timer(0.2, connection._queue.clear).start()
+    began_s = time.monotonic()
+    middleware.wait_until_delivered([publisher(SimpleNamespace(_queue=[], socket=None)), publisher(connection)])
+    assert not connection._queue
+    assert time.monotonic() - began_s >= 0.2
+
+
+def test_what_the_other_computer_has_not_confirmed_is_awaited_but_not_for_long(middleware: Any) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server, socket.create_connection(server.getsockname()) as sender:
+        receiver, _ = server.accept()
+        with receiver:
+            sender.setblocking(False)
+            with pytest.raises(BlockingIOError):
+                while True:
+                    sender.send(bytes(65536))
+            connection = SimpleNamespace(_queue=[], socket=sender)
+            assert middleware._unsent(connection)
+            began_s = time.monotonic()
+            middleware.wait_until_delivered([publisher(connection)])
+            assert time.monotonic() - began_s >= middleware.DELIVERY_S
+
+    assert not middleware._unsent(SimpleNamespace(_queue=[], socket=sender))
+    assert not middleware._unsent(SimpleNamespace(_queue=[], socket=None))

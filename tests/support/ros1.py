@@ -1,0 +1,344 @@
+"""Real ROS 1 in tests: a master, nodes under Debian's Python, a peer that talks to them, all in own processes."""
+
+import contextlib
+import json
+import os
+import queue
+import shutil
+import signal
+import socket
+import subprocess
+import threading
+import time
+import xmlrpc.client
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+PYTHON = "/usr/bin/python3"
+LIMIT_S = 20.0
+EXIT_LIMIT_S = 15.0
+REPEAT_S = 0.1
+
+_MODULES = (
+    "rospy, rosmaster, roslaunch, actionlib, move_base_msgs.msg, geometry_msgs.msg, sensor_msgs.msg, std_srvs.srv, "
+    "diagnostic_msgs.msg"
+)
+
+
+@cache
+def missing() -> str | None:
+    """Why tests that need ROS 1 cannot run here; None if they can."""
+    if not Path(PYTHON).exists() or shutil.which("rosmaster", path="/usr/bin") is None:
+        return "ROS 1 (rosmaster) is not installed"
+    command = [PYTHON, "-c", f"import {_MODULES}"]
+    found = subprocess.run(command, env=clean_environment(), capture_output=True, text=True, check=False)
+    return None if found.returncode == 0 else f"ROS 1 is not installed: {found.stderr.splitlines()[-1]}"
+
+
+def clean_environment() -> dict[str, str]:
+    """The environment of programs that are not of this interpreter's: without what ROS 2's wheels put there."""
+    return {"PATH": "/usr/bin:/bin", "HOME": os.environ.get("HOME", "/"), "LANG": "C.UTF-8"}
+
+
+def free_port() -> int:
+    """A port that nobody listens on."""
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        return int(found.getsockname()[1])
+
+
+def wait_until(condition: Callable[[], bool], what: str, limit_s: float = LIMIT_S) -> None:
+    """Poll until a condition is true.
+
+    Raises:
+        AssertionError: It was not within the limit; says what was waited for.
+    """
+    deadline = time.monotonic() + limit_s
+    while not condition():
+        assert time.monotonic() < deadline, f"waited {limit_s} s in vain for {what}"
+        time.sleep(0.01)
+
+
+class Process:
+    """A program in an environment of ROS 1; ended at the latest when the `with` block ends.
+
+    Args:
+        command: What to run.
+        variables: Its environment.
+        folder: Folder for its output.
+    """
+
+    def __init__(self, command: Sequence[str], variables: Mapping[str, str], folder: Path) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self._error_file = folder / "stderr.txt"
+        self._output_file = folder / "stdout.txt"
+        with self._error_file.open("wb") as error, self._output_file.open("wb") as output:
+            self.popen = subprocess.Popen(
+                command,
+                env=dict(variables),
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=error,
+                cwd=folder,
+                start_new_session=True,
+            )
+
+    @property
+    def stderr(self) -> str:
+        """What it has written to standard error so far."""
+        return self._error_file.read_text(errors="replace")
+
+    @property
+    def stdout(self) -> str:
+        """What it has written to standard output so far."""
+        return self._output_file.read_text(errors="replace")
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it has not ended."""
+        return self.popen.poll() is None
+
+    def signal(self, number: signal.Signals) -> None:
+        """Send a signal."""
+        self.popen.send_signal(number)
+
+    def wait(self, limit_s: float = EXIT_LIMIT_S) -> int:
+        """Its exit status, waiting for its end."""
+        try:
+            return self.popen.wait(limit_s)
+        except subprocess.TimeoutExpired:
+            raise AssertionError(f"the process did not end within {limit_s} s\n{self.stderr}") from None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        # Its children, too: it leads a session of its own.
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.popen.pid, signal.SIGKILL)
+        self.popen.wait()
+
+
+class Master:
+    """A `rosmaster` of a test's own.
+
+    Args:
+        folder: Folder for what ROS writes.
+
+    Attributes:
+        variables: The environment of those that talk to it.
+        process: The master.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        deadline = time.monotonic() + LIMIT_S
+        while True:
+            port = free_port()
+            self.variables = {
+                **clean_environment(),
+                "ROS_MASTER_URI": f"http://127.0.0.1:{port}",
+                "ROS_IP": "127.0.0.1",
+                "ROS_HOME": str(folder / "ros_home"),
+                "ROS_LOG_DIR": str(folder / "ros_log"),
+            }
+            self.port = port
+            self.process = self._start(folder)
+            # Somebody else may have taken the port.
+            while self.process.is_running:
+                if self.is_up():
+                    return
+                assert time.monotonic() < deadline, f"no master\n{self.process.stderr}"
+                time.sleep(0.01)
+            assert time.monotonic() < deadline, f"no master\n{self.process.stderr}"
+
+    def _start(self, folder: Path) -> Process:
+        return Process(["/usr/bin/rosmaster", "--core", "-p", str(self.port)], self.variables, folder / "master")
+
+    def is_up(self) -> bool:
+        """Whether it answers."""
+        try:
+            with xmlrpc.client.ServerProxy(self.variables["ROS_MASTER_URI"]) as master:
+                master.getPid("/test")
+        except OSError:
+            return False
+        return True
+
+    def set_parameter(self, name: str, value: Any) -> None:
+        """Put a parameter on the parameter server."""
+        with xmlrpc.client.ServerProxy(self.variables["ROS_MASTER_URI"]) as master:
+            master.setParam("/test", name, value)
+
+    def start_anew(self, folder: Path) -> None:
+        """End it, and start another at its place."""
+        self.process.__exit__(None, None, None)
+        self.process = self._start(folder)
+        wait_until(self.is_up, "the new master")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.__exit__(None, None, None)
+
+
+class Peer:
+    """The other side of a node: a process of `ros1_peer`, told what to do.
+
+    Args:
+        master: Whom it talks to.
+        folder: Folder for its output.
+        name: Name of its node.
+
+    Attributes:
+        received: Messages by topic, with the time of each.
+        requests: What services were asked, by name.
+        goals: What actions were asked, by name.
+        cancels: How often an action was cancelled, by name.
+    """
+
+    def __init__(self, master: Master, folder: Path, name: str = "test_peer") -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self._error = (folder / f"{name}.txt").open("wb")
+        file = Path(__file__).with_name("ros1_peer.py")
+        self._process = subprocess.Popen(
+            [PYTHON, str(file), name],
+            env=dict(master.variables),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._error,
+            text=True,
+        )
+        self.received: dict[str, list[tuple[float, Any]]] = {}
+        self.requests: dict[str, list[Any]] = {}
+        self.goals: dict[str, list[Any]] = {}
+        self.cancels: dict[str, int] = {}
+        self._replies: queue.Queue[dict[str, Any]] = queue.Queue()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+        self._reply("ready")
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            item = json.loads(line)
+            if "topic" in item:
+                self.received[item["topic"]].append((item["time"], item["message"]))
+            elif "service" in item:
+                self.requests[item["service"]].append(item["request"])
+            elif "goal" in item:
+                self.goals[item["action"]].append(item["goal"])
+            elif "cancel" in item:
+                self.cancels[item["action"]] += 1
+            else:
+                self._replies.put(item)
+
+    def _reply(self, kind: str) -> Any:
+        item = self._replies.get(timeout=LIMIT_S)
+        assert kind in item, item
+        return item
+
+    def do(self, what: str, **arguments: Any) -> None:
+        """Tell it to do something."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(json.dumps({"do": what, **arguments}) + "\n")
+        self._process.stdin.flush()
+
+    def subscribe(self, topic: str, type_name: str) -> None:
+        """Collect the messages of a topic in `received`."""
+        self.received[topic] = []
+        self.do("subscribe", topic=topic, type=type_name)
+
+    def advertise(self, topic: str, type_name: str) -> None:
+        """Be ready to publish on a topic."""
+        self.do("publish", topic=topic, type=type_name, message=None)
+
+    def publish(self, topic: str, type_name: str, **fields: Any) -> None:
+        """Send a message."""
+        self.do("publish", topic=topic, type=type_name, message=fields)
+
+    def serve(self, name: str, type_name: str) -> None:
+        """Offer a service whose calls wait for `answer` or `refuse`."""
+        self.requests[name] = []
+        self.do("service", name=name, type=type_name)
+
+    def act(self, name: str, type_name: str, **options: Any) -> None:
+        """Offer an action, as of `ros1_peer.Server`."""
+        self.goals[name] = []
+        self.cancels[name] = 0
+        self.do("action", name=name, type=type_name, options=options)
+
+    def ends(self, topic: str) -> list[str]:
+        """The nodes that are connected with this one on a topic."""
+        self.do("ends", topic=topic)
+        reply = self._reply("ends")
+        return [*reply["publishers"], *reply["subscribers"]]
+
+    def names(self) -> Any:
+        """What the master knows: nodes by topic and service."""
+        self.do("names")
+        return self._reply("names")["names"]
+
+    def values(self, topic: str) -> list[Any]:
+        """The messages of a topic so far."""
+        return [message for _, message in self.received[topic]]
+
+    def die(self) -> None:
+        """End it at once, as a crash would."""
+        self.do("die")
+        self._process.wait(EXIT_LIMIT_S)
+
+    def stop(self) -> None:
+        """Keep it from taking anything, as a hung program would."""
+        self._process.send_signal(signal.SIGSTOP)
+
+    def go_on(self) -> None:
+        """Let a stopped one go on."""
+        self._process.send_signal(signal.SIGCONT)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._process.kill()
+        self._process.wait()
+        self._reader.join(EXIT_LIMIT_S)
+        for stream in (self._process.stdin, self._process.stdout, self._error):
+            if stream is not None:
+                with contextlib.suppress(OSError):
+                    stream.close()
+
+
+def start_node(
+    master: Master, folder: Path, package: Path, module: str, arguments: Sequence[str] = (), **variables: str
+) -> Process:
+    """A module of a generated package, run from its folder without building anything."""
+    environment = {**master.variables, "PYTHONPATH": str(package), "PYTHONDONTWRITEBYTECODE": "1", **variables}
+    return Process([PYTHON, "-m", module, *arguments], environment, folder)
+
+
+def until(
+    condition: Callable[[], bool],
+    what: str,
+    process: Process,
+    repeat: Callable[[], object] = lambda: None,
+    limit_s: float = LIMIT_S,
+) -> None:
+    """Poll until a condition is true; now and again repeat something, for the first messages may be lost.
+
+    Raises:
+        AssertionError: It did not become true in time, or the process ended.
+    """
+    deadline = time.monotonic() + limit_s
+    next_s = time.monotonic()
+    while not condition():
+        assert time.monotonic() < deadline, f"waited {limit_s} s in vain for {what}\n{process.stderr}"
+        assert process.is_running, f"the node ended, waiting for {what}\n{process.stderr}"
+        if time.monotonic() >= next_s:
+            repeat()
+            next_s = time.monotonic() + REPEAT_S
+        time.sleep(0.005)

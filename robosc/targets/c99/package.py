@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import Constant, Expression, Received, StringType, leaves
-from robosc.model.structure import CommunicationKind, Deployment, Model, ObjectValue
+from robosc.model.structure import Deployment, Model, ObjectValue
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.c99.example import example_file
 from robosc.targets.c99.header import head, header_file
@@ -88,9 +88,8 @@ def _refuse(supervisor: Supervisor) -> None:
         UnsupportedModelError: The model needs something of that.
     """
     model = supervisor.model
-    has_actions = any(item.kind is CommunicationKind.ACTION for item in model.communications)
-    if supervisor.deployment is Deployment.LAYER and has_actions:
-        raise UnsupportedModelError("the target c99 does not do supervision layers of models with actions")
+    if supervisor.deployment is Deployment.LAYER:
+        raise UnsupportedModelError("the target c99 does not do supervision layers; the targets python and ros2 do")
     for component in model.components:
         for variable in component.behaviour.variables if component.behaviour else ():
             if isinstance(variable.type, StringType) and _takes_received(model, component.name, variable.name):

@@ -428,8 +428,9 @@ def test_the_prefix_may_be_chosen() -> None:
 
 
 def test_what_is_not_done_is_refused() -> None:
-    with pytest.raises(UnsupportedModelError, match="does not do supervision layers of models with actions"):
-        generate(example_supervisor("navigation/navigation", Deployment.LAYER), "c99")
+    for name in ("navigation/navigation", "line_follower/line_follower_layer"):
+        with pytest.raises(UnsupportedModelError, match="does not do supervision layers; the targets python and ros2"):
+            generate(example_supervisor(name, Deployment.LAYER), "c99")
     text = """
         robot R { component C {
             outgoing message m with type: string

@@ -217,10 +217,16 @@ robot TwoGoals {
 
 
 class _Caller:
-    """A reference layer of two goals, driven by hand."""
+    """A reference layer with a message `go`, driven by hand.
 
-    def __init__(self, **named: object) -> None:
-        self.reference = LayerReference(layer_of_text(TWO_GOALS), Random(1), Settings(**named))  # type: ignore[arg-type]
+    Args:
+        text: Its model.
+        named: Settings by name.
+    """
+
+    def __init__(self, text: str = TWO_GOALS, **named: object) -> None:
+        self.supervisor = layer_of_text(text)
+        self.reference = LayerReference(self.supervisor, Random(1), Settings(**named))  # type: ignore[arg-type]
         self.executor = self.reference.executor
         self.executor.start()
         self.reference.tell("s")
@@ -245,6 +251,11 @@ class _Caller:
         self.executor.on_request("go", message)
         self.reference.tell("q", 0, *sent)
 
+    def receive(self, identifier: str) -> None:
+        number = self.reference.remember(None)
+        self.executor.receive(identifier, None)
+        self.reference.tell("m", list(self.reference.layout.received_topics).index(identifier), number)
+
     def watch(self, seconds: float) -> None:
         self.reference.clock.advance(seconds)
         self.executor.watch()
@@ -254,7 +265,7 @@ class _Caller:
         return [line for line in self.reference.lines if not line.startswith(("state", "log"))]
 
     def check(self, folder: Path) -> None:
-        program = compiled_layer(layer_of_text(TWO_GOALS), folder)
+        program = compiled_layer(self.supervisor, folder)
         replay(program, self.reference.commands, self.reference.lines)
 
 
@@ -285,13 +296,9 @@ def test_a_cancelled_goal_ends_as_its_server_ends_it(tmp_path: Path) -> None:
         world.cancel("two", number)
         world.accept(number)
         world.reference.end(number, outcome)
-    world.goal("two", 3)
-    world.accept(3)
-    world.cancel("two", 3)
-    world.executor.on_goal_ended(3, "succeeded", message := {"code": 0})
-    world.reference.messages.append(message)
-    ends = [line.rpartition(" ")[0] for line in world.lines() if line.startswith("end")]
-    assert ends[:2] == ["end 1 1 2", "end 1 2 1"]
+    ends = [line.split()[:4] for line in world.lines() if line.startswith("end")]
+    assert ends == [["end", "1", "1", "2"], ["end", "1", "2", "1"]]
+    world.check(tmp_path)
 
 
 @needs_gcc
@@ -305,6 +312,54 @@ def test_a_caller_that_falls_silent_is_released_once(tmp_path: Path) -> None:
     world.watch(0.25)
     world.watch(5.0)
     assert world.lines() == ["publish 0 0", "publish 0 1", "default 0"]
+    world.check(tmp_path)
+
+
+@needs_gcc
+def test_what_a_request_makes_false_does_not_release_its_own_earlier_message(tmp_path: Path) -> None:
+    text = """
+        robot Steps { component P {
+            incoming message go with type: integer
+            outgoing message ready with type: none
+            behaviour {
+                on request to go goto moving
+                initial marked state still { }
+                marked state moving { on response from ready goto still }
+            }
+        }
+        requirement go needs P.still }
+    """
+    world = _Caller(text, release_identifiers=("go",))
+    for _ in range(3):
+        world.go()
+        world.receive("ready")
+    assert [line for line in world.lines() if not line.startswith("pass")] == [f"publish 0 {n}" for n in (0, 2, 4)]
+    world.check(tmp_path)
+
+
+@needs_gcc
+def test_a_cancel_is_forwarded_whatever_goes_wrong_and_before_the_robot_rests(tmp_path: Path) -> None:
+    text = """
+        robot Endless {
+        interface dock use Dock from some_msgs
+        component P {
+            action one with request: none, response: none, feedback: none links dock
+            incoming message go with type: integer
+            behaviour {
+                on request to one
+                on request to go
+                initial marked state fine { on cancel to one goto left }
+                marked state left { transition goto right }
+                state right { transition goto left }
+            }
+        } }
+    """
+    world = _Caller(text, release_identifiers=("go",))
+    world.goal("one", 7)
+    world.accept(1)
+    world.cancel("one", 7)
+    assert world.executor.is_faulty
+    assert world.lines()[2:] == ["cancel 0 1", "default 0"]
     world.check(tmp_path)
 
 

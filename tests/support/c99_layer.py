@@ -276,14 +276,17 @@ class LayerReference(Reference):
         tame = self._tame(datum)
         return self._whole(tame) if isinstance(tame, dict) else tame
 
-    def _tame(self, datum: Any) -> Any:
-        """The same with less that is not finite, and some numbers that are missing."""
+    def _tame(self, datum: Any, is_element: bool = False) -> Any:
+        """The same with less that is not finite, and some numbers that are missing.
+
+        No element of an array is missing: C has NaN for one, which `min` and `max` do not heed.
+        """
         if isinstance(datum, dict):
             return {name: self._tame(part) for name, part in datum.items()}
         if isinstance(datum, list):
-            return [self._tame(part) for part in datum]
+            return [self._tame(part, is_element=True) for part in datum]
         if isinstance(datum, float) and not math.isfinite(datum) and self.dice.random() < 0.95:
-            return self.dice.choice([0.5, 0.0, None])
+            return self.dice.choice([0.5, 0.0, 0.5 if is_element else None])
         return datum
 
     def _whole(self, message: dict[str, Any]) -> dict[str, Any]:

@@ -20,7 +20,8 @@ from robosc.expressions import (
 )
 from robosc.model.structure import Communication, CommunicationKind, EventKind
 from robosc.supervisor.structure import Supervisor
-from robosc.targets.c99.layout import PLANT_LOCATIONS, Layout, event_data, width
+from robosc.targets.c99.layer import request_declarations
+from robosc.targets.c99.layout import PLANT_LOCATIONS, Layout, data_that_comes, event_data, width
 from robosc.targets.c99.provide import request_field, request_struct
 from robosc.targets.c99.step import unknown_name
 from robosc.targets.c99.text import comment, safe
@@ -42,7 +43,31 @@ def runtime_text(layout: Layout, name: str) -> str:
     """A file of the runtime with the robot's prefix in place of `robot_`."""
     text = resources.files("robosc.targets.c99.runtime").joinpath(name).read_text(encoding="utf-8")
     text = re.sub(r"\brobot_(?=[a-z])", f"{layout.prefix}_", text)
-    return re.sub(r"\bROBOT_(?=[A-Z])", f"{layout.upper}_", text)
+    return re.sub(r"\bROBOT_(?=[A-Z])", f"{layout.upper}_", for_deployment(text, layout.is_layer))
+
+
+def for_deployment(text: str, is_layer: bool) -> str:
+    """The lines of a runtime file for a deployment: what `#if` asks of it is decided here, not by a compiler."""
+    conditions = {"#if ROBOT_IS_LAYER": is_layer, "#if !ROBOT_IS_LAYER": not is_layer}
+    lines: list[str] = []
+    # For each `#if` around: whether its part is kept; None if it stays for the compiler.
+    around: list[bool | None] = []
+    for line in text.splitlines(keepends=True):
+        word = line.strip()
+        if word.startswith("#if"):
+            around.append(conditions.get(word))
+            is_decided = around[-1] is not None
+        elif word in ("#else", "#endif"):
+            kept = around.pop()
+            is_decided = kept is not None
+            if word == "#else":
+                around.append(None if kept is None else not kept)
+        else:
+            is_decided = False
+        # A part that is left out is left out with all that is in it.
+        if not is_decided and False not in around:
+            lines.append(line)
+    return "".join(lines)
 
 
 def header_file(unit: Unit) -> str:
@@ -74,8 +99,7 @@ def header_file(unit: Unit) -> str:
         *_received_types(layout),
         *_state(layout),
         "",
-        *_request(unit),
-        "",
+        *([] if layout.is_layer else [*_request(unit), ""]),
         *runtime_text(layout, "engine.h").splitlines(),
         "",
         *_entries(layout),
@@ -91,8 +115,7 @@ def header_file(unit: Unit) -> str:
 def _about(layout: Layout) -> list[str]:
     certificate = layout.supervisor.certificate
     words = [
-        f"The supervisor of the robot {layout.model.name} and its executor. No allocation, no recursion, no global "
-        f"variable: everything is in one {layout.prefix}_t that the caller owns.",
+        _purpose(layout),
         f"Checked: safe {certificate.safe}, controllable {certificate.controllable}, nonblocking "
         f"{certificate.nonblocking}, maximally permissive {certificate.maximally_permissive}. "
         f"How: {certificate.method}.",
@@ -103,6 +126,18 @@ def _about(layout: Layout) -> list[str]:
         lines += [f"     {safe(requirement_text(item))}" for item in layout.model.requirements]
         lines[-1] += " */"
     return lines
+
+
+def _purpose(layout: Layout) -> str:
+    """What the generated code is, in a few sentences."""
+    owned = f"No allocation, no recursion, no global variable: everything is in one {layout.prefix}_t"
+    if layout.is_layer:
+        return (
+            f"A supervision layer for the robot {layout.model.name}: what an existing controller, the caller, sends to "
+            "the robot goes to this layer, which lets it through if the supervisor allows it now, else holds it back; "
+            f"what the robot sends reaches the caller through it. {owned} that the program owns."
+        )
+    return f"The supervisor of the robot {layout.model.name} and its executor. {owned} that the caller owns."
 
 
 def _unknowns(layout: Layout) -> list[str]:
@@ -135,6 +170,7 @@ def counts(layout: Layout) -> dict[str, int]:
         "RECEIVED": len(uncontrollable),
         "CONJUNCT": max((info.conjunct_count for info in infos), default=0),
         "REQUIREMENT": max((info.requirement_count for info in infos if info.kind == "action"), default=0),
+        **({"WHEN": sum(item.when is not None for item in model.communications)} if layout.is_layer else {}),
     }
 
 
@@ -159,6 +195,7 @@ def _numbers(layout: Layout) -> list[str]:
         ("event", layout.events, "Events."),
         ("communication", layout.communications, "Messages, services and actions, in source order."),
         ("topic", layout.topics, "Identifiers of incoming messages."),
+        *([("source", layout.received_topics, "Identifiers of outgoing messages.")] if layout.is_layer else []),
     ):
         members = list(table.values()) or [f"{upper}_NO_{kind.upper()}S"]
         lines += [*_enumeration(f"{prefix}_{kind}_t", words, members), ""]
@@ -238,12 +275,9 @@ def _received_types(layout: Layout) -> list[str]:
         lines.extend([f"/* {words} */", "typedef struct {", *indent(body), f"}} {name};", ""])
 
     roots = []
-    for event in layout.events:
-        if not is_controllable(event):
-            data = event_data(layout.model, event)
-            if data is not None:
-                visit(data)
-                roots.append(layout.source(data))
+    for data in data_that_comes(layout):
+        visit(data)
+        roots.append(layout.source(data))
     for enum in layout.model.enums:
         visit(enum.source)
     for name in dict.fromkeys(layout.raw(root) for root in roots if isinstance(root, ObjectType | ArrayType)):
@@ -331,29 +365,29 @@ def _request(unit: Unit) -> list[str]:
 
 def _entries(layout: Layout) -> list[str]:
     """The functions through which data comes."""
-    lines = []
+    lines = request_declarations(layout) if layout.is_layer else []
     for identifier in layout.received_topics:
         names = ", ".join(item.name for item in batch(layout, identifier))
         lines += [
-            *comment(f"A message came on {identifier}: {names}. NULL: nothing of it is known."),
+            *comment(f"A message came on {identifier}: {names}. NULL: nothing of it is known.{_message_words(layout)}"),
             f"{receive_head(layout, identifier)};",
             "",
         ]
     for item in layout.model.communications:
         if item.kind is CommunicationKind.SERVICE:
             lines += [
-                *comment(f"The service {item.name} answered."),
+                *comment(f"The service {item.name} answered.{_message_words(layout)}"),
                 f"{reply_head(layout, item.event(EventKind.RESPONSE))};",
                 "",
             ]
         elif item.kind is CommunicationKind.ACTION:
             lines += [
-                *comment(f"The server of the action {item.name} told how far it is."),
+                *comment(f"The server of the action {item.name} told how far it is.{_message_words(layout)}"),
                 f"{reply_head(layout, item.event(EventKind.FEEDBACK))};",
                 "",
             ]
             lines += [
-                *comment(f"A goal of the action {item.name} succeeded."),
+                *comment(f"A goal of the action {item.name} succeeded.{_message_words(layout)}"),
                 f"{reply_head(layout, item.event(EventKind.RESPONSE))};",
                 "",
             ]
@@ -382,6 +416,7 @@ def receive_head(layout: Layout, identifier: str) -> str:
             types.setdefault(layout.raw(type_), type_)
     for raw, name in batch_parameters(layout, identifier).items():
         parameters.append(layout.parameter(types[raw], name))
+    parameters += _passed_on(layout)
     return f"void {layout.function('receive', identifier)}({', '.join(parameters)})"
 
 
@@ -395,7 +430,17 @@ def reply_head(layout: Layout, event: str) -> str:
     data = event_data(layout.model, event)
     if data is not None:
         parameters.append(layout.parameter(data, "data"))
+    parameters += _passed_on(layout)
     return f"void {layout.function(purpose, name)}({', '.join(parameters)})"
+
+
+def _message_words(layout: Layout) -> str:
+    return " `message` goes to the caller." if layout.is_layer else ""
+
+
+def _passed_on(layout: Layout) -> list[str]:
+    """The parameter that a layer passes on to the caller unchanged."""
+    return ["const void *message"] if layout.is_layer else []
 
 
 __all__ = ["batch", "counts", "head", "header_file", "receive_head", "reply_head", "runtime_text"]

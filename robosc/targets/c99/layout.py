@@ -18,7 +18,7 @@ from robosc.expressions import (
     StringType,
     Type,
 )
-from robosc.model.structure import Behaviour, Communication, CommunicationKind, EventKind, Model
+from robosc.model.structure import Behaviour, Communication, CommunicationKind, Deployment, EventKind, Model
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.c99.naming import Namer, prefix_for
 from robosc.targets.events import events, has_plant_location, is_controllable
@@ -32,12 +32,16 @@ PLANT_LOCATIONS = {
 # Names of the engine itself after the prefix.
 _ENGINE_NAMES = """
     t ACTION_COUNT COMMUNICATION_COUNT CONJUNCT_COUNT EVENT_COUNT FALSE H NO_COMMUNICATIONS NO_EVENT NO_EVENTS
-    NO_TOPICS RECEIVED_COUNT REQUEST_COUNT REQUIREMENT_COUNT SENSOR_COUNT SERVICE_COUNT SILENT_COUNT
-    TOPIC_COUNT TRUE UNCONTROLLABLE_DATA UNKNOWN UNKNOWN_INTEGER acting_t call_failed call_t callbacks_t
-    cancel_refused communication_name communication_t counters_t default_settings enabled event_name event_t
-    fault fault_t goal_accepted goal_ended goal_t init log_t on_unknown_t policy_t request_t restart sensor_t
-    settings_t start state_t status status_t stop tick topic_name topic_t watch
+    NO_SOURCES NO_TOPICS RECEIVED_COUNT REQUEST_COUNT REQUIREMENT_COUNT SENSOR_COUNT SERVICE_COUNT SILENT_COUNT
+    TOPIC_COUNT TRUE UNCONTROLLABLE_DATA UNKNOWN UNKNOWN_INTEGER WHEN_COUNT acting_t call_failed call_t callbacks_t
+    cancel_refused communication_name communication_t counters_t default_settings enabled end_t event_name event_t
+    fault fault_t goal_accepted goal_ended goal_t init log_t on_unknown_t policy_t refusal_t request_t restart sensor_t
+    sent_t settings_t source_name source_t start state_t status status_t stop tick topic_name topic_t watch
 """.split()
+
+
+# Purposes of functions that are named after an identifier.
+_TOPIC_PURPOSES = frozenset({"receive", "request", "recognizes"})
 
 
 @dataclass
@@ -51,7 +55,7 @@ class Layout:
         events: Enumerator of each event.
         communications: Enumerator of each communication.
         topics: Enumerator of each identifier of incoming messages.
-        received_topics: Identifiers of outgoing messages, in source order.
+        received_topics: Enumerator of each identifier of outgoing messages, in source order.
         locations: Member of the state that holds each automaton's location.
         location_names: Enumerator of each location, by automaton and location.
         variables: Member and type of each variable, by component and variable.
@@ -67,7 +71,7 @@ class Layout:
     events: dict[str, str] = field(default_factory=dict)
     communications: dict[str, str] = field(default_factory=dict)
     topics: dict[str, str] = field(default_factory=dict)
-    received_topics: dict[str, None] = field(default_factory=dict)
+    received_topics: dict[str, str] = field(default_factory=dict)
     locations: dict[str, str] = field(default_factory=dict)
     location_names: dict[tuple[str, str], str] = field(default_factory=dict)
     variables: dict[tuple[str, str], tuple[str, Type]] = field(default_factory=dict)
@@ -83,6 +87,11 @@ class Layout:
     def model(self) -> Model:
         """The model."""
         return self.supervisor.model
+
+    @property
+    def is_layer(self) -> bool:
+        """Whether a supervision layer is generated, not a controller."""
+        return self.supervisor.deployment is Deployment.LAYER
 
     @property
     def upper(self) -> str:
@@ -117,7 +126,7 @@ class Layout:
         """The static or public function for a purpose and an event, communication or identifier."""
         key = (purpose, name)
         if key not in self._functions:
-            word = _topic_word(name) if purpose == "receive" else name
+            word = _topic_word(name) if purpose in _TOPIC_PURPOSES else name
             self._functions[key] = self._namer.name(f"{self.prefix}_{purpose}_{word}")
         return self._functions[key]
 
@@ -196,8 +205,8 @@ def make_layout(supervisor: Supervisor, prefix: str | None = None) -> Layout:
         layout.communications[item.name] = name(f"{upper}_COMMUNICATION_{item.name}")
         if item.kind is CommunicationKind.INCOMING_MESSAGE and item.identifier not in layout.topics:
             layout.topics[item.identifier] = name(f"{upper}_TOPIC_{_topic_word(item.identifier)}")
-        if item.kind is CommunicationKind.OUTGOING_MESSAGE:
-            layout.received_topics[item.identifier] = None
+        if item.kind is CommunicationKind.OUTGOING_MESSAGE and item.identifier not in layout.received_topics:
+            layout.received_topics[item.identifier] = name(f"{upper}_SOURCE_{_topic_word(item.identifier)}")
     for enum in model.enums:
         for value in enum.values:
             layout.values[enum.name, value] = name(f"{upper}_VALUE_{enum.name}_{value}")
@@ -232,6 +241,36 @@ def _name_state(layout: Layout) -> None:
             layout.locations[plant] = members.name(f"at_{item.name}")
             for location in PLANT_LOCATIONS[item.kind]:
                 layout.location_names[plant, location] = name(f"{layout.upper}_AT_{item.name}_{location}")
+
+
+def possible_messages(model: Model, identifier: str) -> tuple[Communication, ...]:
+    """What a message on an identifier may be in a supervision layer: up to the first that needs no condition."""
+    found = []
+    for item in model.communications:
+        if item.kind is CommunicationKind.INCOMING_MESSAGE and item.identifier == identifier:
+            found.append(item)
+            if item.when is None:
+                break
+    return tuple(found)
+
+
+def told_apart(model: Model, identifier: str) -> tuple[Communication, ...]:
+    """Those of them that are known by their data."""
+    return tuple(item for item in possible_messages(model, identifier) if item.when is not None)
+
+
+def request_data(item: Communication) -> Type | None:
+    """Type of the data that an incoming message is told apart by, if any."""
+    return None if isinstance(item.request, NoneType) else item.request
+
+
+def data_that_comes(layout: Layout) -> tuple[Type, ...]:
+    """The types of all data that is handed over, in the order of the events."""
+    model = layout.model
+    found = [event_data(model, event) for event in layout.events if not is_controllable(event)]
+    if layout.is_layer:
+        found += [request_data(item) for topic in layout.topics for item in told_apart(model, topic)]
+    return tuple(type_ for type_ in found if type_ is not None)
 
 
 def event_data(model: Model, event: str) -> Type | None:

@@ -4,10 +4,11 @@ from collections.abc import Iterator
 
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import Constant, Expression, Received, StringType, leaves
-from robosc.model.structure import CommunicationKind, Deployment, Model, ObjectValue
+from robosc.model.structure import Model, ObjectValue
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.c99.example import example_file
 from robosc.targets.c99.header import head, header_file
+from robosc.targets.c99.layer_example import layer_example_file
 from robosc.targets.c99.layout import event_data
 from robosc.targets.c99.naming import prefix_for
 from robosc.targets.c99.readme import readme_file
@@ -66,7 +67,7 @@ def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles
         {
             f"{prefix}.h": header_file(unit),
             f"{prefix}.c": source,
-            "main.c": example_file(unit),
+            "main.c": layer_example_file(unit) if unit.layout.is_layer else example_file(unit),
             "CMakeLists.txt": head(supervisor, "# ", "# ", "") + "\n" + _CMAKE.format(prefix=prefix),
             "README.md": head(supervisor, "<!-- ", "     ", " -->") + "\n" + readme_file(unit),
         }
@@ -88,9 +89,6 @@ def _refuse(supervisor: Supervisor) -> None:
         UnsupportedModelError: The model needs something of that.
     """
     model = supervisor.model
-    has_actions = any(item.kind is CommunicationKind.ACTION for item in model.communications)
-    if supervisor.deployment is Deployment.LAYER and has_actions:
-        raise UnsupportedModelError("the target c99 does not do supervision layers of models with actions")
     for component in model.components:
         for variable in component.behaviour.variables if component.behaviour else ():
             if isinstance(variable.type, StringType) and _takes_received(model, component.name, variable.name):

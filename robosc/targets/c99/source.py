@@ -9,7 +9,8 @@ from robosc.model.structure import CommunicationKind, EventKind, is_tau
 from robosc.targets.c99.conditions import Conditions
 from robosc.targets.c99.header import batch, batch_parameters, counts, head, receive_head, reply_head, runtime_text
 from robosc.targets.c99.helpers import HELPERS
-from robosc.targets.c99.layout import Layout, event_data
+from robosc.targets.c99.layer_source import happen_call, reply_functions, request_functions
+from robosc.targets.c99.layout import Layout, data_that_comes, event_data
 from robosc.targets.c99.provide import default_function, provide_function
 from robosc.targets.c99.received import converter, converter_head
 from robosc.targets.c99.step import Stepper, unknown_name
@@ -19,7 +20,8 @@ from robosc.targets.events import has_plant_location, is_controllable, split
 from robosc.targets.python.text import indent
 
 _ENGINE = tuple(f"{part}.c" for part in "log releases goals steps policies decisions rest time replies life".split())
-"""The parts of the engine, each after those that it calls."""
+_LAYER_ENGINE = tuple(f"{part}.c" for part in "log releases goals steps rest callers time replies layer life".split())
+"""The parts of the engines, each after those that it calls."""
 
 
 def source_file(unit: Unit) -> str:
@@ -31,12 +33,14 @@ def source_file(unit: Unit) -> str:
     steps = [item.step_function() for item in steppers]
     happens = [item.happen_function() for item in steppers if _happens(layout, item.event)]
     messages = layout.of_kind(CommunicationKind.INCOMING_MESSAGE)
-    provided = [provide_function(unit, item) for item in layout.requests]
-    provided += [default_function(unit, item) for item in messages]
+    provided = [] if layout.is_layer else [provide_function(unit, item) for item in layout.requests]
+    provided += [] if layout.is_layer else [default_function(unit, item) for item in messages]
     held = [conditions.conjuncts_function(item.name) for item in messages]
     held += [conditions.requirements_function(item.name) for item in layout.of_kind(CommunicationKind.ACTION)]
-    engine = [runtime_text(layout, part).rstrip().splitlines() for part in _ENGINE]
-    ends = [*engine, *happens, *_entries(layout), *_names(layout)]
+    parts = _LAYER_ENGINE if layout.is_layer else _ENGINE
+    engine = [runtime_text(layout, part).rstrip().splitlines() for part in parts]
+    asked = request_functions(unit) if layout.is_layer else []
+    ends = [*engine, *happens, *asked, *_entries(layout), *_names(layout)]
     rest = [*allows, *steps, *provided, *held, *_dispatchers(layout), *ends]
     converters = {layout.converters[enum.name]: converter(unit, enum) for enum in layout.model.enums}
     functions = {
@@ -94,10 +98,11 @@ def _prologue(layout: Layout) -> str:
         "#define CANCEL_WAIT_US UINT64_C(500000)",
         "#define REFUSED (-1)",
         "#define KLEENE_UNKNOWN (-1)",
+        *(["#define LET_THROUGH (-1)"] if layout.is_layer else []),
         "",
         f"typedef {prefix}_state_t state_t;",
     ]
-    if with_data:
+    if with_data or numbers.get("WHEN"):
         lines += [
             "",
             "/* What was unknown in received data. */",
@@ -111,11 +116,7 @@ def _prologue(layout: Layout) -> str:
 
 def _unknown_constants(layout: Layout) -> list[str]:
     lines: list[str] = []
-    roots = [
-        layout.source(data)
-        for event in layout.events
-        if not is_controllable(event) and (data := event_data(layout.model, event))
-    ]
+    roots = [layout.source(data) for data in data_that_comes(layout)]
     for root in dict.fromkeys(root for root in roots if isinstance(root, ObjectType | ArrayType)):
         raw = layout.raw(root)
         text = f"const {raw} {unknown_name(raw)} = {_unknown_value(layout, root)};"
@@ -163,6 +164,7 @@ def _tables(layout: Layout, numbers: dict[str, int]) -> list[str]:
             "    int service;",
             "    int action;",
             "    int conjuncts;",
+            *(["    const char *identifier;"] if layout.is_layer else []),
             "} REQUESTS[] = {",
         ]
         for item in layout.requests:
@@ -171,13 +173,17 @@ def _tables(layout: Layout, numbers: dict[str, int]) -> list[str]:
             action = actions.index(item.name) if item.name in actions else -1
             event = layout.events[item.event(EventKind.REQUEST)]
             conjuncts = infos[item.name].conjunct_count
-            lines.append(
-                f"    {{{layout.communications[item.name]}, {event}, {topic}, {service}, {action}, {conjuncts}}},"
-            )
+            parts = [layout.communications[item.name], event, str(topic), str(service), str(action), str(conjuncts)]
+            parts += [string_literal(item.identifier)] if layout.is_layer else []
+            lines.append(f"    {{{', '.join(parts)}}},")
         lines.append("};")
     if services:
-        lines += ["", f"static const struct {{\n    {prefix}_event_t error;\n}} SERVICES[] = {{"]
-        lines += [f"    {{{layout.events[f'{name}.error']}}}," for name in services] + ["};"]
+        member = [f"    {prefix}_communication_t communication;"] if layout.is_layer else []
+        lines += ["", "static const struct {", *member, f"    {prefix}_event_t error;", "} SERVICES[] = {"]
+        for name in services:
+            parts = [layout.communications[name]] if layout.is_layer else []
+            lines.append(f"    {{{', '.join([*parts, layout.events[f'{name}.error']])}}},")
+        lines.append("};")
     if actions:
         lines += [
             "",
@@ -242,7 +248,7 @@ def _dispatchers(layout: Layout) -> list[list[str]]:
                 ["s", "event"],
             )
         )
-    if layout.requests:
+    if layout.requests and not layout.is_layer:
         data = [
             (str(place), f"return {function('provides', item.name)}(s, data);")
             for place, item in enumerate(layout.requests)
@@ -263,15 +269,16 @@ def _dispatchers(layout: Layout) -> list[list[str]]:
             if item.kind is CommunicationKind.INCOMING_MESSAGE
         ]
         defaults = [(str(place), f"return {function('is_default', item.name)}(data);") for place, item in messages]
-        result.append(
-            _switch(
-                f"static bool is_data_default(int request, const {prefix}_request_t *data)",
-                "request",
-                defaults,
-                "return true;",
-                ["request", "data"],
+        if not layout.is_layer:
+            result.append(
+                _switch(
+                    f"static bool is_data_default(int request, const {prefix}_request_t *data)",
+                    "request",
+                    defaults,
+                    "return true;",
+                    ["request", "data"],
+                )
             )
-        )
         held = [(str(place), f"{function('conjuncts', item.name)}(s, holds);\nbreak;") for place, item in messages]
         result.append(
             _switch(
@@ -368,7 +375,7 @@ _LOOK = "    look_at_clock(r, now_us);"
 
 def _entries(layout: Layout) -> list[list[str]]:
     """The functions through which data comes."""
-    result = []
+    result: list[list[str]] = []
     sensors = [item.name for item in layout.of_kind(CommunicationKind.OUTGOING_MESSAGE)]
     for identifier in layout.received_topics:
         parameters = batch_parameters(layout, identifier)
@@ -380,14 +387,24 @@ def _entries(layout: Layout) -> list[list[str]]:
             call = f"{layout.function('happens', event)}({', '.join(arguments)})"
             body += indent([f"if ({call}) {{", f"    see(r, {sensors.index(item.name)});", "}"])
         unused = [f"    (void){name};" for name in parameters.values()]
-        result.append([receive_head(layout, identifier), "{", *unused, *body, "    guard(r, end_batch(r));", "}"])
+        body.append("    guard(r, end_batch(r));")
+        if layout.is_layer:
+            source = layout.received_topics[identifier]
+            body += ["    finish(r);", f"    told(r, r->callbacks.pass_on(r->callbacks.context, {source}, message));"]
+        result.append([receive_head(layout, identifier), "{", *unused, *body, "}"])
+    return result + (reply_functions(layout) if layout.is_layer else _replies(layout))
+
+
+def _replies(layout: Layout) -> list[list[str]]:
+    """The functions of a controller through which answers come."""
+    result = []
     services = [item.name for item in layout.of_kind(CommunicationKind.SERVICE)]
     actions = [item.name for item in layout.of_kind(CommunicationKind.ACTION)]
     for name in services:
         event = f"{name}.response"
         body = [
             f"if (close_call(r, {services.index(name)}, id)) {{",
-            f"    {_happen(layout, event)}",
+            f"    {happen_call(layout, event)}",
             "    guard(r, end_batch(r));",
             "}",
         ]
@@ -400,7 +417,7 @@ def _entries(layout: Layout) -> list[list[str]]:
                 f"if (has_goal(r, {place}, id)) {{",
                 *([f"    close_goal(r, {place});"] if is_end else []),
                 f"    if (r->goals[{place}].is_running) {{",
-                f"        {_happen(layout, event)}",
+                f"        {happen_call(layout, event)}",
                 "        guard(r, end_batch(r));",
                 "    } else {",
                 f"        unexpected(r, (int){layout.events[event]});",
@@ -411,17 +428,13 @@ def _entries(layout: Layout) -> list[list[str]]:
     return result
 
 
-def _happen(layout: Layout, event: str) -> str:
-    data = ["data"] if event_data(layout.model, event) is not None else []
-    return f"(void){layout.function('happens', event)}({', '.join(['r', *data, 'false'])});"
-
-
 def _names(layout: Layout) -> list[list[str]]:
     result = []
     for kind, names in (
         ("event", list(layout.events)),
         ("communication", list(layout.communications)),
         ("topic", list(layout.topics)),
+        *([("source", list(layout.received_topics))] if layout.is_layer else []),
     ):
         head_ = f"const char *{layout.prefix}_{kind}_name(int {kind})"
         if not names:

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from random import Random
 from typing import Any
 
-import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -14,47 +13,18 @@ from hypothesis import strategies as st
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.protocol import Reading
 from robosc.execution.runner import Status
-from robosc.expressions import Binary, BooleanType, Constant, EnumType, Expression, Received
+from robosc.expressions import BooleanType, EnumType
 from robosc.expressions.evaluate import evaluate
-from robosc.model.structure import Communication, CommunicationKind, Deployment
+from robosc.model.structure import Communication, CommunicationKind
 from robosc.supervisor.structure import Supervisor
-from support.execution import supervisor_of
 from support.generated import load_system
 from support.layer_twin import LayerTwin, TwinCall, TwinGoal
 from support.layers import LayerBench
-from support.random_controllers import SAMPLE, random_robot
+from support.random_layers import random_layer
 
 STEPS = 60
 OUTCOMES = ("succeeded", "rejected", "aborted", "cancelled", "lost")
 _INCOMING = CommunicationKind.INCOMING_MESSAGE
-
-
-def random_layer(dice: Random) -> Supervisor:
-    """A random robot, its incoming messages on few identifiers and told apart by conditions."""
-    model = random_robot(dice.randrange(2**32)).model
-    found: list[Communication] = []
-    for item in model.communications:
-        if item.kind is _INCOMING:
-            for letter in "xy"[: dice.choice((1, 1, 2))]:
-                identifier = dice.choice(("/wheels", "/arm"))
-                name = item.name if letter == "x" else f"{item.name}{letter}"
-                copy = msgspec.structs.replace(item, name=name, identifier=identifier, request=SAMPLE)
-                found.append(msgspec.structs.replace(copy, when=_condition(dice)))
-        else:
-            found.append(item)
-    last = {item.identifier: item.name for item in found if item.kind is _INCOMING}
-    is_open = dice.random() < 0.7
-    communications = tuple(
-        msgspec.structs.replace(item, when=None) if is_open and item.name == last.get(item.identifier) else item
-        for item in found
-    )
-    return supervisor_of(msgspec.structs.replace(model, communications=communications), Deployment.LAYER)
-
-
-def _condition(dice: Random) -> Expression:
-    part = Received((dice.choice(("n", "m")),))
-    left = dice.choice((part, part, Binary("/", Constant(6), part)))
-    return Binary(dice.choice((">", "<", "=")), left, Constant(dice.choice((0, 1, 3))))
 
 
 class Watched(InterpretedSystem):

@@ -5,12 +5,14 @@ typedef enum {
     ROBOT_ON_UNKNOWN_FAULT    /* safe stop, for a skipped update too */
 } robot_on_unknown_t;
 
+#if !ROBOT_IS_LAYER
 typedef enum {
     ROBOT_POLICY_FAIR,     /* newly enabled first, then the longest-ago issued */
     ROBOT_POLICY_PRIORITY, /* a list, then fair */
     ROBOT_POLICY_RANDOM    /* splitmix64 from `seed`: not the sequence of the Python executor */
 } robot_policy_t;
 
+#endif
 typedef enum {
     ROBOT_STATUS_NEW,      /* not started */
     ROBOT_STATUS_WAITING,  /* for the first message of every sensor with a maximum age */
@@ -26,7 +28,7 @@ typedef enum {
     ROBOT_FAULT_UNKNOWN,        /* something was unknown, and `on_unknown` is a fault */
     ROBOT_FAULT_REFUSED,        /* an event is enabled, but the state does not accept it */
     ROBOT_FAULT_CANCEL_REFUSED, /* the cancel of a running goal was refused */
-    ROBOT_FAULT_CALLER          /* stopped with is_fault */
+    ROBOT_FAULT_CALLER          /* `robot_stop` with is_fault */
 } robot_fault_t;
 
 /* What is told to the `log` callback, and what its argument is then. */
@@ -36,25 +38,90 @@ typedef enum {
     ROBOT_LOG_UNKNOWN,    /* something was unknown at this event, or the data of this request was */
     ROBOT_LOG_RELEASE,    /* the default message went out: the topic */
     ROBOT_LOG_FAULT,      /* the robot_fault_t */
-    ROBOT_LOG_STOP,       /* the communication that is stale, or -1: stopped by the caller */
+    ROBOT_LOG_STOP,       /* the communication that is stale, or -1: `robot_stop` */
     ROBOT_LOG_RESUME,     /* the communication that is fresh again */
+#if ROBOT_IS_LAYER
+    ROBOT_LOG_RESTART,    /* -1 */
+    ROBOT_LOG_BLOCKED     /* something of the caller was held back: the robot_refusal_t */
+#else
     ROBOT_LOG_RESTART     /* -1 */
+#endif
 } robot_log_t;
+#if ROBOT_IS_LAYER
+
+/* Why something that the caller sent was held back. */
+typedef enum {
+    ROBOT_REFUSAL_NOT_ALLOWED,   /* by the supervisor, in this state */
+    ROBOT_REFUSAL_NOT_FINITE,    /* a NaN or an infinity is in it */
+    ROBOT_REFUSAL_NOT_KNOWN,     /* it is no message of the model */
+    ROBOT_REFUSAL_STILL_RUNNING, /* the last goal of the action may still be under way */
+    ROBOT_REFUSAL_NOT_STARTED,
+    ROBOT_REFUSAL_WAITING,       /* for the first message of a sensor with a maximum age */
+    ROBOT_REFUSAL_STOPPED,
+    ROBOT_REFUSAL_FAULT          /* something failed while it was let through; the robot is stopped now */
+} robot_refusal_t;
+
+/* How a goal that was accepted ends for the caller. */
+typedef enum {
+    ROBOT_END_SUCCEEDED,
+    ROBOT_END_ABORTED,
+    ROBOT_END_CANCELLED
+} robot_end_t;
+
+/* What the caller sent. It is needed until the function that takes it returns. All zero is held back. */
+typedef struct {
+    const void *message; /* the message itself, for the callback that sends it on; the layer does not look at it */
+    bool is_finite;      /* there is no NaN and no infinity in it, nor in fields that the model does not know */
+    bool is_default;     /* all of it but a header is zero, false or empty; looked at for messages only */
+} robot_sent_t;
+#endif
 
 /* Settings of a deployment; begin with `robot_default_settings`. All spans are microseconds. */
 typedef struct {
+#if !ROBOT_IS_LAYER
     robot_policy_t policy;
     robot_communication_t priority[ROBOT_REQUEST_COUNT + 1]; /* most urgent first, for ROBOT_POLICY_PRIORITY */
     int priority_count;
     uint64_t seed;                                        /* for ROBOT_POLICY_RANDOM */
     bool decides_after_batch;                             /* decide after each batch and each period */
+#endif
     robot_on_unknown_t on_unknown;
     uint64_t service_timeout_us;                          /* UINT64_MAX: none */
     uint64_t action_timeout_us;                           /* UINT64_MAX: none */
+#if ROBOT_IS_LAYER
+    uint64_t command_timeout_us;                          /* 0: never; what acts is released if nothing came */
+#endif
     uint64_t max_age_us[ROBOT_COMMUNICATION_COUNT + 1];   /* by outgoing message; 0: it is not watched */
     bool releases[ROBOT_TOPIC_COUNT + 1];                 /* by topic: whether its last message keeps acting */
 } robot_settings_t;
 
+#if ROBOT_IS_LAYER
+/* What the layer tells the robot and the caller. None of them may call the layer back. Those that return a bool return
+   false if they failed, which is a fault. A `message` is what a function below was given, unchanged. */
+typedef struct {
+    void *context; /* first argument of all */
+
+    /* The robot's side. */
+    bool (*publish)(void *context, robot_topic_t topic, const void *message);
+    bool (*publish_default)(void *context, robot_topic_t topic); /* the all-default message */
+    bool (*call)(void *context, uint32_t id, robot_communication_t service, const void *message);
+    bool (*send_goal)(void *context, uint32_t id, robot_communication_t action, const void *message);
+    bool (*cancel_goal)(void *context, robot_communication_t action, uint32_t id);
+
+    /* The caller's side; `caller_id` is its own number of a call or goal. */
+    bool (*pass_on)(void *context, robot_source_t source, const void *message); /* what came from the robot */
+    bool (*blocked)(void *context, const char *identifier, robot_refusal_t why); /* something was held back */
+    bool (*answer)(void *context, robot_communication_t service, uint32_t caller_id, const void *message);
+    bool (*answer_default)(void *context, robot_communication_t service, uint32_t caller_id);
+    bool (*accept_goal)(void *context, robot_communication_t action, uint32_t caller_id); /* one end follows */
+    bool (*reject_goal)(void *context, robot_communication_t action, uint32_t caller_id);
+    bool (*pass_feedback)(void *context, robot_communication_t action, uint32_t caller_id, const void *message);
+    bool (*end_goal)(void *context, robot_communication_t action, uint32_t caller_id, robot_end_t end,
+                     const void *message); /* NULL: the default result */
+
+    void (*log)(void *context, robot_log_t kind, int what); /* NULL: nothing is logged */
+} robot_callbacks_t;
+#else
 /* What the executor asks of the world. None of them may call the executor back. Those that return a bool return
    false if they failed, which is a fault. */
 typedef struct {
@@ -67,6 +134,7 @@ typedef struct {
     bool (*fits)(void *context, const robot_request_t *request);                      /* NULL: all data fits */
     void (*log)(void *context, robot_log_t kind, int what);                           /* NULL: nothing is logged */
 } robot_callbacks_t;
+#endif
 
 /* How often something went wrong: one for each entry of that kind in the log. */
 typedef struct {
@@ -80,7 +148,9 @@ typedef struct {
     uint64_t sent;
     bool was_enabled;
     bool is_due;
+#if !ROBOT_IS_LAYER
     bool is_waiting;
+#endif
     bool held[ROBOT_CONJUNCT_COUNT + 1];
 } robot_acting_t;
 
@@ -88,6 +158,10 @@ typedef struct {
     bool is_open;
     uint32_t id;
     uint64_t deadline_us;
+#if ROBOT_IS_LAYER
+    bool is_awaited; /* by the caller */
+    uint32_t caller_id;
+#endif
 } robot_call_t;
 
 typedef struct {
@@ -98,6 +172,11 @@ typedef struct {
     bool is_cancel_sent;
     uint32_t id;
     uint64_t deadline_us;
+#if ROBOT_IS_LAYER
+    bool is_awaited; /* by the caller */
+    bool is_cancelled_by_caller;
+    uint32_t caller_id;
+#endif
     bool held[ROBOT_REQUIREMENT_COUNT + 1];
 } robot_goal_t;
 
@@ -107,7 +186,11 @@ typedef struct {
     bool is_stale;
 } robot_sensor_t;
 
+#if ROBOT_IS_LAYER
+/* The layer. `state` and `counters` may be read at any time; the rest is its own business. */
+#else
 /* The executor. `state` and `counters` may be read at any time; the rest is its own business. */
+#endif
 typedef struct {
     robot_state_t state;
     robot_counters_t counters;
@@ -115,27 +198,37 @@ typedef struct {
     robot_callbacks_t callbacks;
     robot_state_t stable;
     bool has_stable;
+#if !ROBOT_IS_LAYER
     bool is_enabled_known;
+#endif
     bool is_pending;
     bool is_started;
     bool is_stopped;
     bool may_request;
+#if !ROBOT_IS_LAYER
     bool is_new;
+#endif
     robot_fault_t fault;
     robot_fault_t why;
     uint64_t now_us;
     uint64_t deadline_us;
     uint64_t awaited_until_us;
+#if !ROBOT_IS_LAYER
     uint64_t random;
+#endif
     uint64_t sent_count;
     uint32_t next_call_id;
     uint32_t next_goal_id;
+#if !ROBOT_IS_LAYER
     int64_t decision;
     int64_t issued[ROBOT_REQUEST_COUNT + 1];
     int64_t favoured[ROBOT_REQUEST_COUNT + 1];
     bool was_enabled[ROBOT_REQUEST_COUNT + 1];
     bool is_enabled[ROBOT_REQUEST_COUNT + 1];
     bool is_unchanging[ROBOT_REQUEST_COUNT + 1];
+#else
+    uint64_t arrived_us[ROBOT_TOPIC_COUNT + 1];
+#endif
     robot_acting_t acting[ROBOT_TOPIC_COUNT + 1];
     bool is_restless[ROBOT_TOPIC_COUNT + 1];
     robot_call_t calls[ROBOT_SERVICE_COUNT + 1];
@@ -146,7 +239,7 @@ typedef struct {
 /* The default settings of this model. */
 void robot_default_settings(robot_settings_t *settings);
 
-/* Make an executor in the initial state; NULL settings are the default ones. False if a setting is wrong or a
+/* Begin with everything in the initial state; NULL settings are the default ones. False if a setting is wrong or a
    callback that the model needs is missing; it must not be used then. */
 bool robot_init(robot_t *r, const robot_settings_t *settings, const robot_callbacks_t *callbacks);
 
@@ -155,13 +248,18 @@ bool robot_init(robot_t *r, const robot_settings_t *settings, const robot_callba
 /* Begin; what comes earlier is ignored. Does nothing the second time. */
 void robot_start(robot_t *r, uint64_t now_us);
 
+#if ROBOT_IS_LAYER
+/* Time has passed: stale sensors, a caller that fell silent, replies that did not come, messages and cancels still
+   owed. Call it at least every 100 ms. */
+#else
 /* A period has passed: one decision. */
 void robot_tick(robot_t *r, uint64_t now_us);
 
 /* Time has passed, but no period: stale sensors, replies that did not come, messages and cancels still owed. */
+#endif
 void robot_watch(robot_t *r, uint64_t now_us);
 
-/* Come to rest until `robot_restart`; tell with is_fault whether the caller found a fault. */
+/* Come to rest until `robot_restart`; tell with is_fault whether the program found a fault. */
 void robot_stop(robot_t *r, uint64_t now_us, bool is_fault);
 
 /* Begin again in the initial state, whatever happened. */
@@ -179,6 +277,9 @@ bool robot_enabled(const robot_t *r, robot_event_t event);
 const char *robot_event_name(int event);
 const char *robot_communication_name(int communication);
 const char *robot_topic_name(int topic);
+#if ROBOT_IS_LAYER
+const char *robot_source_name(int source);
+#endif
 #if ROBOT_SERVICE_COUNT > 0
 
 /* A service call will not be answered: its server is absent or lost, or refuses it. */
@@ -189,8 +290,14 @@ void robot_call_failed(robot_t *r, uint64_t now_us, uint32_t id);
 /* A goal was accepted by its server. */
 void robot_goal_accepted(robot_t *r, uint64_t now_us, uint32_t id);
 
+#if ROBOT_IS_LAYER
+/* A goal ended without success: it was rejected, aborted or cancelled, or its server is lost.
+   `is_cancelled`: its server says that it was cancelled. `message`: its result for the caller, or NULL. */
+void robot_goal_ended(robot_t *r, uint64_t now_us, uint32_t id, bool is_cancelled, const void *message);
+#else
 /* A goal ended without a result: rejected, aborted, cancelled, or its server is lost. */
 void robot_goal_ended(robot_t *r, uint64_t now_us, uint32_t id);
+#endif
 
 /* A cancel was refused: whether because the goal had ended already. */
 void robot_cancel_refused(robot_t *r, uint64_t now_us, uint32_t id, bool has_ended);

@@ -18,15 +18,19 @@ static bool begin(robot_t *r)
         r->sensors[sensor].was_seen = false;
     }
 #endif
+#if !ROBOT_IS_LAYER
 #if ROBOT_REQUEST_COUNT > 0
     new_policy(r);
     for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
         r->is_unchanging[request] = false;
     }
 #endif
+#endif
     set_initial(&r->state);
     r->has_stable = false;
+#if !ROBOT_IS_LAYER
     r->is_enabled_known = false;
+#endif
     r->is_pending = false;
     if (!settle(r, -1, &has_changed)) {
         return false;
@@ -39,10 +43,15 @@ static bool begin(robot_t *r)
 void robot_default_settings(robot_settings_t *settings)
 {
     memset(settings, 0, sizeof *settings);
+#if !ROBOT_IS_LAYER
     settings->policy = ROBOT_POLICY_FAIR;
+#endif
     settings->on_unknown = ROBOT_ON_UNKNOWN_DEFAULT;
     settings->service_timeout_us = UINT64_C(10000000);
     settings->action_timeout_us = FOREVER;
+#if ROBOT_IS_LAYER
+    settings->command_timeout_us = UINT64_C(1000000);
+#endif
     set_model_settings(settings);
 }
 
@@ -54,6 +63,11 @@ bool robot_init(robot_t *r, const robot_settings_t *settings, const robot_callba
     } else {
         robot_default_settings(&r->settings);
     }
+#if ROBOT_IS_LAYER
+    if (callbacks == NULL || r->settings.on_unknown > ROBOT_ON_UNKNOWN_FAULT) {
+        return false;
+    }
+#else
     if (callbacks == NULL || r->settings.policy > ROBOT_POLICY_RANDOM
         || r->settings.on_unknown > ROBOT_ON_UNKNOWN_FAULT || r->settings.priority_count < 0
         || r->settings.priority_count > ROBOT_REQUEST_COUNT) {
@@ -70,7 +84,20 @@ bool robot_init(robot_t *r, const robot_settings_t *settings, const robot_callba
         }
     }
 #endif
+#endif
     r->callbacks = *callbacks;
+#if ROBOT_IS_LAYER
+#if ROBOT_REQUEST_COUNT > 0
+    if (callbacks->blocked == NULL) {
+        return false;
+    }
+#endif
+#if ROBOT_SENSOR_COUNT > 0
+    if (callbacks->pass_on == NULL) {
+        return false;
+    }
+#endif
+#endif
 #if ROBOT_TOPIC_COUNT > 0
     if (callbacks->publish == NULL || callbacks->publish_default == NULL) {
         return false;
@@ -83,12 +110,23 @@ bool robot_init(robot_t *r, const robot_settings_t *settings, const robot_callba
     if (callbacks->call == NULL) {
         return false;
     }
+#if ROBOT_IS_LAYER
+    if (callbacks->answer == NULL || callbacks->answer_default == NULL) {
+        return false;
+    }
+#endif
     r->next_call_id = 1;
 #endif
 #if ROBOT_ACTION_COUNT > 0
     if (callbacks->send_goal == NULL || callbacks->cancel_goal == NULL) {
         return false;
     }
+#if ROBOT_IS_LAYER
+    if (callbacks->accept_goal == NULL || callbacks->reject_goal == NULL || callbacks->pass_feedback == NULL
+        || callbacks->end_goal == NULL) {
+        return false;
+    }
+#endif
     r->next_goal_id = 1;
 #endif
     set_initial(&r->state);
@@ -103,6 +141,7 @@ void robot_start(robot_t *r, uint64_t now_us)
     }
 }
 
+#if !ROBOT_IS_LAYER
 void robot_tick(robot_t *r, uint64_t now_us)
 {
     if (!r->is_started) {
@@ -118,6 +157,7 @@ void robot_tick(robot_t *r, uint64_t now_us)
     }
 }
 
+#endif
 void robot_watch(robot_t *r, uint64_t now_us)
 {
     if (!r->is_started) {
@@ -127,6 +167,9 @@ void robot_watch(robot_t *r, uint64_t now_us)
     if (is_at_rest(r)) {
         (void)retry(r);
     }
+#if ROBOT_IS_LAYER
+    finish(r);
+#endif
 }
 
 void robot_stop(robot_t *r, uint64_t now_us, bool is_fault)
@@ -161,6 +204,9 @@ void robot_restart(robot_t *r, uint64_t now_us)
 #endif
     if (is_restless) {
         fail(r, ROBOT_FAULT_CALLBACK);
+#if ROBOT_IS_LAYER
+        finish(r);
+#endif
         return;
     }
     r->is_stopped = false;
@@ -172,6 +218,9 @@ void robot_restart(robot_t *r, uint64_t now_us)
 #endif
     note(r, ROBOT_LOG_RESTART, -1);
     guard(r, begin(r));
+#if ROBOT_IS_LAYER
+    finish(r);
+#endif
 }
 
 robot_status_t robot_status(const robot_t *r, uint64_t now_us)

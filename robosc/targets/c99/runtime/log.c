@@ -1,6 +1,12 @@
+#if ROBOT_IS_LAYER
+/* The layer: batches, silent steps, requests of the caller, releases, calls, goals, sensors, safe stop. Nothing in this
+   part depends on the model but through the tables and functions above it. A function that may find a fault tells by
+   false, with the reason in `why`. */
+#else
 /* The executor: batches, silent steps, decisions, releases, calls, goals, sensors, safe stop. Nothing in this part
    depends on the model but through the tables and functions above it. A function that may find a fault tells by
    false, with the reason in `why`. */
+#endif
 
 static bool fault(robot_t *r, robot_fault_t why)
 {

@@ -4,7 +4,9 @@
 static void forget_acting(robot_t *r, int topic)
 {
     r->acting[topic].request = -1;
+#if !ROBOT_IS_LAYER
     r->acting[topic].is_waiting = false;
+#endif
 }
 
 static bool release(robot_t *r, int topic)
@@ -22,6 +24,7 @@ static bool keeps_acting(const robot_t *r, int request)
     return REQUESTS[request].topic >= 0 && r->settings.releases[REQUESTS[request].topic];
 }
 
+#if !ROBOT_IS_LAYER
 static bool another_is_enabled(const robot_t *r, int topic)
 {
     for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
@@ -33,6 +36,7 @@ static bool another_is_enabled(const robot_t *r, int topic)
     return false;
 }
 
+#endif
 /* Judge one message in a stable state. */
 static void observe_acting(robot_t *r, int topic)
 {
@@ -52,40 +56,53 @@ static void observe_acting(robot_t *r, int topic)
     acting->was_enabled = is_enabled;
 }
 
-/* Release what is due in this stable state, in the order in which it was sent. */
-static bool judge_releases(robot_t *r, int issuing)
+/* Release what acts on the topics that are marked, in the order in which it was sent. */
+static bool release_marked(robot_t *r, bool *is_marked)
 {
-    bool is_now[ROBOT_TOPIC_COUNT] = {false};
-    for (int topic = 0; topic < ROBOT_TOPIC_COUNT; topic++) {
-        robot_acting_t *acting = &r->acting[topic];
-        if (acting->request >= 0) {
-            acting->is_waiting = false;
-            if (acting->request != issuing) {
-                observe_acting(r, topic);
-                if (acting->is_due) {
-                    acting->is_waiting = another_is_enabled(r, topic);
-                    is_now[topic] = !acting->is_waiting;
-                }
-            }
-        }
-    }
     for (;;) {
         int first = -1;
         for (int topic = 0; topic < ROBOT_TOPIC_COUNT; topic++) {
-            if (is_now[topic] && (first < 0 || r->acting[topic].sent < r->acting[first].sent)) {
+            if (is_marked[topic] && (first < 0 || r->acting[topic].sent < r->acting[first].sent)) {
                 first = topic;
             }
         }
         if (first < 0) {
             return true;
         }
-        is_now[first] = false;
+        is_marked[first] = false;
         if (!release(r, first)) {
             return false;
         }
     }
 }
 
+/* Release what is due in this stable state. */
+static bool judge_releases(robot_t *r, int issuing)
+{
+    bool is_now[ROBOT_TOPIC_COUNT] = {false};
+    for (int topic = 0; topic < ROBOT_TOPIC_COUNT; topic++) {
+        robot_acting_t *acting = &r->acting[topic];
+        if (acting->request >= 0) {
+#if !ROBOT_IS_LAYER
+            acting->is_waiting = false;
+#endif
+            if (acting->request != issuing) {
+                observe_acting(r, topic);
+#if ROBOT_IS_LAYER
+                is_now[topic] = acting->is_due;
+#else
+                if (acting->is_due) {
+                    acting->is_waiting = another_is_enabled(r, topic);
+                    is_now[topic] = !acting->is_waiting;
+                }
+#endif
+            }
+        }
+    }
+    return release_marked(r, is_now);
+}
+
+#if !ROBOT_IS_LAYER
 static bool is_any_waiting(const robot_t *r)
 {
     for (int topic = 0; topic < ROBOT_TOPIC_COUNT; topic++) {
@@ -96,6 +113,7 @@ static bool is_any_waiting(const robot_t *r)
     return false;
 }
 
+#endif
 static void sent(robot_t *r, int request, bool is_default)
 {
     const int topic = REQUESTS[request].topic;

@@ -1,15 +1,21 @@
 #if ROBOT_RECEIVED_COUNT > 0
+#if ROBOT_IS_LAYER
+/* The end of a batch: silent steps. */
+#else
 /* The end of a batch: silent steps, and a decision if each batch brings one. */
+#endif
 static bool end_batch(robot_t *r)
 {
     bool has_changed = false;
     if (!settle(r, -1, &has_changed)) {
         return false;
     }
+#if !ROBOT_IS_LAYER
 #if ROBOT_REQUEST_COUNT > 0
     if (r->settings.decides_after_batch && r->may_request) {
         return decide(r);
     }
+#endif
 #endif
     return true;
 }
@@ -63,6 +69,9 @@ void robot_call_failed(robot_t *r, uint64_t now_us, uint32_t id)
         happened(r, SERVICES[found].error, take_event(&r->state, SERVICES[found].error));
         guard(r, end_batch(r));
     }
+#if ROBOT_IS_LAYER
+    finish(r);
+#endif
 }
 #endif
 
@@ -93,7 +102,9 @@ static bool has_goal(robot_t *r, int action, uint32_t id)
 static void close_goal(robot_t *r, int action)
 {
     r->goals[action].is_open = false;
+#if !ROBOT_IS_LAYER
     r->is_enabled_known = false;
+#endif
 }
 
 void robot_goal_accepted(robot_t *r, uint64_t now_us, uint32_t id)
@@ -107,20 +118,41 @@ void robot_goal_accepted(robot_t *r, uint64_t now_us, uint32_t id)
             guard(r, request_cancel(r, action));
         }
     }
+#if ROBOT_IS_LAYER
+    finish(r);
+#endif
 }
 
+#if ROBOT_IS_LAYER
+void robot_goal_ended(robot_t *r, uint64_t now_us, uint32_t id, bool is_cancelled, const void *message)
+#else
 void robot_goal_ended(robot_t *r, uint64_t now_us, uint32_t id)
+#endif
 {
     int action = -1;
     look_at_clock(r, now_us);
     action = find_goal(r, id);
     if (action >= 0) {
+#if ROBOT_IS_LAYER
+        bool is_well = true;
+#endif
         close_goal(r, action);
         if (r->goals[action].is_running) {
             happened(r, ACTIONS[action].error, take_event(&r->state, ACTIONS[action].error));
+#if ROBOT_IS_LAYER
+            is_well = end_batch(r);
+#else
             guard(r, end_batch(r));
+#endif
         }
+#if ROBOT_IS_LAYER
+        end_for_caller(r, action, is_cancelled ? ROBOT_END_CANCELLED : ROBOT_END_ABORTED, message);
+        guard(r, is_well);
+#endif
     }
+#if ROBOT_IS_LAYER
+    finish(r);
+#endif
 }
 
 void robot_cancel_refused(robot_t *r, uint64_t now_us, uint32_t id, bool has_ended)
@@ -129,5 +161,8 @@ void robot_cancel_refused(robot_t *r, uint64_t now_us, uint32_t id, bool has_end
     if (!has_ended && find_goal(r, id) >= 0) {
         fail(r, ROBOT_FAULT_CANCEL_REFUSED);
     }
+#if ROBOT_IS_LAYER
+    finish(r);
+#endif
 }
 #endif

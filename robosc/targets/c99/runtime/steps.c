@@ -67,11 +67,13 @@ static bool settle(robot_t *r, int issuing, bool *has_changed)
     if (*has_changed) {
         bool has_stepped = false;
         r->has_stable = false;
+#if !ROBOT_IS_LAYER
         r->is_enabled_known = false;
 #if ROBOT_REQUEST_COUNT > 0
         for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
             r->is_unchanging[request] = false;
         }
+#endif
 #endif
         if (!silent_step(r, &has_stepped) || (has_stepped && !run_on(r))) {
             return false;

@@ -38,6 +38,15 @@ static uint64_t next_deadline(const robot_t *r)
         }
     }
 #endif
+#if ROBOT_IS_LAYER
+#if ROBOT_TOPIC_COUNT > 0
+    for (int topic = 0; topic < ROBOT_TOPIC_COUNT; topic++) {
+        if (r->acting[topic].request >= 0 && silent_from(r, topic) < next) {
+            next = silent_from(r, topic);
+        }
+    }
+#endif
+#endif
     (void)r;
     return next;
 }
@@ -89,9 +98,24 @@ static bool expire(robot_t *r)
     return true;
 }
 
+#if ROBOT_IS_LAYER
+/* A caller that fell silent, replies that did not come in time, and stale sensors. */
+#else
 /* Replies that did not come in time, and stale sensors. */
+#endif
 static bool check_time(robot_t *r)
 {
+#if ROBOT_IS_LAYER
+#if ROBOT_TOPIC_COUNT > 0
+    bool is_silent[ROBOT_TOPIC_COUNT];
+    for (int topic = 0; topic < ROBOT_TOPIC_COUNT; topic++) {
+        is_silent[topic] = r->acting[topic].request >= 0 && r->now_us >= silent_from(r, topic);
+    }
+    if (!release_marked(r, is_silent)) {
+        return false;
+    }
+#endif
+#endif
     if (!expire(r)) {
         return false;
     }
@@ -107,6 +131,10 @@ static bool check_time(robot_t *r)
     }
 #endif
     r->deadline_us = next_deadline(r);
+#if ROBOT_IS_LAYER
+    /* What is over ends for the caller before anything that comes at the same moment. */
+    finish(r);
+#endif
     return true;
 }
 

@@ -1,0 +1,222 @@
+#if ROBOT_REQUEST_COUNT > 0
+/* What the caller asks for: why it is held back, or LET_THROUGH. */
+
+static void hold_back(robot_t *r, const char *identifier, int why)
+{
+    note(r, ROBOT_LOG_BLOCKED, why);
+    told(r, r->callbacks.blocked(r->callbacks.context, identifier, (robot_refusal_t)why));
+    /* What let nothing through because it failed stops the robot now that the caller knows. */
+    guard(r, why != (int)ROBOT_REFUSAL_FAULT);
+    finish(r);
+}
+
+/* Why nothing at all, or not this, is let through now. */
+static int refusal(const robot_t *r, const robot_sent_t *sent_by_caller)
+{
+    if (r->may_request) {
+        return sent_by_caller->is_finite ? LET_THROUGH : (int)ROBOT_REFUSAL_NOT_FINITE;
+    }
+    if (is_at_rest(r)) {
+        return (int)ROBOT_REFUSAL_STOPPED;
+    }
+    return r->is_started ? (int)ROBOT_REFUSAL_WAITING : (int)ROBOT_REFUSAL_NOT_STARTED;
+}
+
+/* The request happens, if it is allowed, with all that follows from it, before its message goes out. */
+static int take_request(robot_t *r, int request)
+{
+    bool has_changed = false;
+    if (!is_allowed(&r->state, REQUESTS[request].event)) {
+        return (int)ROBOT_REFUSAL_NOT_ALLOWED;
+    }
+    if (!take(r, REQUESTS[request].event) || !settle(r, request, &has_changed)) {
+        return (int)ROBOT_REFUSAL_FAULT;
+    }
+    /* What goes out now may wait for time to pass: looked up as soon as the clock is read again. */
+    r->deadline_us = r->now_us;
+    return LET_THROUGH;
+}
+
+#if ROBOT_WHEN_COUNT > 0
+/* Whether a message may be told apart by its data, although something in it is unknown. */
+static int judge_notes(robot_t *r, robot_event_t event, const notes_t *notes)
+{
+    if (notes->is_unknown) {
+        unknown(r, (int)event);
+    }
+    if (notes->is_enum_unknown && r->settings.on_unknown == ROBOT_ON_UNKNOWN_FAULT) {
+        r->why = ROBOT_FAULT_UNKNOWN;
+        return (int)ROBOT_REFUSAL_FAULT;
+    }
+    if (notes->is_enum_unknown && r->settings.on_unknown == ROBOT_ON_UNKNOWN_KEEP) {
+        return (int)ROBOT_REFUSAL_NOT_KNOWN;
+    }
+    return LET_THROUGH;
+}
+#endif
+
+/* A callback failed while something was let through. */
+static int failed(robot_t *r)
+{
+    r->why = ROBOT_FAULT_CALLBACK;
+    return (int)ROBOT_REFUSAL_FAULT;
+}
+#endif
+
+#if ROBOT_TOPIC_COUNT > 0
+/* A message came from the caller. */
+static int message_refusal(robot_t *r, uint64_t now_us, int topic, const robot_sent_t *sent_by_caller)
+{
+    look_at_clock(r, now_us);
+    r->arrived_us[topic] = r->now_us;
+    return refusal(r, sent_by_caller);
+}
+
+/* It is one of the model's, unless `why` tells otherwise. */
+static void let_message_through(robot_t *r, int topic, int request, int why, const robot_sent_t *sent_by_caller)
+{
+    if (why == LET_THROUGH) {
+        why = take_request(r, request);
+    }
+    if (why == LET_THROUGH) {
+        if (keeps_acting(r, request)) {
+            sent(r, request, sent_by_caller->is_default);
+        }
+        if (!r->callbacks.publish(r->callbacks.context, (robot_topic_t)topic, sent_by_caller->message)) {
+            why = failed(r);
+        }
+    }
+    if (why != LET_THROUGH) {
+        hold_back(r, robot_topic_name(topic), why);
+        return;
+    }
+    finish(r);
+}
+#endif
+
+#if ROBOT_SERVICE_COUNT > 0
+/* The caller called a service. */
+static void let_call_through(robot_t *r, uint64_t now_us, int request, uint32_t caller_id,
+                             const robot_sent_t *sent_by_caller)
+{
+    const robot_callbacks_t *callbacks = &r->callbacks;
+    const robot_communication_t service = REQUESTS[request].communication;
+    robot_call_t *call = &r->calls[REQUESTS[request].service];
+    int why = LET_THROUGH;
+    look_at_clock(r, now_us);
+    why = refusal(r, sent_by_caller);
+    if (why == LET_THROUGH) {
+        why = take_request(r, request);
+    }
+    if (why == LET_THROUGH) {
+        call->is_open = true;
+        call->id = r->next_call_id++;
+        call->deadline_us = later(r->now_us, r->settings.service_timeout_us);
+        if (callbacks->call(callbacks->context, call->id, service, sent_by_caller->message)) {
+            call->is_awaited = true;
+            call->caller_id = caller_id;
+        } else {
+            call->is_open = false;
+            why = failed(r);
+        }
+    }
+    if (why != LET_THROUGH) {
+        told(r, callbacks->answer_default(callbacks->context, service, caller_id));
+        hold_back(r, REQUESTS[request].identifier, why);
+        return;
+    }
+    finish(r);
+}
+
+/* A reply was handled: its caller gets it, if it still waits for this call. */
+static void answer_caller(robot_t *r, int service, bool is_awaited, const void *message)
+{
+    if (is_awaited) {
+        r->calls[service].is_awaited = false;
+        told(r, r->callbacks.answer(r->callbacks.context, SERVICES[service].communication, r->calls[service].caller_id,
+                                    message));
+    }
+}
+#endif
+
+#if ROBOT_ACTION_COUNT > 0
+static int send_goal(robot_t *r, int request, uint32_t caller_id, const void *message)
+{
+    const robot_callbacks_t *callbacks = &r->callbacks;
+    const robot_communication_t action = REQUESTS[request].communication;
+    robot_goal_t *goal = &r->goals[REQUESTS[request].action];
+    goal->is_open = true;
+    goal->is_running = true;
+    goal->is_accepted = false;
+    goal->is_cancel_wanted = false;
+    goal->is_cancel_sent = false;
+    goal->is_cancelled_by_caller = false;
+    goal->caller_id = caller_id;
+    goal->id = r->next_goal_id++;
+    goal->deadline_us = later(r->now_us, r->settings.action_timeout_us);
+    get_requirements(&r->state, REQUESTS[request].action, goal->held);
+    if (!callbacks->send_goal(callbacks->context, goal->id, action, message)) {
+        goal->is_open = false;
+        return failed(r);
+    }
+    if (!callbacks->accept_goal(callbacks->context, action, caller_id)) {
+        return failed(r);
+    }
+    goal->is_awaited = true;
+    return LET_THROUGH;
+}
+
+/* The caller sent a goal. */
+static void let_goal_through(robot_t *r, uint64_t now_us, int request, uint32_t caller_id,
+                             const robot_sent_t *sent_by_caller)
+{
+    const robot_callbacks_t *callbacks = &r->callbacks;
+    int why = LET_THROUGH;
+    look_at_clock(r, now_us);
+    why = refusal(r, sent_by_caller);
+    if (why == LET_THROUGH && r->goals[REQUESTS[request].action].is_open) {
+        why = (int)ROBOT_REFUSAL_STILL_RUNNING;
+    }
+    if (why == LET_THROUGH) {
+        why = take_request(r, request);
+    }
+    if (why == LET_THROUGH) {
+        why = send_goal(r, request, caller_id, sent_by_caller->message);
+    }
+    if (why != LET_THROUGH) {
+        told(r, callbacks->reject_goal(callbacks->context, REQUESTS[request].communication, caller_id));
+        hold_back(r, REQUESTS[request].identifier, why);
+        return;
+    }
+    finish(r);
+}
+
+/* The caller cancels a goal. */
+static void cancel_for_caller(robot_t *r, uint64_t now_us, int action, uint32_t caller_id)
+{
+    robot_goal_t *goal = &r->goals[action];
+    look_at_clock(r, now_us);
+    if (!goal->is_awaited || goal->caller_id != caller_id) {
+        unexpected(r, ROBOT_NO_EVENT);
+    } else if (!goal->is_cancelled_by_caller) {
+        bool is_well = true;
+        goal->is_cancelled_by_caller = true;
+        goal->is_running = false;
+        happened(r, ACTIONS[action].cancel, take_event(&r->state, ACTIONS[action].cancel));
+        is_well = end_batch(r);
+        /* Whatever went wrong, the cancel is forwarded. */
+        is_well = request_cancel(r, action) && is_well;
+        guard(r, is_well);
+    }
+    finish(r);
+}
+
+/* Feedback was handled: its caller gets it. */
+static void pass_feedback(robot_t *r, int action, const void *message)
+{
+    if (r->goals[action].is_awaited) {
+        told(r, r->callbacks.pass_feedback(r->callbacks.context, ACTIONS[action].communication,
+                                           r->goals[action].caller_id, message));
+    }
+}
+#endif

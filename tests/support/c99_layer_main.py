@@ -1,0 +1,248 @@
+"""A test program around a generated C layer: reads commands from its standard input, prints all that happens."""
+
+import re
+
+from robosc.expressions import Type
+from robosc.model.structure import CommunicationKind
+from robosc.supervisor.structure import Supervisor
+from robosc.targets.c99.header import receive_head, reply_head
+from robosc.targets.c99.layer import call_head, cancel_head, goal_head, request_head, request_parameters
+from robosc.targets.c99.layout import Layout, event_data
+from support.c99_main import _TOP, _Program, batch_types, events_back
+
+TOKENS = 4096
+"""Messages are told apart by their address in an array of this length."""
+
+CALLBACKS = (
+    *("publish", "default", "call", "goal", "cancel", "pass", "blocked"),
+    *("answer", "no_answer", "accept", "reject", "feedback", "end"),
+)
+"""What each callback is called here, in the order of the struct; also the bits of what is to fail."""
+
+_CALLBACK = """
+static bool do_@name@(void *context@parameters@)
+{
+    (void)context;
+    if (failing & @flag@) {
+        return false;
+    }
+    printf(@format@);
+    return true;
+}
+"""
+
+_IN_HEXADECIMAL = """
+static const char *in_hexadecimal(const char *text)
+{
+    static char result[512];
+    size_t length = 0;
+    result[length++] = 'x';
+    for (; *text; text++) {
+        length += (size_t)sprintf(result + length, "%02x", (unsigned)(unsigned char)*text);
+    }
+    result[length] = 0;
+    return result;
+}
+"""
+
+_COMMUNICATION = "@p@_communication_t communication"
+_MESSAGE, _CALLER = "const void *message", "uint32_t caller_id"
+_TOPIC, _SOURCE = "@p@_topic_t topic", "@p@_source_t source"
+_SIGNATURES: dict[str, tuple[str, ...]] = {
+    "publish": (_TOPIC, _MESSAGE),
+    "default": (_TOPIC,),
+    "call": ("uint32_t id", _COMMUNICATION, _MESSAGE),
+    "goal": ("uint32_t id", _COMMUNICATION, _MESSAGE),
+    "cancel": (_COMMUNICATION, "uint32_t id"),
+    "pass": (_SOURCE, _MESSAGE),
+    "blocked": ("const char *identifier", "@p@_refusal_t why"),
+    "answer": (_COMMUNICATION, _CALLER, _MESSAGE),
+    "no_answer": (_COMMUNICATION, _CALLER),
+    "accept": (_COMMUNICATION, _CALLER),
+    "reject": (_COMMUNICATION, _CALLER),
+    "feedback": (_COMMUNICATION, _CALLER, _MESSAGE),
+    "end": (_COMMUNICATION, _CALLER, "@p@_end_t end", _MESSAGE),
+}
+
+_MAIN = """
+static void do_log(void *context, @p@_log_t kind, int what)
+{
+    static const char *const kinds[]
+        = {"event", "unexpected", "unknown", "release", "fault", "stop", "resume", "restart", "blocked"};
+    (void)context;
+    if (kind == @P@_LOG_FAULT || kind == @P@_LOG_STOP || kind == @P@_LOG_RESTART || kind == @P@_LOG_RESUME) {
+        printf("log %s\\n", kinds[kind]);
+    } else {
+        printf("log %s %d\\n", kinds[kind], what);
+    }
+}
+
+static void do_new(void)
+{
+    static const @p@_callbacks_t callbacks = {NULL, @callbacks@, do_log};
+    @p@_settings_t settings;
+    @p@_default_settings(&settings);
+    failing = 0;
+    settings.on_unknown = (@p@_on_unknown_t)read_integer();
+    settings.service_timeout_us = read_time();
+    settings.action_timeout_us = read_time();
+    settings.command_timeout_us = read_time();
+    for (int k = 0; k < @P@_COMMUNICATION_COUNT; k++) {
+        settings.max_age_us[k] = read_time();
+    }
+    for (int k = 0; k < @P@_TOPIC_COUNT; k++) {
+        settings.releases[k] = read_integer() != 0;
+    }
+    if (!@p@_init(&r, &settings, &callbacks)) {
+        printf("refused\\n");
+    }
+}
+
+int main(void)
+{
+    for (;;) {
+        const char command = next_word()[0];
+        const uint64_t now_us = command == 'n' || command == 'x' ? 0 : read_time();
+        word_count = 0;
+        reset_pools();
+        switch (command) {
+        case 'n': do_new(); break;
+        case 'x': failing = (int)read_integer(); break;
+        case 's': @p@_start(&r, now_us); break;
+        case 'w': @p@_watch(&r, now_us); break;
+        case 'S': @p@_stop(&r, now_us, read_integer() != 0); break;
+        case 'R': @p@_restart(&r, now_us); break;
+        case 'm': {
+            const int source = (int)read_integer();
+            do_receive(source, now_us, read_message());
+            break;
+        }
+        case 'q': do_request((int)read_integer(), now_us); break;
+        case 'b': {
+            const int event = (int)read_integer();
+            const uint32_t id = read_id();
+            do_back(event, now_us, id, read_message());
+            break;
+        }
+#if @P@_SERVICE_COUNT > 0
+        case 'f': @p@_call_failed(&r, now_us, read_id()); break;
+#endif
+#if @P@_ACTION_COUNT > 0
+        case 'a': @p@_goal_accepted(&r, now_us, read_id()); break;
+        case 'e': {
+            const uint32_t id = read_id();
+            const bool is_cancelled = read_integer() != 0;
+            @p@_goal_ended(&r, now_us, id, is_cancelled, read_message());
+            break;
+        }
+        case 'c': {
+            const uint32_t id = read_id();
+            @p@_cancel_refused(&r, now_us, id, read_integer() != 0);
+            break;
+        }
+#endif
+        default: printf("what?\\n"); return 1;
+        }
+        print_state(now_us);
+    }
+}
+"""
+
+
+class _LayerProgram(_Program):
+    """The test program of a layer."""
+
+    def cases(self, name: str, parameters: str, calls: list[str]) -> str:
+        """A function that makes one of some calls."""
+        lines = [f"static void {name}({parameters})", "{", "    (void)now_us;"]
+        lines += [f"    (void){word};" for word in ("id", "message") if re.search(rf"\b{word}\b", parameters)]
+        lines += ["    switch (number) {", *(f"    case {place}: {call}" for place, call in enumerate(calls))]
+        return "\n".join([*lines, "    default: break;", "    }", "}", ""])
+
+    def call_with(self, head: str, types: list[Type], *around: str) -> str:
+        """A call with data that is read, between or after other arguments."""
+        function = re.match(r"void (\w+)\(", head)
+        assert function is not None
+        lines, data = [], []
+        for number, type_ in enumerate(types):
+            if self.layout.is_by_pointer(type_):
+                raw = self.layout.raw(type_)
+                lines.append(f"{raw} data_{number}; const bool is_{number} = read_integer() != 0;")
+                lines.append(f"if (is_{number}) {{ data_{number} = {self.reader(type_)}(); }}")
+                data.append(f"is_{number} ? &data_{number} : NULL")
+            else:
+                lines.append(f"{self.layout.raw(type_)} data_{number} = {self.reader(type_)}();")
+                data.append(f"data_{number}")
+        arguments = [item for word in around for item in (data if word == "@data" else [word])]
+        return f"{{ {' '.join(lines)} {function.group(1)}({', '.join(['&r', 'now_us', *arguments])}); break; }}"
+
+    def text(self) -> str:
+        layout = self.layout
+        receive = [
+            self.call_with(receive_head(layout, identifier), batch_types(layout, identifier), "@data", "message")
+            for identifier in layout.received_topics
+        ]
+        back = []
+        for event in events_back(layout):
+            data = event_data(layout.model, event)
+            types = [] if data is None else [data]
+            back.append(self.call_with(reply_head(layout, event), types, "id", "@data", "message"))
+        asked = []
+        for identifier in layout.topics:
+            types = [layout.source(type_) for _, type_ in request_parameters(layout, identifier).values()]
+            call = self.call_with(request_head(layout, identifier), types, "@data", "what")
+            asked.append(f"{{ const @p@_sent_t what = read_sent(); {call} break; }}")
+        for head in _caller_heads(layout):
+            function = head.partition("(")[0].removeprefix("void ")
+            what = ", what" if "_sent_t" in head else ""
+            read = "const @p@_sent_t what = read_sent(); " if what else ""
+            call = f"{function}(&r, now_us, caller_id{what});"
+            asked.append(f"{{ const uint32_t caller_id = read_id(); {read}{call} break; }}")
+        resets = "".join(f" {pool}_used = 0;" for pool in self.pools)
+        parts = [
+            _TOP,
+            f"static const char tokens[{TOKENS}] = {{0}};",
+            "static int token(const void *message) "
+            "{ return message == NULL ? -1 : (int)((const char *)message - tokens); }",
+            _IN_HEXADECIMAL,
+            "static const void *read_message(void) "
+            "{ const int64_t number = read_integer(); return number < 0 ? NULL : &tokens[number]; }",
+            "static @p@_sent_t read_sent(void)\n{\n    @p@_sent_t what;\n    what.message = read_message();",
+            "    what.is_finite = read_integer() != 0;\n    what.is_default = read_integer() != 0;",
+            "    return what;\n}",
+            *self.readers.values(),
+            f"static void reset_pools(void) {{{resets} }}\n",
+            self.cases("do_receive", "int number, uint64_t now_us, const void *message", receive),
+            self.cases("do_back", "int number, uint64_t now_us, uint32_t id, const void *message", back),
+            self.cases("do_request", "int number, uint64_t now_us", asked),
+            self.print_state(),
+            *(_callback(name, place) for place, name in enumerate(CALLBACKS)),
+            _MAIN.replace("@callbacks@", ", ".join(f"do_{name}" for name in CALLBACKS)),
+        ]
+        return "\n".join(parts).replace("@p@", layout.prefix).replace("@P@", layout.upper)
+
+
+def _caller_heads(layout: Layout) -> list[str]:
+    """The functions for the caller's calls, goals and cancels."""
+    heads = [call_head(layout, item.name) for item in layout.of_kind(CommunicationKind.SERVICE)]
+    for item in layout.of_kind(CommunicationKind.ACTION):
+        heads += [goal_head(layout, item.name), cancel_head(layout, item.name)]
+    return heads
+
+
+def _callback(name: str, place: int) -> str:
+    parameters = _SIGNATURES[name]
+    formats, arguments = [name], []
+    for parameter in parameters:
+        word = parameter.replace("*", "").split()[-1]
+        formats.append("%s" if word == "identifier" else "%d")
+        shown = {"identifier": "in_hexadecimal(identifier)", "message": "token(message)"}
+        arguments.append(shown.get(word, f"(int){word}"))
+    text = _CALLBACK.replace("@name@", name).replace("@flag@", str(2**place))
+    text = text.replace("@format@", ", ".join([f'"{" ".join(formats)}\\n"', *arguments]))
+    return text.replace("@parameters@", "".join(f", {parameter}" for parameter in parameters))
+
+
+def layer_program(supervisor: Supervisor) -> str:
+    """The text of a test program."""
+    return _LayerProgram(supervisor, None).text()

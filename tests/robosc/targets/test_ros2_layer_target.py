@@ -17,6 +17,7 @@ from robosc.supervisor.structure import Supervisor
 from robosc.targets import GeneratedFiles, GenerateOptions, generate, write_files
 from robosc.targets.registry import SupervisedController
 from robosc.targets.ros.runtime.parameters import ParameterError, declarations, validate
+from robosc.targets.ros2.runtime.lifecycle import AUTOSTART
 from robosc.targets.ros2.runtime.supervised import callers_name, remapped, remapping_arguments, robots_name
 from support.generated import example_supervisor
 from support.launch_stub import evaluated, launch_actions
@@ -264,7 +265,7 @@ def test_what_a_controller_sends_may_be_read_as_an_enum() -> None:
 
 def test_parameters_about_decisions_do_not_exist(files: GeneratedFiles) -> None:
     content = yaml.safe_load(files["config/parameters.yaml"])["/**"]["ros__parameters"]
-    expected = {item.name: item.default for item in declarations(("/cmd_vel",), "layer")}
+    expected = {item.name: item.default for item in (*declarations(("/cmd_vel",), "layer"), AUTOSTART)}
     assert content == expected
     assert not {"policy", "priority", "seed", "every"} & set(content)
     for name in content:

@@ -18,6 +18,7 @@ from robosc.supervisor.structure import Supervisor
 from robosc.targets import GeneratedFiles, GenerateOptions, generate, write_files
 from robosc.targets.ros.runtime.parameters import ParameterError, declarations, prefixed, validate
 from robosc.targets.ros.state_topic import state_topic
+from robosc.targets.ros2.runtime.lifecycle import AUTOSTART
 from support.generated import example_supervisor, imported
 from support.launch_stub import launch_actions
 from support.models import model_of
@@ -132,7 +133,7 @@ def test_the_launch_file_starts_the_node_with_its_parameters(folder: Path) -> No
 
 def test_the_parameter_file_holds_every_default(files: GeneratedFiles) -> None:
     content = yaml.safe_load(files["config/parameters.yaml"])["/**"]["ros__parameters"]
-    expected = {item.name: item.default for item in declarations(("/cmd_vel",))}
+    expected = {item.name: item.default for item in (*declarations(("/cmd_vel",)), AUTOSTART)}
     assert content == expected
     description = describe(example_supervisor(FOLLOWER))
     checked = validate(content, description)

@@ -29,6 +29,7 @@ from robosc.targets.words import requirement_text
 _RUNTIME = (
     "controller.hpp",
     "event_log.hpp",
+    "health.hpp",
     "json.hpp",
     "notes.hpp",
     "parameters.hpp",

@@ -17,6 +17,7 @@
 
 #include "../model.hpp"
 #include "event_log.hpp"
+#include "health.hpp"
 #include "json.hpp"
 #include "notes.hpp"
 #include "parameters.hpp"
@@ -83,15 +84,6 @@ public:
 private:
     bool is_missed_ = false;
     std::uint64_t missed_since_us_ = 0;
-};
-
-enum class Level { OK = 0, WARN = 1, ERROR_ = 2 };
-
-/* A report for /diagnostics. */
-struct Health {
-    Level level = Level::OK;
-    std::string message;
-    std::vector<std::pair<std::string, std::string>> values;
 };
 
 /* What the controller asks of the middleware. What fails throws. */
@@ -450,7 +442,7 @@ private:
         add_news(dropped - last_dropped_, "dropped");
         result.level = Level::WARN;
         if (!reasons_.empty()) {
-            result.level = Level::ERROR_;
+            result.level = Level::FAULTY;
             result.message = "stopped: " + reasons_text();
         } else if (status == ROBOT_STATUS_NEW) {
             result.message = missing_.empty() ? "not started" : "waiting for servers: " + joined(missing_);

@@ -76,7 +76,7 @@ def generate_package(supervisor: Supervisor, options: GenerateOptions, middlewar
         return _generate(supervisor, name, middleware)
     except UnsupportedModelError as error:
         # What refuses it may serve other targets, too.
-        text = str(error).removeprefix("target ros2: ").replace("ROS 2", "ROS")
+        text = str(error).removeprefix("target ros2: ").replace("ROS 2", "ROS").replace("the target c99", "it")
         prefix = f"target {middleware.target}: "
         raise UnsupportedModelError(text if text.startswith(prefix) else prefix + text) from error
 

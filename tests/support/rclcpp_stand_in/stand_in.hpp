@@ -9,6 +9,7 @@
 //   result NAME CODE DATA         4: succeeded, 5: canceled, 6: aborted
 //   refuse NAME CODE              the answer to a cancel (0: it is accepted)
 //   signal NUMBER
+//   wait WORD NAME                go on when the node has done that once more
 //
 // DATA depends on the type: the value of `data`, the ranges of a scan, `success` and `message` of a reply, `sequence`.
 
@@ -81,6 +82,7 @@ struct World {
     // By word and name.
     std::map<std::pair<std::string, std::string>, Handler> orders;
     std::map<std::string, bool> servers;
+    std::map<std::string, int> done;
     std::string input;
     bool is_over = false;
 };
@@ -139,13 +141,21 @@ inline void step(int timeout_ms)
     }
     if (end != std::string::npos) {
         const std::string line = here.input.substr(0, end);
+        if (line.compare(0, 5, "wait ") == 0 && here.done[line.substr(5)]-- <= 0) {
+            here.done[line.substr(5)] = 0;
+            poll(nullptr, 0, timeout_ms < 5 ? timeout_ms : 5);
+            return;
+        }
         here.input.erase(0, end + 1);
-        obey(line);
+        if (line.compare(0, 5, "wait ") != 0) {
+            obey(line);
+        }
     }
 }
 
 inline void print(const std::string& what, const std::string& name, const std::string& yaml)
 {
+    world().done[what + " " + name]++;
     std::cout << what << " " << name << " " << yaml << std::endl;
 }
 

@@ -31,7 +31,7 @@ pytestmark = [
 ]
 
 PACKAGE = "line_follower_controller"
-STOPPED = {axis: 0.0 for axis in "xyz"}
+STOPPED = dict.fromkeys("xyz", 0.0)
 
 
 @pytest.fixture(scope="module")
@@ -224,7 +224,9 @@ def test_state_prefix_stale_sensors_and_other_scans(start: Start, peer: Peer) ->
     assert {item["key"] for item in status["values"]} >= {"status", "reason", "unknown", "last decision (us)"}
 
 
-def test_a_stale_sensor_stops_the_robot_until_it_is_back(workspace: Path, master: Master, peer: Peer, tmp_path: Path) -> None:
+def test_a_stale_sensor_stops_the_robot_until_it_is_back(
+    workspace: Path, master: Master, peer: Peer, tmp_path: Path
+) -> None:
     parameters = tmp_path / "parameters.yaml"
     parameters.write_text("period: 0.02\nmax_age: ['/scan=0.3']\n")
     # By roslaunch, with the file of parameters that its argument names.

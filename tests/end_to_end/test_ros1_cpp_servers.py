@@ -100,7 +100,11 @@ def ready(carrier: Carrier) -> Carrier:
 
 def test_what_is_sent_is_as_the_model_says_and_stamped(ready: Carrier, supervisor: Supervisor) -> None:
     peer = ready.peer
-    for topic, type_ in (("/creep", "geometry_msgs/TwistStamped"), ("/said", "std_msgs/String"), ("/count", "std_msgs/Int16")):
+    for topic, type_ in (
+        ("/creep", "geometry_msgs/TwistStamped"),
+        ("/said", "std_msgs/String"),
+        ("/count", "std_msgs/Int16"),
+    ):
         peer.tell("subscribe", topic, type_)
     ready.until("level.response", repeat=lambda: peer.publish("/level", "std_msgs/Float32", data=0.25))
     until(lambda: any(m["twist"]["angular"]["z"] == 0.25 for m in peer.messages("/creep")), "the charge")

@@ -1,4 +1,4 @@
-"""Compares the event log of a node with the reference executor: what came is given to it, what it does must be the same.
+"""Compares the event log of a node with the reference executor: given what came, it must do the same.
 
 The log of a node tells every event with the state after it. What came (events of the environment, with their data) is
 taken from the log; all else (requests with their data, silent steps, states, stops, releases) must be what the

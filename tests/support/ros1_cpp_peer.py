@@ -7,30 +7,31 @@ import importlib
 import json
 import sys
 import threading
+from typing import Any
 
 import genpy
 import rospy
 from actionlib import ActionServer
 
-publishers = {}
-services = {}
-actions = {}
-goals = {}
+publishers: dict[str, Any] = {}
+services: dict[str, Any] = {}
+actions: dict[str, Any] = {}
+goals: dict[str, Any] = {}
 lock = threading.Lock()
 
 
-def tell(**entry):
+def tell(**entry: Any) -> None:
     with lock:
         sys.stdout.write(json.dumps(entry) + "\n")
         sys.stdout.flush()
 
 
-def type_of(name, folder):
+def type_of(name: str, folder: str) -> Any:
     package, _, kind = name.partition("/")
     return getattr(importlib.import_module(package + "." + folder), kind)
 
 
-def plain(value):
+def plain(value: Any) -> Any:
     if isinstance(value, (genpy.Time, genpy.Duration)):
         return value.to_sec()
     if hasattr(value, "__slots__"):
@@ -40,7 +41,7 @@ def plain(value):
     return value.decode() if isinstance(value, bytes) else value
 
 
-def filled(message, data):
+def filled(message: Any, data: Any) -> Any:
     genpy.message.fill_message_args(message, [data])
     return message
 
@@ -48,15 +49,15 @@ def filled(message, data):
 class Service:
     """Answers as told, or not at all."""
 
-    def __init__(self, name, kind):
-        self.answer = None
+    def __init__(self, name: str, kind: str) -> None:
+        self.answer: Any = None
         self.may_answer = threading.Condition()
         service = type_of(kind, "srv")
         self._response = service._response_class
         self._name = name
         self.server = rospy.Service(name, service, self._take)
 
-    def _take(self, request):
+    def _take(self, request: Any) -> Any:
         tell(kind="called", name=self._name, data=plain(request))
         with self.may_answer:
             self.may_answer.wait_for(lambda: self.answer is not None)
@@ -69,25 +70,25 @@ class Service:
 class Action:
     """Tells what comes; goals are accepted, rejected and ended as told."""
 
-    def __init__(self, name, kind):
+    def __init__(self, name: str, kind: str) -> None:
         self._name = name
         self.kind = kind
         self.server = ActionServer(name, type_of(kind + "Action", "msg"), self._take, self._cancel, auto_start=False)
         self.server.start()
 
-    def _take(self, goal):
+    def _take(self, goal: Any) -> None:
         goals[self._name] = goal
         tell(kind="goal", name=self._name, data=plain(goal.get_goal()))
 
-    def _cancel(self, goal):
+    def _cancel(self, goal: Any) -> None:
         tell(kind="cancel", name=self._name)
 
 
-def obey(order):
-    what, name = order["do"], order.get("name")
+def obey(order: dict[str, Any]) -> None:
+    what, name = order["do"], order["name"]
     if what == "subscribe":
         # Bound to the topic by a default: the callback is called later.
-        def receive(message, topic=name):
+        def receive(message: Any, topic: Any = name) -> None:
             tell(kind="message", name=topic, data=plain(message))
 
         rospy.Subscriber(name, type_of(order["type"], "msg"), receive, queue_size=1000, tcp_nodelay=True)
@@ -124,14 +125,14 @@ def obey(order):
         tell(kind="error", data="no order: " + what)
 
 
-def main():
+def main() -> None:
     rospy.init_node(sys.argv[1], disable_signals=True)
     tell(kind="ready")
     for line in sys.stdin:
         try:
             obey(json.loads(line))
         except Exception as error:
-            tell(kind="error", data="{}: {}".format(line.strip(), error))
+            tell(kind="error", data=f"{line.strip()}: {error}")
 
 
 main()

@@ -134,7 +134,8 @@ class Writer:
                 lines += indent(self._put_variable(f"state.{member}", type_))
             lines += ['    out += "}}";', "}"]
         return _function(
-            f"inline void put_state(std::string& out, [[maybe_unused]] const {layout.prefix}_state_t& state, bool as_text)",
+            "inline void put_state("
+            f"std::string& out, [[maybe_unused]] const {layout.prefix}_state_t& state, bool as_text)",
             [*lines, "out += '}';"],
             comment("The state as JSON; with values as the model writes them, in quotes, for /state."),
         )

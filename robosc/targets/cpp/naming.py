@@ -38,7 +38,9 @@ def require_package_name(name: str) -> None:
         UnsupportedModelError: It cannot.
     """
     if name in KEYWORDS:
-        raise UnsupportedModelError(f"the package '{name}' is called like a keyword of C++, which has no messages of it")
+        raise UnsupportedModelError(
+            f"the package '{name}' is called like a keyword of C++, which has no messages of it"
+        )
 
 
 def file_name(type_name: str) -> str:

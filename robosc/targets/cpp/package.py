@@ -105,7 +105,9 @@ def _generate(supervisor: Supervisor, name: str, middleware: Middleware) -> Gene
 
 
 def _require_own_names(package: str, found: tuple[Topic, ...], asked: tuple[Communication, ...]) -> None:
-    packages = {topic.interface.package for topic in found} | {item.interface.package for item in asked if item.interface}
+    packages = {topic.interface.package for topic in found} | {
+        item.interface.package for item in asked if item.interface
+    }
     for name in sorted(packages):
         require_package_name(name)
     if package in packages:

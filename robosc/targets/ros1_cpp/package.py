@@ -7,7 +7,6 @@ from robosc.targets.files import GeneratedFiles
 from robosc.targets.registry import GenerateOptions
 from robosc.targets.ros2.runtime.parameters import USE_SIM_TIME
 
-
 _ENDINGS = {
     "action": "Action",
     "goal": "Goal",

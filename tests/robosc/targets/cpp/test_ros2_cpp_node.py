@@ -183,9 +183,7 @@ def test_what_comes_before_the_start_is_held_and_goals_are_cancelled_at_the_end(
 def test_a_server_that_is_lost_fails_its_calls(courier_node: Path, tmp_path: Path) -> None:
     lines = [*SERVERS, "message /order/wind", "wait call /wind", "server /wind 0"]
     waited = ["wait publish /state"] * 60
-    done = run(
-        courier_node, [*lines, *waited, END], "period:=0.025", "publish_state:=true", f"log_folder:={tmp_path}"
-    )
+    done = run(courier_node, [*lines, *waited, END], "period:=0.025", "publish_state:=true", f"log_folder:={tmp_path}")
     assert done.returncode == 0, done.stderr
     events = [entry["event"] for entry in entries_of(tmp_path) if entry["kind"] == "event"]
     assert events[-2:] == ["wind.error", "wind.reset"]

@@ -166,6 +166,16 @@ def test_rosnode_kill_stops_the_robot_first(start: Start, peer: Peer, master: Ma
     until(lambda: robot.speed == 0.0, "a zero")
 
 
+def test_a_fault_stops_the_robot_and_is_told_at_the_end(start: Start, peer: Peer) -> None:
+    node = start("period:=0.5", "on_unknown:=fault")
+    robot = Robot(peer)
+    robot.drive()
+    until(lambda: not node.is_running, "the end", lambda: robot.scan(float("nan")))
+    assert node.wait() == 1
+    until(lambda: robot.speed == 0.0, "a zero")
+    assert node.stderr.splitlines()[-1] == f"{PACKAGE}: something was unknown"
+
+
 @pytest.mark.parametrize(
     ("parameter", "expected"),
     [

@@ -26,7 +26,9 @@ def own_registry(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_built_in_targets_are_listed_without_importing_them() -> None:
-    assert [info.name for info in available_targets()] == ["c99", "cif", "promela", "python", "ros2"]
+    assert [info.name for info in available_targets()] == [
+        *("c99", "cif", "promela", "python", "ros1-cpp", "ros2", "ros2-cpp")
+    ]
     assert all(info.description for info in available_targets())
 
 

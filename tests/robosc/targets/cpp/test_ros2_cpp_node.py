@@ -180,6 +180,16 @@ def test_what_comes_before_the_start_is_held_and_goals_are_cancelled_at_the_end(
     assert numbers_of(sent(done.stdout)[-2][2]) == []
 
 
+def test_a_fault_stops_the_robot_and_is_told_at_the_end(maze_node: Path, tmp_path: Path) -> None:
+    lines = ["message /scan nan", END]
+    done = run(maze_node, lines, *BY_EVENT, "on_unknown:=fault", f"log_folder:={tmp_path}")
+    assert done.returncode == 1
+    assert done.stderr == "maze_solver_controller: something was unknown\n"
+    name, last = sent(done.stdout)[-1][1:]
+    assert (name, numbers_of(last)) == ("/cmd_vel", [])
+    assert "fault" in {entry["kind"] for entry in entries_of(tmp_path)}
+
+
 def test_a_server_that_is_lost_fails_its_calls(courier_node: Path, tmp_path: Path) -> None:
     lines = [*SERVERS, "message /order/wind", "wait call /wind", "server /wind 0"]
     waited = ["wait publish /state"] * 60

@@ -186,7 +186,7 @@ class Writer:
             if found is not None:
                 place = f"request.data.{self.layout.request_members[item.name]}"
                 cases += [f"case {self.layout.communications[item.name]}:", "    {"]
-                cases += indent(self._put_field(found, place), 2) + ["    }", "    break;"]
+                cases += [*indent(self._put_field(found, place), 2), "    }", "    break;"]
         return _function(
             f"inline void put_request(std::string& out, const {self.layout.prefix}_request_t& request)",
             ["switch (request.communication) {", *cases, "default:", '    out += "null";', "    break;", "}"],

@@ -177,6 +177,24 @@ def test_files_of_types_are_called_as_rosidl_calls_them(type_name: str, expected
     assert file_name(type_name) == expected
 
 
+MISFIT = """
+robot Misfit {
+    datatype object Wrong { x: string w: double }
+    interface i use Vector3 from geometry_msgs
+    component C { outgoing message m with identifier: "/m", type: Wrong links i }
+}
+"""
+
+
+@pytest.mark.skipif(missing("geometry_msgs") is not None, reason=str(missing("geometry_msgs")))
+def test_the_compiler_names_a_field_that_does_not_fit(tmp_path: Path) -> None:
+    with pytest.raises(AssertionError) as raised:
+        compiled(supervisor_of(MISFIT), tmp_path)
+    message = str(raised.value)
+    assert "in the model it is a string, in the message it is not" in message
+    assert re.search(r"has no member named .w.", message)
+
+
 HOSTILE = r"""
 robot None {
     datatype object int { x: double }

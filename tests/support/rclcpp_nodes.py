@@ -36,7 +36,7 @@ def compiled(supervisor: Supervisor, folder: Path) -> Path:
     packages = sorted((Path(sys.prefix) / "include").iterdir())
     includes = [word for path in packages if path.is_dir() for word in ("-isystem", str(path))]
     program = folder / "controller"
-    both = ["-O1", *WARNINGS, "-ffp-contract=off"]
+    both = [*WARNINGS, "-ffp-contract=off"]
     for command in (
         ["gcc", "-std=c99", *both, "-c", engine.name, "-o", "engine.o"],
         ["g++", "-std=c++17", *both, "-I.", f"-I{STAND_IN}", *includes, "node.cpp", "engine.o", "-o", str(program)],

@@ -6,7 +6,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-import yaml
+import yaml  # type: ignore[import-untyped]
 
 from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Deployment
@@ -27,8 +27,8 @@ NAVIGATION = "navigation/navigation"
 PACKAGE = "line_follower_controller"
 
 
-def supervisor_of(body: str, **options: Deployment) -> Supervisor:
-    made = make_supervisor(bundle_of(body), **options)
+def supervisor_of(body: str) -> Supervisor:
+    made = make_supervisor(bundle_of(body))
     assert made.supervisor is not None, made.reason
     return made.supervisor
 

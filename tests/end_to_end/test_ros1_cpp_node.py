@@ -246,7 +246,6 @@ def test_a_stale_sensor_stops_the_robot_until_it_is_back(
         "CMAKE_PREFIX_PATH": f"{workspace / 'build' / 'devel'}:/usr",
         "PYTHONPATH": "/usr/lib/python3/dist-packages",
     }
-    # rosrun and roslaunch look below `libexec` of the develspace.
     command = ["/usr/bin/roslaunch", str(workspace / "src/launch/controller.launch"), f"parameters:={parameters}"]
     with Process(command, environment, tmp_path / "launch") as launch:
         robot = Robot(peer)

@@ -97,8 +97,6 @@ def obey(order: dict[str, Any]) -> None:
         if name not in publishers:
             publishers[name] = rospy.Publisher(name, kind, queue_size=1000)
         publishers[name].publish(filled(kind(), order["data"]))
-    elif what == "connections":
-        tell(kind="connections", name=name, data=publishers[name].get_num_connections() if name in publishers else 0)
     elif what == "service":
         services[name] = Service(name, order["type"])
     elif what == "answer":

@@ -13,6 +13,7 @@ from robosc.targets import generate, write_files
 
 STAND_IN = Path(__file__).with_name("rclcpp_stand_in")
 WARNINGS = "-Wall -Wextra -Wpedantic -Werror".split()
+SANITIZERS = "-g1 -fsanitize=address,undefined -fno-sanitize-recover=all".split()
 LIMIT_S = 60.0
 
 
@@ -28,7 +29,7 @@ def missing(*packages: str) -> str | None:
     return f"not installed: {', '.join(lacking)}" if lacking else None
 
 
-def compiled(supervisor: Supervisor, folder: Path) -> Path:
+def compiled(supervisor: Supervisor, folder: Path, *options: str) -> Path:
     """The program of a node, compiled without a warning."""
     write_files(generate(supervisor, "ros2-cpp"), folder)
     source = folder / "src"
@@ -36,7 +37,7 @@ def compiled(supervisor: Supervisor, folder: Path) -> Path:
     packages = sorted((Path(sys.prefix) / "include").iterdir())
     includes = [word for path in packages if path.is_dir() for word in ("-isystem", str(path))]
     program = folder / "controller"
-    both = [*WARNINGS, "-ffp-contract=off"]
+    both = [*WARNINGS, *options, "-ffp-contract=off"]
     for command in (
         ["gcc", "-std=c99", *both, "-c", engine.name, "-o", "engine.o"],
         ["g++", "-std=c++17", *both, "-I.", f"-I{STAND_IN}", *includes, "node.cpp", "engine.o", "-o", str(program)],

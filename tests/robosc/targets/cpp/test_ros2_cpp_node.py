@@ -13,7 +13,7 @@ from robosc.supervisor import make_supervisor
 from robosc.supervisor.structure import Supervisor
 from support.models import EXAMPLES, bundle_of
 from support.node_logs import comparable, entries_of, replayed
-from support.rclcpp_nodes import compiled, missing, run, sent
+from support.rclcpp_nodes import SANITIZERS, compiled, missing, run, sent
 
 MODELS = Path(__file__).parents[3] / "models"
 END = "signal 15"
@@ -54,7 +54,7 @@ def courier() -> Supervisor:
 
 @pytest.fixture(scope="module")
 def courier_node(courier: Supervisor, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return compiled(courier, tmp_path_factory.mktemp("courier"))
+    return compiled(courier, tmp_path_factory.mktemp("courier"), *SANITIZERS)
 
 
 def scan(dice: Random) -> str:
@@ -197,6 +197,41 @@ def test_a_server_that_is_lost_fails_its_calls(courier_node: Path, tmp_path: Pat
     assert done.returncode == 0, done.stderr
     events = [entry["event"] for entry in entries_of(tmp_path) if entry["kind"] == "event"]
     assert events[-2:] == ["wind.error", "wind.reset"]
+
+
+DRIVING = [*SERVERS, "message /allowed 1", "message /order/count", "wait goal /count"]
+A_WHILE = ["wait publish /state"] * 60
+WATCHED = ("period:=0.025", "publish_state:=true")
+
+
+def test_a_lost_goal_is_cancelled_when_its_server_is_seen_again(courier_node: Path, tmp_path: Path) -> None:
+    lines = [*DRIVING, "accept /count", "server /count 0", *A_WHILE, "server /count 1", "wait cancel /count"]
+    # Of another one it becomes known only later that it was accepted.
+    lines += ["refuse /count 3", "result /count 5", "message /order/count", "wait goal /count", "server /count 0"]
+    lines += [*A_WHILE, "accept /count", "wait cancel /count", "refuse /count 0", END]
+    done = run(courier_node, lines, *WATCHED, f"log_folder:={tmp_path}")
+    assert (done.returncode, done.stderr) == (0, "")
+    events = [entry["event"] for entry in entries_of(tmp_path) if entry["kind"] == "event"]
+    assert events.count("count.error") == 2
+    assert events.count("count.cancel") == 0
+
+
+@pytest.mark.parametrize(("code", "status"), [(1, 1), (2, 0)])
+def test_a_running_goal_whose_cancel_is_refused_is_a_fault(courier_node: Path, code: int, status: int) -> None:
+    # Unless the server does not know the goal: then it is lost, and nothing runs.
+    lines = [
+        *DRIVING,
+        "accept /count",
+        "message /allowed 0",
+        "wait cancel /count",
+        f"refuse /count {code}",
+        *A_WHILE,
+        END,
+    ]
+    done = run(courier_node, lines, *WATCHED)
+    assert done.returncode == status
+    told = "courier_controller: the cancel of a running goal was refused\n"
+    assert done.stderr == (told if status else "")
 
 
 @pytest.mark.parametrize(

@@ -119,9 +119,17 @@ _BUILT_IN: dict[str, tuple[str, str]] = {
         "a complete ROS 1 package (catkin, rospy): controller node, launch file, parameters",
         "robosc.targets.ros1:TARGET",
     ),
+    "ros1-cpp": (
+        "a complete ROS 1 package (catkin): a roscpp node around the supervisor in C99",
+        "robosc.targets.ros1_cpp:TARGET",
+    ),
     "ros2": (
         "a complete ROS 2 package (ament_python): controller or layer node, launch file, parameters",
         "robosc.targets.ros2:TARGET",
+    ),
+    "ros2-cpp": (
+        "a complete ROS 2 package (ament_cmake): an rclcpp node around the supervisor in C99",
+        "robosc.targets.ros2_cpp:TARGET",
     ),
 }
 

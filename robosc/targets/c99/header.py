@@ -41,7 +41,11 @@ def head(supervisor: Supervisor, begin: str = "/* ", rest: str = "   ", end: str
 
 def runtime_text(layout: Layout, name: str) -> str:
     """A file of the runtime with the robot's prefix in place of `robot_`."""
-    text = resources.files("robosc.targets.c99.runtime").joinpath(name).read_text(encoding="utf-8")
+    return with_prefix(layout, resources.files("robosc.targets.c99.runtime").joinpath(name).read_text(encoding="utf-8"))
+
+
+def with_prefix(layout: Layout, text: str) -> str:
+    """A text of a runtime with the robot's prefix in place of `robot_`."""
     text = re.sub(r"\brobot_(?=[a-z])", f"{layout.prefix}_", text)
     return re.sub(r"\bROBOT_(?=[A-Z])", f"{layout.upper}_", for_deployment(text, layout.is_layer))
 
@@ -443,4 +447,4 @@ def _passed_on(layout: Layout) -> list[str]:
     return ["const void *message"] if layout.is_layer else []
 
 
-__all__ = ["batch", "counts", "head", "header_file", "receive_head", "reply_head", "runtime_text"]
+__all__ = ["batch", "counts", "head", "header_file", "receive_head", "reply_head", "runtime_text", "with_prefix"]

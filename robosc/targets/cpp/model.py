@@ -1,0 +1,457 @@
+"""The generated `model.hpp`: tables of one robot, its data as JSON, and between its data and messages of any class."""
+
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+from robosc.expressions import (
+    ArrayType,
+    BooleanType,
+    DoubleType,
+    EnumType,
+    IntegerType,
+    NoneType,
+    ObjectType,
+    StringType,
+    Type,
+)
+from robosc.model.structure import Communication, CommunicationKind, EventKind
+from robosc.targets.c99.header import batch, batch_parameters
+from robosc.targets.c99.layout import Layout, event_data
+from robosc.targets.c99.provide import Field, request_field
+from robosc.targets.c99.text import comment, string_literal
+from robosc.targets.c99.unit import Unit
+from robosc.targets.cpp.naming import require_field_name
+from robosc.targets.events import is_controllable
+from robosc.targets.python.text import indent
+from robosc.targets.ros.state_topic import state_topic
+
+_LITERAL = 100
+"""Characters of one piece of a long literal."""
+
+_KINDS = {BooleanType: "boolean", IntegerType: "integer", DoubleType: "double", StringType: "string"}
+
+
+@dataclass
+class Writer:
+    """Writes the header of one robot.
+
+    Attributes:
+        unit: The C file that it belongs to.
+        package: Name of the package.
+    """
+
+    unit: Unit
+    package: str
+    _types: dict[str, int] = field(default_factory=dict)
+    _functions: list[str] = field(default_factory=list)
+
+    @property
+    def layout(self) -> Layout:
+        """Names in C."""
+        return self.unit.layout
+
+    def text(self) -> str:
+        """The header without what stands at the top of every file."""
+        layout = self.layout
+        tables = self._tables()
+        states = [*self._put_state(), *self._put_taken()]
+        requests = self._put_request()
+        received = [line for number, identifier in enumerate(received_topics(layout)) for line in
+                    self._receive(number, identifier)]  # fmt: skip
+        answers = [line for item in layout.requests for event in answers_of(item) for line in self._take(event)]
+        fills = [line for item in layout.requests for line in self._fill(item)]
+        body = [*tables, *states, *requests, *self._functions, *received, *answers, *fills]
+        return "\n".join([*_TOP.splitlines(), "", *body, *_BOTTOM]) + "\n"
+
+    # Tables.
+
+    def _tables(self) -> list[str]:
+        layout, model = self.layout, self.layout.model
+        topic_of = {identifier: number for number, identifier in enumerate(received_topics(layout))}
+        sensors = layout.of_kind(CommunicationKind.OUTGOING_MESSAGE)
+        definition = json.dumps(state_topic(model).definition)
+        pieces = [definition[place : place + _LITERAL] for place in range(0, len(definition), _LITERAL)]
+        sent = list(layout.topics)
+        return [
+            f"inline constexpr const char* PACKAGE = {string_literal(self.package)};",
+            f"inline constexpr const char* ROBOT = {string_literal(model.name)};",
+            "",
+            *_array("const char* const IDENTIFIERS", (string_literal(i.identifier) for i in model.communications)),
+            *_array("const bool IS_CONTROLLABLE", ("true" if is_controllable(e) else "false" for e in layout.events)),
+            *comment("The event of each communication's request."),
+            *_array("const int REQUEST_EVENTS", (self._request_event(item) for item in model.communications)),
+            *comment("Of each outgoing message the number of its topic among those that are received."),
+            *_array("const int SENSOR_TOPICS", (str(topic_of[item.identifier]) for item in sensors)),
+            *comment("What parameters may name."),
+            *self._nameables("REQUESTS", [(item, self._number(item)) for item in layout.requests]),
+            *self._nameables("SENSORS", [(item, self._number(item)) for item in sensors]),
+            *self._nameables(
+                "SENT",
+                [
+                    (item, str(sent.index(item.identifier)))
+                    for item in layout.of_kind(CommunicationKind.INCOMING_MESSAGE)
+                ],
+            ),
+            *comment("What /state says about the model."),
+            "inline constexpr const char* DEFINITION =",
+            *(f"    {string_literal(piece)}" for piece in pieces[:-1]),
+            f"    {string_literal(pieces[-1])};",
+            "",
+        ]
+
+    def _number(self, item: Communication) -> str:
+        return str(list(self.layout.communications).index(item.name))
+
+    def _request_event(self, item: Communication) -> str:
+        if item.kind is CommunicationKind.OUTGOING_MESSAGE:
+            return "-1"
+        return self.layout.events[item.event(EventKind.REQUEST)]
+
+    def _nameables(self, name: str, items: list[tuple[Communication, str]]) -> list[str]:
+        rows = [f"{{{string_literal(i.name)}, {string_literal(i.identifier)}, {number}}}," for i, number in items]
+        return [f"inline const std::vector<Nameable> {name} = {{", *indent(rows), "};", ""]
+
+    # State.
+
+    def _put_state(self) -> list[str]:
+        layout = self.layout
+        lines = ["[[maybe_unused]] const bool is_text = as_text;", "out += '{';"]
+        for place, (component, behaviour) in enumerate(layout.behaviours):
+            names = ", ".join(string_literal(state.name) for state in behaviour.states)
+            start = ("," if place else "") + json.dumps(component) + ':{"state":'
+            lines += [
+                "{",
+                f"    static const char* const names[] = {{{names}}};",
+                f"    out += {string_literal(start)};",
+                f"    put_json(out, names[state.{layout.locations[component]}]);",
+                f"    out += {string_literal(',"variables":{')};",
+            ]
+            for position, variable in enumerate(behaviour.variables):
+                member, type_ = layout.variables[component, variable.name]
+                key = ("," if position else "") + json.dumps(variable.name) + ":"
+                lines.append(f"    out += {string_literal(key)};")
+                lines += indent(self._put_variable(f"state.{member}", type_))
+            lines += ['    out += "}}";', "}"]
+        return _function(
+            "inline void put_state("
+            f"std::string& out, [[maybe_unused]] const {layout.prefix}_state_t& state, bool as_text)",
+            [*lines, "out += '}';"],
+            comment("The state as JSON; with values as the model writes them, in quotes, for /state."),
+        )
+
+    def _put_variable(self, place: str, type_: Type) -> list[str]:
+        if isinstance(type_, EnumType):
+            names = ", ".join(string_literal(value) for value in type_.values)
+            return [
+                "{",
+                f"    static const char* const values[] = {{{names}}};",
+                f"    put_json(out, values[{place}]);",
+                "}",
+            ]
+        if isinstance(type_, StringType):
+            return [f"put_json(out, {place});"]
+        return [f"put_value(out, {place}, is_text);"]
+
+    def _put_taken(self) -> list[str]:
+        layout = self.layout
+        places = {name: [state.name for state in behaviour.states] for name, behaviour in layout.behaviours}
+        cases: list[str] = []
+        for event, parts in state_topic(layout.model).transitions.items():
+            if event not in layout.events:
+                continue
+            cases.append(f"case {layout.events[event]}:")
+            for component, by_state in parts:
+                numbers = ", ".join(str(by_state.get(state, -1)) for state in places[component])
+                cases += [
+                    "    {",
+                    f"        static const int numbers[] = {{{numbers}}};",
+                    f"        put_transition(out, numbers[before.{layout.locations[component]}]);",
+                    "    }",
+                ]
+            cases.append("    break;")
+        return _function(
+            "inline void put_taken([[maybe_unused]] std::vector<int>& out, int event, "
+            f"[[maybe_unused]] const {layout.prefix}_state_t& before)",
+            ["switch (event) {", *cases, "default:", "    break;", "}"],
+            comment("The numbers of the transitions that an event takes."),
+        )
+
+    # Requests.
+
+    def _put_request(self) -> list[str]:
+        cases: list[str] = []
+        for item in self.layout.requests:
+            found = request_field(self.unit, item)
+            if found is not None:
+                place = f"request.data.{self.layout.request_members[item.name]}"
+                cases += [f"case {self.layout.communications[item.name]}:", "    {"]
+                cases += [*indent(self._put_field(found, place), 2), "    }", "    break;"]
+        return _function(
+            f"inline void put_request(std::string& out, const {self.layout.prefix}_request_t& request)",
+            ["switch (request.communication) {", *cases, "default:", '    out += "null";', "    break;", "}"],
+            comment("The data of a request as JSON."),
+        )
+
+    def _put_field(self, found: Field, place: str) -> list[str]:
+        if not isinstance(found.type, ObjectType):
+            return [f"if ({place}.{found.flag}) {{", f"    put_json(out, {place}.{found.value});", "} else {",
+                    '    out += "null";', "}"]  # fmt: skip
+        lines = ['out += "{";', '[[maybe_unused]] const char* between = "";']
+        for name, (member, part) in found.parts.items():
+            key = json.dumps(name) + ":"
+            put = [f"out += std::string(between) + {string_literal(key)};", 'between = ",";']
+            if isinstance(part.type, ObjectType):
+                lines += ["{", *indent(put)]
+                lines += ["    {", *indent(self._put_field(part, f"{place}.{member}"), 2), "    }", "}"]
+            else:
+                lines += [
+                    f"if ({place}.{part.flag}) {{",
+                    *indent([*put, f"put_json(out, {place}.{member});"]),
+                    "}",
+                ]
+        return [*lines, 'out += "}";']
+
+    def _fill(self, item: Communication) -> list[str]:
+        found = request_field(self.unit, item)
+        declared = item.request or NoneType()
+        place = f"request.data.{self.layout.request_members[item.name]}"
+        lines = self._checks(declared, "message", ())
+        if found is not None:
+            lines += self._assignments(found, place, ())
+        return _function(
+            f"template <class M>\nvoid {fill_name(self.layout, item)}("
+            f"[[maybe_unused]] const {self.layout.prefix}_request_t& request, [[maybe_unused]] M& message)",
+            lines,
+            comment(f"The message of the request of {item.name}."),
+        )
+
+    def _checks(self, type_: Type, place: str, path: tuple[str, ...]) -> list[str]:
+        """That the message has every field that the model declares, of a fitting type."""
+        if isinstance(type_, NoneType):
+            return []
+        if not path and not isinstance(type_, ObjectType):
+            place = "basic_field(message)"
+        match type_:
+            case ObjectType(name=name):
+                lines = []
+                for part in self.layout.model.object(name).properties:
+                    require_field_name(part.name)
+                    lines += self._checks(part.type, f"{place}.{part.name}", (*path, part.name))
+                return lines
+            case ArrayType():
+                return [f"(void){place}.size();"]
+            case _:
+                return [f"require_{_KINDS[type(type_)]}({place});"]
+
+    def _assignments(self, found: Field, place: str, path: tuple[str, ...]) -> list[str]:
+        if isinstance(found.type, ObjectType):
+            lines = []
+            for name, (member, part) in found.parts.items():
+                if isinstance(part.type, ObjectType):
+                    lines += self._assignments(part, f"{place}.{member}", (*path, name))
+                else:
+                    lines += self._assignment(part, place, member, (*path, name))
+            return lines
+        return self._assignment(found, place, found.value, path)
+
+    def _assignment(self, found: Field, place: str, member: str, path: tuple[str, ...]) -> list[str]:
+        target = ".".join(("message", *path)) if path else "basic_field(message)"
+        where = string_literal(".".join(path) or "data")
+        kind = _KINDS[type(found.type)]
+        return [
+            f"if ({place}.{found.flag}) {{",
+            f"    assign_{kind}({target}, {place}.{member}, {where});",
+            "}",
+        ]
+
+    # Received.
+
+    def _type_number(self, type_: Type) -> int:
+        """The number of the functions for an object or an array; they are written on first use."""
+        layout = self.layout
+        key = layout.raw(type_)
+        if key in self._types:
+            return self._types[key]
+        reads, puts = self._object(type_) if isinstance(type_, ObjectType) else self._array_parts(type_)
+        number = self._types[key] = len(self._types) + 1
+        self._functions += _function(
+            f"inline void put_received_{number}(std::string& out, [[maybe_unused]] const {key}& data)", puts, []
+        )
+        self._functions += _function(
+            f"template <class M>\nvoid read_{number}([[maybe_unused]] const M& message, [[maybe_unused]] {key}& data, "
+            "[[maybe_unused]] Arena& arena)",
+            reads,
+            [],
+        )
+        return number
+
+    def _object(self, type_: ObjectType) -> tuple[list[str], list[str]]:
+        reads, puts = [], ['out += "{";']
+        for part in self.layout.model.object(type_.name).properties:
+            if isinstance(part.type, NoneType):
+                continue
+            require_field_name(part.name)
+            member = self.layout.properties[type_.name, part.name]
+            inner = self.layout.source(part.type)
+            reads.append(self._read(inner, f"message.{part.name}", f"data.{member}"))
+            key = ("," if len(puts) > 1 else "") + json.dumps(part.name) + ":"
+            puts += [f"out += {string_literal(key)};", self._put(inner, f"data.{member}")]
+        return reads, [*puts, 'out += "}";']
+
+    def _array_parts(self, type_: Type) -> tuple[list[str], list[str]]:
+        if not isinstance(type_, ArrayType):
+            raise TypeError(type_)
+        element = self.layout.source(type_.element)
+        raw = self.layout.raw(element)
+        reads = [
+            f"auto* const items = arena.take<{raw}>(message.size());",
+            "for (std::size_t k = 0; k < message.size(); k++) {",
+            "    const auto& item = message[k];",
+            f"    {self._read(element, 'item', 'items[k]')}",
+            "}",
+            "data.items = items;",
+            "data.length = message.size();",
+        ]
+        puts = [
+            'out += "[";',
+            "for (std::size_t k = 0; k < data.length; k++) {",
+            '    out += k > 0 ? "," : "";',
+            f"    {self._put(element, 'data.items[k]')}",
+            "}",
+            'out += "]";',
+        ]
+        return reads, puts
+
+    def _read(self, type_: Type, place: str, target: str) -> str:
+        if isinstance(type_, ObjectType | ArrayType):
+            return f"read_{self._type_number(type_)}({place}, {target}, arena);"
+        return f"read_{_KINDS[type(type_)]}({place}, {target});"
+
+    def _put(self, type_: Type, place: str) -> str:
+        if isinstance(type_, ObjectType | ArrayType):
+            return f"put_received_{self._type_number(type_)}(out, {place});"
+        return f"put_json(out, {place});"
+
+    def _datum(self, type_: Type, name: str) -> list[str]:
+        """Statements that declare a local datum and read it from `message`."""
+        source = self.layout.source(type_)
+        place = "message" if isinstance(source, ObjectType) else "basic_field(message)"
+        return [f"{self.layout.raw(source)} {name}{{}};", self._read(source, place, name)]
+
+    def _note(self, event: str, type_: Type, name: str) -> list[str]:
+        return [
+            "if (notes.is_active) {",
+            "    std::string out;",
+            f"    {self._put(self.layout.source(type_), name)}",
+            f"    notes.note({self.layout.events[event]}, std::move(out));",
+            "}",
+        ]
+
+    def _argument(self, type_: Type, name: str) -> str:
+        return f", &{name}" if self.layout.is_by_pointer(type_) else f", {name}"
+
+    def _receive(self, number: int, identifier: str) -> list[str]:
+        layout = self.layout
+        lines = ["[[maybe_unused]] Arena arena;"]
+        names = batch_parameters(layout, identifier)
+        arguments: dict[str, str] = {}
+        notes: list[str] = []
+        for item in batch(layout, identifier):
+            event = item.event(EventKind.RESPONSE)
+            type_ = event_data(layout.model, event)
+            if type_ is None:
+                continue
+            raw = layout.raw(type_)
+            if raw not in arguments:
+                arguments[raw] = self._argument(type_, names[raw])
+                lines += self._datum(type_, names[raw])
+            notes += self._note(event, type_, names[raw])
+        call = f"{layout.function('receive', identifier)}(robot, now{''.join(arguments.values())});"
+        return _function(
+            f"template <class M>\nvoid receive_{number}({layout.prefix}_t* robot, std::uint64_t now, "
+            "[[maybe_unused]] const M& message, [[maybe_unused]] Notes& notes)",
+            [*lines, *notes, call],
+            comment(f"A message came on {identifier}."),
+        )
+
+    def _take(self, event: str) -> list[str]:
+        layout = self.layout
+        name, _, kind = event.rpartition(".")
+        is_action = layout.model.communication(name).kind is CommunicationKind.ACTION
+        purpose = "feedback" if kind == "feedback" else "succeeded" if is_action else "reply"
+        type_ = event_data(layout.model, event)
+        lines = ["[[maybe_unused]] Arena arena;"]
+        argument = ""
+        if type_ is not None:
+            lines += [*self._datum(type_, "data"), *self._note(event, type_, "data")]
+            argument = self._argument(type_, "data")
+        lines.append(f"{layout.function(purpose, name)}(robot, now, id{argument});")
+        return _function(
+            f"template <class M>\nvoid {take_name(layout, event)}({layout.prefix}_t* robot, std::uint64_t now, "
+            "std::uint32_t id, [[maybe_unused]] const M& message, [[maybe_unused]] Notes& notes)",
+            lines,
+            comment(f"What came: {event}."),
+        )
+
+
+def received_topics(layout: Layout) -> tuple[str, ...]:
+    """Identifiers of outgoing messages, in source order: their numbers in the generated code."""
+    return tuple(layout.received_topics)
+
+
+def answers_of(item: Communication) -> Iterator[str]:
+    """The events by which a service or action answers with data."""
+    if item.kind is CommunicationKind.ACTION:
+        yield item.event(EventKind.FEEDBACK)
+    if item.kind in (CommunicationKind.ACTION, CommunicationKind.SERVICE):
+        yield item.event(EventKind.RESPONSE)
+
+
+def fill_name(layout: Layout, item: Communication) -> str:
+    """The function that fills the message of a request."""
+    return f"fill_{list(layout.communications).index(item.name)}"
+
+
+def take_name(layout: Layout, event: str) -> str:
+    """The function that takes an answer."""
+    return f"take_{list(layout.events).index(event)}"
+
+
+def _array(head: str, items: Iterable[str]) -> list[str]:
+    rows = [f"{item}," for item in items] or ["{},"]
+    return [f"inline {head}[] = {{", *indent(rows), "};", ""]
+
+
+def _function(head: str, body: list[str], words: list[str]) -> list[str]:
+    return [*words, *head.splitlines(), "{", *indent(body), "}", ""]
+
+
+_TOP = """\
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "engine.h"
+#include "runtime/json.hpp"
+#include "runtime/notes.hpp"
+#include "runtime/parameters.hpp"
+#include "runtime/values.hpp"
+
+namespace robosc {
+
+namespace model {
+
+inline void put_transition(std::vector<int>& taken, int number)
+{
+    if (number >= 0) {
+        taken.push_back(number);
+    }
+}
+"""
+
+_BOTTOM = ["}  // namespace model", "", "}  // namespace robosc"]

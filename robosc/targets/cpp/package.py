@@ -1,0 +1,258 @@
+"""The files that every C++ package has, and what the templates of a package speak of."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import resources
+
+import jinja2
+
+from robosc._version import __version__
+from robosc.errors import UnsupportedModelError
+from robosc.model.structure import Communication, CommunicationKind, Deployment, EventKind, Interface
+from robosc.supervisor.structure import Supervisor
+from robosc.targets.c99.header import head, with_prefix
+from robosc.targets.c99.package import generate as generate_c
+from robosc.targets.c99.text import safe, string_literal
+from robosc.targets.c99.unit import Unit, make_unit
+from robosc.targets.cpp.model import Writer, fill_name, received_topics, take_name
+from robosc.targets.cpp.naming import require_package_name
+from robosc.targets.files import GeneratedFiles
+from robosc.targets.python.package import package_name
+from robosc.targets.python.text import printable
+from robosc.targets.registry import GenerateOptions
+from robosc.targets.ros.package import chosen, packages, release_identifiers, require_own_names, told_by
+from robosc.targets.ros.runtime.parameters import Parameter, declarations
+from robosc.targets.ros.topics import Topic, servers, shapes_of, topics
+from robosc.targets.words import requirement_text
+
+_RUNTIME = (
+    "controller.hpp",
+    "event_log.hpp",
+    "health.hpp",
+    "json.hpp",
+    "notes.hpp",
+    "parameters.hpp",
+    "run.hpp",
+    "scans.hpp",
+    "signals.hpp",
+    "values.hpp",
+)
+_DIAGNOSTICS = Interface("DiagnosticArray", "diagnostic_msgs")
+_OWN_TYPES = (_DIAGNOSTICS, Interface("String", "std_msgs"))
+
+
+@dataclass(frozen=True, slots=True)
+class Middleware:
+    """What a target says about its middleware.
+
+    Attributes:
+        target: Name of the target.
+        include: The file to include for a type, by its kind (`msg`, `srv`, `action`).
+        type_name: The C++ class of a type, by its kind; that of a part of a service or an action by the part's name.
+        runtime: Its own headers, in the package `runtime` of the module `module`.
+        module: The Python package that has its runtime and its templates.
+        templates: Path of each file from a template: the template's name.
+        without: Parameters that nodes of this middleware have in another way, or not at all.
+    """
+
+    target: str
+    include: Callable[[str, Interface], str]
+    type_name: Callable[[str, Interface], str]
+    runtime: tuple[str, ...]
+    module: str
+    templates: dict[str, str]
+    without: frozenset[str]
+
+
+def generate_package(supervisor: Supervisor, options: GenerateOptions, middleware: Middleware) -> GeneratedFiles:
+    """The files of a package.
+
+    Raises:
+        UnsupportedModelError: The model is outside what the target handles.
+    """
+    name = package_name(supervisor, options, "controller")
+    with told_by(middleware.target):
+        return _generate(supervisor, name, options, middleware)
+
+
+def _generate(supervisor: Supervisor, name: str, options: GenerateOptions, middleware: Middleware) -> GeneratedFiles:
+    if supervisor.deployment is not Deployment.CONTROLLER:
+        raise UnsupportedModelError(
+            f"the supervisor of {supervisor.model.name} was made for the deployment '{supervisor.deployment}', and "
+            "this version generates controllers only"
+        )
+    found, asked = topics(supervisor.model), servers(supervisor.model)
+    require_own_names(name, found, asked)
+    for package in sorted(packages(found, asked)):
+        require_package_name(package)
+    for item in supervisor.model.communications:
+        shapes_of(supervisor.model, item)
+    engine = _engine(supervisor)
+    prefix = next(path.removesuffix(".h") for path in engine if path.endswith(".h"))
+    unit = make_unit(supervisor, prefix)
+    top = head(supervisor)
+    files = {f"src/{prefix}{ending}": engine[f"{prefix}{ending}"] for ending in (".h", ".c")}
+    files["src/engine.h"] = f'{top}\n#include "{prefix}.h"\n'
+    files["src/model.hpp"] = f"{top}\n{Writer(unit, name).text()}"
+    for module, headers in (("robosc.targets.cpp", _RUNTIME), (middleware.module, middleware.runtime)):
+        for path in headers:
+            text = resources.files(f"{module}.runtime").joinpath(path).read_text(encoding="utf-8")
+            files[f"src/runtime/{path}"] = f"{top}\n{with_prefix(unit.layout, text)}"
+    environment = _environment(middleware.module)
+    context = _context(supervisor, unit, name, found, asked, options, middleware)
+    for path, template in middleware.templates.items():
+        files[path.format(package=name)] = environment.get_template(template).render(context)
+    return GeneratedFiles(files)
+
+
+def _engine(supervisor: Supervisor) -> GeneratedFiles:
+    try:
+        return generate_c(supervisor, GenerateOptions())
+    except UnsupportedModelError as error:
+        # What refuses the model is the target that this one is built on.
+        raise UnsupportedModelError(str(error).replace("the target c99", "it")) from error
+
+
+def _context(
+    supervisor: Supervisor,
+    unit: Unit,
+    package: str,
+    found: tuple[Topic, ...],
+    asked: tuple[Communication, ...],
+    options: GenerateOptions,
+    middleware: Middleware,
+) -> dict[str, object]:
+    """What the templates speak of."""
+    model, layout = supervisor.model, unit.layout
+    released = release_identifiers(found)
+    types = [("msg", topic.interface) for topic in found]
+    types += [(_kind(item), item.interface) for item in asked if item.interface]
+
+    def without(parameters: tuple[Parameter, ...]) -> list[Parameter]:
+        return [item for item in parameters if item.name not in middleware.without]
+
+    numbers = {identifier: number for number, identifier in enumerate(received_topics(layout))}
+    return {
+        "version": __version__,
+        "model": model.name,
+        "package": package,
+        "prefix": layout.prefix,
+        "upper": layout.upper,
+        "digest": supervisor.certificate.bundle_sha256,
+        "top": head(supervisor),
+        "hash_top": head(supervisor, "# ", "# ", ""),
+        "certificate": {
+            field: printable(str(getattr(supervisor.certificate, field)))
+            for field in ("safe", "controllable", "nonblocking", "maximally_permissive", "method", "states")
+        },
+        "requirements": [printable(requirement_text(item)) for item in model.requirements],
+        "includes": sorted({middleware.include(kind, type_) for kind, type_ in (*types, *_own_types())}),
+        "packages": sorted({type_.package for _, type_ in (*types, *_own_types())}),
+        "has_actions": any(item.kind is CommunicationKind.ACTION for item in asked),
+        "has_services": any(item.kind is CommunicationKind.SERVICE for item in asked),
+        "topics": [_topic(unit, topic, numbers, middleware) for topic in found],
+        "servers": [_server(unit, number, item, middleware) for number, item in enumerate(asked)],
+        "topic_table": found,
+        "server_table": asked,
+        "parameters": without(declarations(released)),
+        "chosen": without(chosen(declarations(released), options)),
+    }
+
+
+def _own_types() -> list[tuple[str, Interface]]:
+    return [("msg", type_) for type_ in _OWN_TYPES]
+
+
+def _kind(item: Communication) -> str:
+    return "action" if item.kind is CommunicationKind.ACTION else "srv"
+
+
+def _topic(unit: Unit, topic: Topic, numbers: dict[str, int], middleware: Middleware) -> dict[str, object]:
+    layout = unit.layout
+    is_scan = topic.interface == Interface("LaserScan", "sensor_msgs")
+    return {
+        "type": middleware.type_name("msg", topic.interface),
+        "literal": string_literal(topic.identifier),
+        "sent": layout.topics.get(topic.identifier),
+        "received": numbers.get(topic.identifier) if topic.received else None,
+        "publisher": topic.publisher_quality,
+        "subscription": topic.subscription_quality,
+        "is_scan": is_scan,
+        # The message that stops a robot is stamped like the ones that move it.
+        "frame": next((string_literal(frame) for frame in topic.frames.values()), None),
+        "messages": [
+            {
+                "enumerator": layout.communications[item.name],
+                "fill": fill_name(layout, item),
+                "frame": None if item.frame is None else string_literal(item.frame),
+            }
+            for item in topic.published
+        ],
+    }
+
+
+def _server(unit: Unit, number: int, item: Communication, middleware: Middleware) -> dict[str, object]:
+    layout, model = unit.layout, unit.layout.model
+    if item.interface is None:
+        raise UnsupportedModelError(f"'{item.name}' needs a link to the type of its {item.kind}")
+    is_action = item.kind is CommunicationKind.ACTION
+    fields: list[str] = []
+    if item.frame is not None and item.request is not None and hasattr(item.request, "name"):
+        fields = [f"message.{part.name}" for part in model.object(item.request.name).properties]
+    asked, answered = ("goal", "result") if is_action else ("request", "response")
+    return {
+        "number": number,
+        "is_action": is_action,
+        "type": middleware.type_name(_kind(item), item.interface),
+        "asked": middleware.type_name(asked, item.interface),
+        "answered": middleware.type_name(answered, item.interface),
+        "told": middleware.type_name("feedback", item.interface),
+        "literal": string_literal(item.identifier),
+        "enumerator": layout.communications[item.name],
+        "fill": fill_name(layout, item),
+        "answer": take_name(layout, item.event(EventKind.RESPONSE)),
+        "feedback": take_name(layout, item.event(EventKind.FEEDBACK)) if is_action else None,
+        "frame": None if item.frame is None else string_literal(item.frame),
+        "stamped": fields,
+    }
+
+
+def declaration(parameter: Parameter) -> str:
+    """A parameter as an entry of the C++ table of declarations."""
+    default = parameter.default
+    if isinstance(default, bool):
+        value = f"Value(std::in_place_type<bool>, {str(default).lower()})"
+    elif isinstance(default, int):
+        value = f"Value(std::in_place_type<std::int64_t>, {default})"
+    elif isinstance(default, float):
+        value = f"Value(std::in_place_type<double>, {default!r})"
+    elif isinstance(default, str):
+        value = f"Value(std::in_place_type<std::string>, {string_literal(default)})"
+    else:
+        items = ", ".join(string_literal(item) for item in default)
+        value = f"Value(std::in_place_type<Texts>, Texts{{{items}}})"
+    return f"{{{string_literal(parameter.name)}, {value}, {string_literal(parameter.description)}}},"
+
+
+def _environment(module: str) -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.ChoiceLoader([jinja2.PackageLoader(module), jinja2.PackageLoader("robosc.targets.cpp")]),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        # Escapes what goes into XML; every other value is escaped by a filter or is a checked name.
+        autoescape=jinja2.select_autoescape(enabled_extensions=("xml.j2", "launch.j2")),
+    )
+    filters: dict[str, Callable[..., object]] = {
+        "declaration": declaration,
+        "json": json.dumps,
+        "literal": string_literal,
+        "printable": printable,
+        "safe_comment": safe,
+        "quality": lambda quality: f"{quality[0].replace('_', ' ')}, depth {quality[1]}",
+        "split_lines": str.splitlines,
+    }
+    environment.filters.update(filters)
+    return environment

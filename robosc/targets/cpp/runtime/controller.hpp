@@ -1,0 +1,679 @@
+/* The controller: the supervisor's engine on one side, a middleware on the other. Everything in it runs in one thread;
+   only `Reports` may be filled from others. */
+
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "../model.hpp"
+#include "event_log.hpp"
+#include "health.hpp"
+#include "json.hpp"
+#include "notes.hpp"
+#include "parameters.hpp"
+#include "values.hpp"
+
+namespace robosc {
+
+inline std::uint64_t now_us()
+{
+    using micros = std::chrono::microseconds;
+    const auto now = std::chrono::steady_clock::now().time_since_epoch();
+    return static_cast<std::uint64_t>(std::chrono::duration_cast<micros>(now).count());
+}
+
+/* A server that was not seen for so long is lost. */
+constexpr std::uint64_t LOST_US = 1000000;
+constexpr std::uint64_t CANCEL_WAIT_US = 500000;
+/* How often, at least, it is noticed that time has passed. */
+constexpr std::uint64_t WATCH_US = 50000;
+constexpr std::uint64_t DIAGNOSTICS_US = 1000000;
+
+constexpr int EXIT_OK = 0;
+constexpr int EXIT_FAULT = 1;
+constexpr int EXIT_USAGE = 2;
+
+/* What became of calls and goals, kept until the engine may be told: it must not be called from within itself. */
+class Reports {
+public:
+    using Report = std::function<void(robot_t*, std::uint64_t, Notes&)>;
+
+    void add(Report report)
+    {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        waiting_.push_back(std::move(report));
+    }
+
+    std::deque<Report> take()
+    {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        return std::exchange(waiting_, {});
+    }
+
+private:
+    std::mutex mutex_;
+    std::deque<Report> waiting_;
+};
+
+/* Tells when a server is lost, asked again and again. */
+class Presence {
+public:
+    bool is_lost(bool is_ready, std::uint64_t now)
+    {
+        if (is_ready) {
+            is_missed_ = false;
+            return false;
+        }
+        missed_since_us_ = is_missed_ ? missed_since_us_ : now;
+        is_missed_ = true;
+        return now >= missed_since_us_ + LOST_US;
+    }
+
+    void forget() { is_missed_ = false; }
+
+private:
+    bool is_missed_ = false;
+    std::uint64_t missed_since_us_ = 0;
+};
+
+/* What the controller asks of the middleware. What fails throws. */
+class Middleware {
+public:
+    virtual ~Middleware() = default;
+
+    /* Throws Misfit if the data of a request does not fit its message. */
+    virtual void prepare(const robot_request_t& request) = 0;
+    virtual void publish(const robot_request_t& request) = 0;
+    virtual void publish_default(int topic) = 0;
+    virtual void call(std::uint32_t id, const robot_request_t& request) = 0;
+    virtual void send_goal(std::uint32_t id, const robot_request_t& request) = 0;
+    virtual void cancel_goal(int action, std::uint32_t id) = 0;
+
+    /* Names of services and actions without a server. */
+    virtual Texts missing_servers() = 0;
+    virtual void check_servers(std::uint64_t now) = 0;
+    /* Whether a goal that was told to be lost may be running; ask for the cancel of each. */
+    virtual bool has_abandoned() const = 0;
+    virtual void cancel_abandoned() = 0;
+
+    virtual void tell_state(const std::string& json) = 0;
+    virtual void tell_health(const Health& health) = 0;
+    virtual void info(const std::string& text) = 0;
+    virtual void warn(const std::string& text) = 0;
+    virtual void error(const std::string& text) = 0;
+};
+
+class Controller {
+public:
+    using Take = std::function<void(robot_t*, std::uint64_t, Notes&)>;
+
+    Controller(Middleware& middleware, Reports& reports, const Parameters& parameters)
+        : middleware_(middleware), reports_(reports), parameters_(parameters)
+    {
+        if (!parameters.log_folder.empty()) {
+            try {
+                log_.open(parameters.log_folder, model::PACKAGE);
+            } catch (const LogError& failure) {
+                throw ParameterError(std::string("parameter 'log_folder': ") + failure.what());
+            }
+        }
+        notes_.is_active = log_.is_active();
+        robot_callbacks_t callbacks{};
+        callbacks.context = this;
+        callbacks.publish = on_publish;
+        callbacks.publish_default = on_publish_default;
+        callbacks.call = on_call;
+        callbacks.send_goal = on_send_goal;
+        callbacks.cancel_goal = on_cancel_goal;
+        callbacks.fits = on_fits;
+        callbacks.log = on_log;
+        if (!robot_init(&robot_, &parameters_.settings, &callbacks)) {
+            throw ParameterError("the engine refuses the parameters");
+        }
+        before_ = robot_.state;
+        last_ = robot_.counters;
+        const std::uint64_t now = now_us();
+        period_us_ = std::max<std::uint64_t>(detail::microseconds(parameters.period_s), 1);
+        next_tick_us_ = now + period_us_;
+        next_watch_us_ = now + WATCH_US;
+        next_diagnosis_us_ = now + DIAGNOSTICS_US;
+    }
+
+    Controller(const Controller&) = delete;
+    Controller& operator=(const Controller&) = delete;
+
+    /* Begin as soon as every server is there, or not much later without it. */
+    void start()
+    {
+        start_by_us_ = now_us() + detail::microseconds(parameters_.server_wait_s);
+        is_starting_ = true;
+        start_if_ready();
+    }
+
+    /* A message came on the topic with this number among those received; of each as many are held as its depth. */
+    void receive(int topic, std::size_t depth, Take take)
+    {
+        if (is_held_) {
+            held_.push_back({topic, now_us(), std::move(take)});
+            const auto is_same = [topic](const Held& item) { return item.topic == topic; };
+            if (static_cast<std::size_t>(std::count_if(held_.begin(), held_.end(), is_same)) > depth) {
+                held_.erase(std::find_if(held_.begin(), held_.end(), is_same));
+            }
+            return;
+        }
+        take_in(take);
+        tell_reasons();
+    }
+
+    /* Whatever is due: reports of calls and goals, decisions, time that has passed. */
+    void run_due()
+    {
+        advance();
+        const std::uint64_t now = now_us();
+        if (now >= next_tick_us_) {
+            next_tick_us_ = next_after(next_tick_us_, period_us_, now);
+            tick();
+        }
+        if (now >= next_watch_us_) {
+            next_watch_us_ = next_after(next_watch_us_, WATCH_US, now);
+            watch();
+        }
+        if (now >= next_diagnosis_us_) {
+            next_diagnosis_us_ = next_after(next_diagnosis_us_, DIAGNOSTICS_US, now);
+            tell_health();
+            last_ = robot_.counters;
+            last_dropped_ = log_.dropped();
+        }
+        advance();
+    }
+
+    /* How long nothing will be due, in microseconds; never long, so that signals are noticed. */
+    std::uint64_t idle_us() const
+    {
+        const std::uint64_t now = now_us();
+        const std::uint64_t next = std::min({next_tick_us_, next_watch_us_, next_diagnosis_us_});
+        return next > now ? std::min(next - now, WATCH_US) : 0;
+    }
+
+    /* Why a fault stopped it; NULL if none did. */
+    const std::string* fault() const
+    {
+        for (const auto& [key, reason] : reasons_) {
+            if (key == FAULT_KEY) {
+                return &reason;
+            }
+        }
+        return nullptr;
+    }
+
+    /* Bring the robot to rest: the default message on every release identifier, then the cancel of every goal. */
+    void stop(const std::string& reason, bool is_fault = false)
+    {
+        is_starting_ = false;
+        reason_ = reason;
+        begin();
+        robot_stop(&robot_, now_us(), is_fault);
+        cancel_abandoned();
+        told_ = reasons_;
+        tell_health();
+    }
+
+    /* Whether it is at rest, but the ends of cancelled goals are awaited. */
+    bool is_stopping() const
+    {
+        return robot_status(&robot_, now_us()) == ROBOT_STATUS_STOPPING || middleware_.has_abandoned();
+    }
+
+    /* Tell the engine what became of calls and goals. */
+    void advance()
+    {
+        for (const Take& report : reports_.take()) {
+            take_in(report);
+            tell_reasons();
+        }
+    }
+
+    void close() { log_.close(); }
+
+private:
+    using Reasons = std::vector<std::pair<std::string, std::string>>;
+
+    struct Held {
+        int topic;
+        std::uint64_t came_us;
+        Take take;
+    };
+
+    static constexpr const char* FAULT_KEY = "fault";
+
+    static std::uint64_t next_after(std::uint64_t due, std::uint64_t period, std::uint64_t now)
+    {
+        return due + ((now - due) / period + 1) * period;
+    }
+
+    void begin() { began_us_ = now_us(); }
+
+    void take_in(const Take& take)
+    {
+        begin();
+        /* A message is data of somebody else: whatever goes wrong with it stops the robot, not the process. */
+        try {
+            take(&robot_, began_us_, notes_);
+        } catch (const std::exception& failure) {
+            reason_ = failure.what();
+            robot_stop(&robot_, now_us(), true);
+        }
+        notes_.clear();
+    }
+
+    void start_if_ready()
+    {
+        missing_ = middleware_.missing_servers();
+        if (!missing_.empty() && now_us() < start_by_us_) {
+            return;
+        }
+        is_starting_ = false;
+        if (!missing_.empty()) {
+            middleware_.warn("starting without a server of " + joined(missing_));
+        }
+        missing_.clear();
+        begin();
+        robot_start(&robot_, began_us_);
+        before_ = robot_.state;
+        take_held();
+        tell_reasons();
+    }
+
+    /* What came early: nothing is decided before the last of it, and ages count from when it came. */
+    void take_held()
+    {
+        const bool decides = robot_.settings.decides_after_batch;
+        robot_.settings.decides_after_batch = false;
+        const std::uint64_t started = began_us_;
+        is_held_ = false;
+        for (const Held& item : std::exchange(held_, {})) {
+            take_in(item.take);
+            for (int sensor = 0; sensor < ROBOT_SENSOR_COUNT; sensor++) {
+                if (model::SENSOR_TOPICS[sensor] == item.topic) {
+                    robot_.sensors[sensor].seen_us = std::min(item.came_us, started);
+                }
+            }
+        }
+        robot_.settings.decides_after_batch = decides;
+        /* A sensor whose last message is too old by now is stale already. */
+        begin();
+        robot_.deadline_us = began_us_;
+        robot_watch(&robot_, began_us_);
+    }
+
+    void tick()
+    {
+        const bool decides = robot_status(&robot_, now_us()) == ROBOT_STATUS_RUNNING;
+        begin();
+        robot_tick(&robot_, began_us_);
+        notes_.clear();
+        if (decides) {
+            decision_us_ = static_cast<double>(now_us() - began_us_);
+        }
+        tell_reasons();
+        if (parameters_.publish_state) {
+            guarded("no state", [this] { middleware_.tell_state(state_report()); });
+        }
+    }
+
+    void watch()
+    {
+        if (is_starting_) {
+            start_if_ready();
+        }
+        middleware_.check_servers(now_us());
+        begin();
+        robot_watch(&robot_, began_us_);
+        tell_reasons();
+    }
+
+    /* Say why the robot is stopped, and when it no longer is; on the console a fault is told at the end. */
+    void tell_reasons()
+    {
+        if (reasons_ == told_) {
+            return;
+        }
+        told_ = reasons_;
+        if (!reasons_.empty()) {
+            cancel_abandoned();
+        }
+        tell_health();
+        if (fault() != nullptr) {
+            return;
+        }
+        if (reasons_.empty()) {
+            middleware_.info("no longer stopped");
+        } else {
+            middleware_.error("stopped: " + reasons_text());
+        }
+    }
+
+    /* The engine knows nothing any more of goals that were told to be lost, but they may be running. */
+    void cancel_abandoned()
+    {
+        guarded("no cancel of a lost goal", [this] { middleware_.cancel_abandoned(); });
+    }
+
+    /* What must not stop the controller. */
+    template <class Action>
+    void guarded(const char* what, const Action& action)
+    {
+        try {
+            action();
+        } catch (const std::exception& failure) {
+            middleware_.warn(std::string(what) + ": " + failure.what());
+        }
+    }
+
+    static std::string joined(const Texts& texts)
+    {
+        std::string result;
+        for (const std::string& text : texts) {
+            result += (result.empty() ? "" : ", ") + text;
+        }
+        return result;
+    }
+
+    std::string reasons_text() const
+    {
+        std::string result;
+        for (const auto& [key, reason] : reasons_) {
+            result += (result.empty() ? "" : "; ") + reason;
+        }
+        return result;
+    }
+
+    void add_reason(const std::string& key, const std::string& reason)
+    {
+        for (const auto& item : reasons_) {
+            if (item.first == key) {
+                return;
+            }
+        }
+        reasons_.emplace_back(key, reason);
+    }
+
+    /* Health. */
+
+    void tell_health()
+    {
+        guarded("no diagnostics", [this] { middleware_.tell_health(health()); });
+    }
+
+    Health health() const
+    {
+        static const char* const STATUSES[] = {"new", "waiting", "running", "stopping", "stopped"};
+        Health result;
+        const robot_status_t status = robot_status(&robot_, now_us());
+        const std::uint64_t dropped = log_.dropped();
+        result.values = {
+            {"status", STATUSES[status]},
+            {"reason", reasons_text()},
+            {"unknown", std::to_string(robot_.counters.unknown)},
+            {"unexpected", std::to_string(robot_.counters.unexpected)},
+            {"faults", std::to_string(robot_.counters.faults)},
+            {"dropped", std::to_string(dropped)},
+            {"last decision (us)", decision_us_ < 0.0 ? "" : number_text(decision_us_)},
+        };
+        std::string news;
+        const auto add_news = [&news](std::uint64_t count, const char* what) {
+            if (count > 0) {
+                news += (news.empty() ? "" : ", ") + std::to_string(count) + " " + what;
+            }
+        };
+        add_news(robot_.counters.unknown - last_.unknown, "unknown");
+        add_news(robot_.counters.unexpected - last_.unexpected, "unexpected");
+        add_news(robot_.counters.faults - last_.faults, "faults");
+        add_news(dropped - last_dropped_, "dropped");
+        result.level = Level::WARN;
+        if (!reasons_.empty()) {
+            result.level = Level::FAULTY;
+            result.message = "stopped: " + reasons_text();
+        } else if (status == ROBOT_STATUS_NEW) {
+            result.message = missing_.empty() ? "not started" : "waiting for servers: " + joined(missing_);
+        } else if (status == ROBOT_STATUS_WAITING) {
+            result.message = "waiting for the first message of every sensor with a maximum age";
+        } else if (!news.empty()) {
+            result.message = "since the last report: " + news;
+        } else {
+            result.level = Level::OK;
+            result.message = "running";
+        }
+        return result;
+    }
+
+    /* The text for /state; the transitions are those since the last report. */
+    std::string state_report()
+    {
+        std::string text = "{\"current\": ";
+        model::put_state(text, robot_.state, true);
+        text += ", \"transitions\": [";
+        for (std::size_t k = 0; k < transitions_.size(); k++) {
+            text += (k > 0 ? ", " : "") + std::to_string(transitions_[k]);
+        }
+        transitions_.clear();
+        return text + "], \"definition\": " + model::DEFINITION + "}";
+    }
+
+    /* What the engine asks for. */
+
+    static Controller& self(void* context) { return *static_cast<Controller*>(context); }
+
+    template <class Action>
+    static bool attempted(void* context, const Action& action)
+    {
+        Controller& controller = self(context);
+        try {
+            action(controller.middleware_);
+            return true;
+        } catch (const std::exception& failure) {
+            controller.failure_ = failure.what();
+        } catch (...) {
+            controller.failure_ = "something was thrown that is no exception";
+        }
+        return false;
+    }
+
+    static bool on_publish(void* context, const robot_request_t* request)
+    {
+        return attempted(context, [&](Middleware& middleware) { middleware.publish(*request); });
+    }
+
+    static bool on_publish_default(void* context, robot_topic_t topic)
+    {
+        return attempted(context, [&](Middleware& middleware) { middleware.publish_default(static_cast<int>(topic)); });
+    }
+
+    static bool on_call(void* context, std::uint32_t id, const robot_request_t* request)
+    {
+        return attempted(context, [&](Middleware& middleware) { middleware.call(id, *request); });
+    }
+
+    static bool on_send_goal(void* context, std::uint32_t id, const robot_request_t* request)
+    {
+        return attempted(context, [&](Middleware& middleware) { middleware.send_goal(id, *request); });
+    }
+
+    static bool on_cancel_goal(void* context, robot_communication_t action, std::uint32_t id)
+    {
+        return attempted(
+            context, [&](Middleware& middleware) { middleware.cancel_goal(static_cast<int>(action), id); });
+    }
+
+    static bool on_fits(void* context, const robot_request_t* request)
+    {
+        Controller& controller = self(context);
+        controller.failure_.clear();
+        const int event = model::REQUEST_EVENTS[request->communication];
+        const bool fits = attempted(context, [&](Middleware& middleware) { middleware.prepare(*request); });
+        if (fits && controller.notes_.is_active) {
+            std::string text;
+            model::put_request(text, *request);
+            controller.notes_.note(event, std::move(text));
+        }
+        return fits;
+    }
+
+    static void on_log(void* context, robot_log_t kind, int what)
+    {
+        /* Whatever happens here, it must not pass through C. */
+        try {
+            self(context).log(kind, what);
+        } catch (const std::exception&) {
+            return;
+        }
+    }
+
+    void log(robot_log_t kind, int what)
+    {
+        std::string rest;
+        switch (kind) {
+        case ROBOT_LOG_EVENT:
+            happened(what);
+            return;
+        case ROBOT_LOG_UNEXPECTED:
+            if (what == ROBOT_NO_EVENT) {
+                write("unexpected", "what", "an answer to no request");
+            } else {
+                write("unexpected", "event", robot_event_name(what));
+            }
+            return;
+        case ROBOT_LOG_UNKNOWN:
+            rest = failure_.empty() ? "part of the data or of an update" : failure_;
+            failure_.clear();
+            if (log_.is_active()) {
+                std::string line = head("unknown");
+                line += ",\"event\":";
+                put_json(line, robot_event_name(what));
+                line += ",\"unknown\":[";
+                put_json(line, rest);
+                log_.write(line + "]}");
+            }
+            return;
+        case ROBOT_LOG_RELEASE:
+            write("release", "identifier", robot_topic_name(what));
+            return;
+        case ROBOT_LOG_FAULT:
+            rest = fault_text(static_cast<robot_fault_t>(what));
+            add_reason(FAULT_KEY, rest);
+            write("fault", "what", rest);
+            return;
+        case ROBOT_LOG_STOP:
+            rest = what < 0 ? reason_
+                            : std::string(robot_communication_name(what)) + " on " + model::IDENTIFIERS[what]
+                    + " is stale";
+            add_reason(what < 0 ? "stop" : stale_key(what), rest);
+            write("stop", "what", rest);
+            return;
+        case ROBOT_LOG_RESUME:
+            reasons_.erase(std::remove_if(reasons_.begin(), reasons_.end(),
+                               [&](const auto& item) { return item.first == stale_key(what); }),
+                reasons_.end());
+            write("resume", "what", std::string(robot_communication_name(what)) + " is back");
+            return;
+        case ROBOT_LOG_RESTART:
+            reasons_.clear();
+            write("restart", "what", "");
+            return;
+        }
+    }
+
+    static std::string stale_key(int communication) { return "stale " + std::to_string(communication); }
+
+    std::string fault_text(robot_fault_t fault)
+    {
+        switch (fault) {
+        case ROBOT_FAULT_CALLBACK:
+            return failure_.empty() ? "the middleware failed" : std::exchange(failure_, {});
+        case ROBOT_FAULT_ENDLESS:
+            return "resets, cancels and tau transitions do not end";
+        case ROBOT_FAULT_UNKNOWN:
+            return "something was unknown";
+        case ROBOT_FAULT_REFUSED:
+            return "an event is enabled, but the state does not accept it";
+        case ROBOT_FAULT_CANCEL_REFUSED:
+            return "the cancel of a running goal was refused";
+        default:
+            return reason_;
+        }
+    }
+
+    void happened(int event)
+    {
+        if (parameters_.publish_state) {
+            model::put_taken(transitions_, event, before_);
+        }
+        before_ = robot_.state;
+        if (!log_.is_active()) {
+            return;
+        }
+        std::string line = head("event");
+        line += ",\"event\":";
+        put_json(line, robot_event_name(event));
+        line += ",\"controllable\":";
+        put_json(line, model::IS_CONTROLLABLE[event]);
+        line += ",\"data\":";
+        line += notes_.of(event).empty() ? "null" : notes_.of(event);
+        line += ",\"state\":";
+        model::put_state(line, robot_.state, false);
+        line += ",\"decision_us\":" + number_text(static_cast<double>(now_us() - began_us_)) + "}";
+        log_.write(std::move(line));
+    }
+
+    static std::string head(const char* kind)
+    {
+        return "{\"time\":" + number_text(wall_s()) + ",\"kind\":\"" + kind + "\"";
+    }
+
+    void write(const char* kind, const char* key, const std::string& text)
+    {
+        if (log_.is_active()) {
+            std::string line = head(kind) + ",\"" + key + "\":";
+            put_json(line, text);
+            log_.write(line + "}");
+        }
+    }
+
+    Middleware& middleware_;
+    Reports& reports_;
+    Parameters parameters_;
+    EventLog log_;
+    Notes notes_;
+    robot_t robot_{};
+    robot_state_t before_{};
+    robot_counters_t last_{};
+    std::uint64_t last_dropped_ = 0;
+    std::vector<int> transitions_;
+    Reasons reasons_;
+    Reasons told_;
+    std::string reason_;
+    std::string failure_;
+    Texts missing_;
+    std::deque<Held> held_;
+    bool is_held_ = true;
+    bool is_starting_ = false;
+    std::uint64_t start_by_us_ = 0;
+    std::uint64_t began_us_ = 0;
+    std::uint64_t period_us_ = 1;
+    std::uint64_t next_tick_us_ = 0;
+    std::uint64_t next_watch_us_ = 0;
+    std::uint64_t next_diagnosis_us_ = 0;
+    double decision_us_ = -1.0;
+};
+
+}  // namespace robosc

@@ -1,0 +1,56 @@
+/* The life of a node, whatever the middleware: its loop, its orderly end, its exit status. */
+
+#pragma once
+
+#include <iostream>
+#include <string>
+
+#include "controller.hpp"
+#include "signals.hpp"
+
+namespace robosc {
+
+inline void complain(const std::string& text)
+{
+    std::string line;
+    for (const char one : text) {
+        line += one == '\n' || one == '\r' ? ' ' : one;
+    }
+    std::cerr << model::PACKAGE << ": " << line << std::endl;
+}
+
+/* Run until a signal, a fault or `is_over`, then stop the robot: the exit status. `spin` handles what comes, for at
+   most so many microseconds; `deliver` gives what was sent last time to arrive. */
+template <class Spin, class IsOver, class Deliver>
+int run(Controller& controller, const Spin& spin, const IsOver& is_over, const Deliver& deliver)
+{
+    try {
+        controller.start();
+        while (signal_name() == nullptr && controller.fault() == nullptr && !is_over()) {
+            spin(controller.idle_us());
+            controller.run_due();
+        }
+        /* Once more after a fault: whoever missed the first zero gets this one. */
+        controller.stop(controller.fault() != nullptr ? "fault" : signal_name() != nullptr ? signal_name() : "shutdown");
+    } catch (const std::exception& failure) {
+        controller.stop(failure.what(), true);
+    }
+    try {
+        const std::uint64_t limit = now_us() + CANCEL_WAIT_US;
+        while (controller.is_stopping() && now_us() < limit) {
+            spin(20000);
+            controller.advance();
+        }
+    } catch (const std::exception& failure) {
+        controller.stop(failure.what(), true);
+    }
+    deliver();
+    controller.close();
+    const std::string* fault = controller.fault();
+    if (fault != nullptr) {
+        complain(*fault);
+    }
+    return fault == nullptr ? EXIT_OK : EXIT_FAULT;
+}
+
+}  // namespace robosc

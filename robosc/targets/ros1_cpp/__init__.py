@@ -1,0 +1,12 @@
+"""The target `ros1-cpp`."""
+
+from robosc.targets.registry import GENERAL_ERRORS, Target, TargetInfo
+from robosc.targets.ros1_cpp.package import generate
+
+TARGET = Target(
+    TargetInfo("ros1-cpp", "a complete ROS 1 package (catkin): a roscpp node around the supervisor in C99"),
+    generate,
+    errors=GENERAL_ERRORS | {"invalid-identifier"},
+)
+
+__all__ = ["TARGET"]

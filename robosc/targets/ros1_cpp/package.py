@@ -1,0 +1,50 @@
+"""The target `ros1-cpp`: a catkin package with a roscpp node around the generated supervisor in C99."""
+
+from robosc.model.structure import Interface
+from robosc.supervisor.structure import Supervisor
+from robosc.targets.cpp.package import Middleware, generate_package
+from robosc.targets.files import GeneratedFiles
+from robosc.targets.registry import GenerateOptions
+from robosc.targets.ros.runtime.parameters import USE_SIM_TIME
+
+_ENDINGS = {
+    "action": "Action",
+    "goal": "Goal",
+    "result": "Result",
+    "feedback": "Feedback",
+    "request": "::Request",
+    "response": "::Response",
+}
+"""What stands after a type's name, by kind or part."""
+
+
+def _ended(kind: str, type_: Interface) -> str:
+    return type_.type + _ENDINGS.get(kind, "")
+
+
+_MIDDLEWARE = Middleware(
+    target="ros1-cpp",
+    include=lambda kind, type_: f"{type_.package}/{_ended(kind, type_)}.h",
+    type_name=lambda kind, type_: f"::{type_.package}::{_ended(kind, type_)}",
+    runtime=("ros1.hpp", "ros1_actions.hpp"),
+    module="robosc.targets.ros1_cpp",
+    templates={
+        "CMakeLists.txt": "CMakeLists.txt.j2",
+        "README.md": "README.md.j2",
+        "config/parameters.yaml": "parameters.yaml.j2",
+        "launch/controller.launch": "controller.launch.j2",
+        "package.xml": "package.xml.j2",
+        "src/node.cpp": "node.cpp.j2",
+    },
+    # In ROS 1 it is a parameter of the whole graph, read by the client library.
+    without=frozenset({USE_SIM_TIME}),
+)
+
+
+def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles:
+    """The package's files.
+
+    Raises:
+        UnsupportedModelError: The model has something that this target cannot do.
+    """
+    return generate_package(supervisor, options, _MIDDLEWARE)

@@ -1,0 +1,51 @@
+"""The target `ros2-cpp`: an ament_cmake package with an rclcpp node around the generated supervisor in C99."""
+
+from robosc.model.structure import Interface
+from robosc.supervisor.structure import Supervisor
+from robosc.targets.cpp.naming import file_name
+from robosc.targets.cpp.package import Middleware, generate_package
+from robosc.targets.files import GeneratedFiles
+from robosc.targets.registry import GenerateOptions
+from robosc.targets.ros.runtime.parameters import USE_SIM_TIME
+
+_PARTS = {
+    "goal": ("action", "::Goal"),
+    "result": ("action", "::Result"),
+    "feedback": ("action", "::Feedback"),
+    "request": ("srv", "::Request"),
+    "response": ("srv", "::Response"),
+}
+"""Folder and ending of each part of an action or a service."""
+
+
+def _type_name(kind: str, type_: Interface) -> str:
+    folder, ending = _PARTS.get(kind, (kind, ""))
+    return f"::{type_.package}::{folder}::{type_.type}{ending}"
+
+
+_MIDDLEWARE = Middleware(
+    target="ros2-cpp",
+    include=lambda kind, type_: f"{type_.package}/{kind}/{file_name(type_.type)}.hpp",
+    type_name=_type_name,
+    runtime=("ros2.hpp", "ros2_actions.hpp"),
+    module="robosc.targets.ros2_cpp",
+    templates={
+        "CMakeLists.txt": "CMakeLists.txt.j2",
+        "README.md": "README.md.j2",
+        "config/parameters.yaml": "parameters.yaml.j2",
+        "launch/controller.launch.py": "controller.launch.py.j2",
+        "package.xml": "package.xml.j2",
+        "src/node.cpp": "node.cpp.j2",
+    },
+    # Every ROS 2 node has it by itself.
+    without=frozenset({USE_SIM_TIME}),
+)
+
+
+def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles:
+    """The package's files.
+
+    Raises:
+        UnsupportedModelError: The model has something that this target cannot do.
+    """
+    return generate_package(supervisor, options, _MIDDLEWARE)

@@ -1,0 +1,1 @@
+"""The C++ headers that nodes on rclcpp run on."""

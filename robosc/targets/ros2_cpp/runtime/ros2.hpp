@@ -1,0 +1,177 @@
+/* What the node asks of rclcpp: qualities of service, services without waiting, parameters. */
+
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <rclcpp/rclcpp.hpp>
+
+#include "controller.hpp"
+#include "signals.hpp"
+
+namespace robosc {
+
+/* Calls of one service whose reply is still listened for, so that a late one is noticed. */
+constexpr std::size_t MAXIMUM_PENDING = 16;
+
+enum class Quality { RELIABLE, BEST_EFFORT, LATCHED };
+
+inline rclcpp::QoS profile(Quality quality, std::size_t depth)
+{
+    rclcpp::QoS result{rclcpp::KeepLast(depth)};
+    if (quality == Quality::BEST_EFFORT) {
+        result.best_effort();
+    } else {
+        result.reliable();
+    }
+    if (quality == Quality::LATCHED) {
+        result.transient_local();
+    } else {
+        result.durability_volatile();
+    }
+    return result;
+}
+
+#if ROBOT_SERVICE_COUNT > 0
+/* The calls of one service: nothing waits. */
+template <class Service>
+class ServiceCalls {
+public:
+    using Request = typename Service::Request;
+    using Response = typename Service::Response;
+    using Answer = void (*)(robot_t*, std::uint64_t, std::uint32_t, const Response&, Notes&);
+
+    ServiceCalls(const std::shared_ptr<rclcpp::Node>& node, Reports& reports, const Parameters& parameters,
+        const std::string& name, Answer answer)
+        : reports_(reports)
+        , timeout_us_(parameters.settings.service_timeout_us)
+        , name_(prefixed(parameters.topic_prefix, name))
+        , answer_(answer)
+        , client_(node->create_client<Service>(name_))
+    {
+    }
+
+    const std::string& name() const { return name_; }
+
+    bool is_ready() const { return client_->service_is_ready(); }
+
+    void call(std::uint32_t id, const Request& request)
+    {
+        if (!is_ready()) {
+            fail(id);
+            return;
+        }
+        const auto sent = client_->async_send_request(std::make_shared<Request>(request),
+            [this, id](typename rclcpp::Client<Service>::SharedFuture future) { answered(id, future.get()); });
+        const std::uint64_t now = now_us();
+        const std::uint64_t deadline = timeout_us_ > UINT64_MAX - now ? UINT64_MAX : now + timeout_us_;
+        calls_[id] = {sent.request_id, deadline};
+        if (calls_.size() > MAXIMUM_PENDING) {
+            client_->remove_pending_request(calls_.begin()->second.number);
+            calls_.erase(calls_.begin());
+        }
+    }
+
+    /* Notice a lost server: every call under way has failed. */
+    void check(std::uint64_t now)
+    {
+        if (calls_.empty()) {
+            presence_.forget();
+        } else if (presence_.is_lost(is_ready(), now)) {
+            for (const auto& [id, call] : std::exchange(calls_, {})) {
+                client_->remove_pending_request(call.number);
+                /* What is over by then, the engine has counted as failed. */
+                if (now < call.deadline_us) {
+                    fail(id);
+                }
+            }
+        }
+    }
+
+private:
+    struct Call {
+        std::int64_t number;
+        std::uint64_t deadline_us;
+    };
+
+    void answered(std::uint32_t id, const std::shared_ptr<Response>& response)
+    {
+        calls_.erase(id);
+        reports_.add([answer = answer_, id, response](robot_t* robot, std::uint64_t now, Notes& notes) {
+            answer(robot, now, id, *response, notes);
+        });
+    }
+
+    void fail(std::uint32_t id)
+    {
+        reports_.add([id](robot_t* robot, std::uint64_t now, Notes&) { robot_call_failed(robot, now, id); });
+    }
+
+    Reports& reports_;
+    std::uint64_t timeout_us_;
+    std::string name_;
+    Answer answer_;
+    typename rclcpp::Client<Service>::SharedPtr client_;
+    std::map<std::uint32_t, Call> calls_;
+    Presence presence_;
+};
+#endif
+
+inline Value value_of(const rclcpp::ParameterValue& given)
+{
+    switch (given.get_type()) {
+    case rclcpp::ParameterType::PARAMETER_BOOL:
+        return Value(std::in_place_type<bool>, given.get<bool>());
+    case rclcpp::ParameterType::PARAMETER_INTEGER:
+        return Value(std::in_place_type<std::int64_t>, given.get<std::int64_t>());
+    case rclcpp::ParameterType::PARAMETER_DOUBLE:
+        return Value(std::in_place_type<double>, given.get<double>());
+    case rclcpp::ParameterType::PARAMETER_STRING:
+        return Value(std::in_place_type<std::string>, given.get<std::string>());
+    case rclcpp::ParameterType::PARAMETER_STRING_ARRAY:
+        return Value(std::in_place_type<Texts>, given.get<std::vector<std::string>>());
+    default:
+        return OtherValue{rclcpp::to_string(given)};
+    }
+}
+
+inline rclcpp::ParameterValue ros_value_of(const Value& value)
+{
+    struct Make {
+        rclcpp::ParameterValue operator()(const OtherValue& item) const { return rclcpp::ParameterValue(item.shown); }
+        rclcpp::ParameterValue operator()(bool item) const { return rclcpp::ParameterValue(item); }
+        rclcpp::ParameterValue operator()(std::int64_t item) const { return rclcpp::ParameterValue(item); }
+        rclcpp::ParameterValue operator()(double item) const { return rclcpp::ParameterValue(item); }
+        rclcpp::ParameterValue operator()(const std::string& item) const { return rclcpp::ParameterValue(item); }
+        rclcpp::ParameterValue operator()(const Texts& items) const { return rclcpp::ParameterValue(items); }
+    };
+    return std::visit(Make{}, value);
+}
+
+/* Declare every parameter: the value of each. */
+inline Given given_parameters(rclcpp::Node& node, const std::vector<Declaration>& declarations)
+{
+    Given given;
+    for (const Declaration& item : declarations) {
+        rcl_interfaces::msg::ParameterDescriptor descriptor;
+        descriptor.description = item.description;
+        descriptor.read_only = true;
+        /* A wrong type gets the same kind of error as a wrong value, and 1 is as good as 1.0. */
+        descriptor.dynamic_typing = true;
+        given[item.name] = value_of(node.declare_parameter(item.name, ros_value_of(item.value), descriptor));
+    }
+    /* A misspelt parameter would leave a default in force; one file may serve several nodes, so it is no error. */
+    for (const auto& [name, value] : node.get_node_parameters_interface()->get_parameter_overrides()) {
+        if (!node.has_parameter(name) && name.compare(0, 14, "qos_overrides.") != 0) {
+            RCLCPP_WARN(node.get_logger(), "there is no parameter '%s'", name.c_str());
+        }
+    }
+    return given;
+}
+
+}  // namespace robosc

@@ -1,0 +1,238 @@
+"""The packages of the targets ros1-cpp and ros2-cpp as texts: what they hold, and what is refused."""
+
+import json
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+import yaml  # type: ignore[import-untyped]
+
+from robosc.errors import UnsupportedModelError
+from robosc.model.structure import Deployment
+from robosc.supervisor import make_supervisor
+from robosc.supervisor.structure import Supervisor
+from robosc.targets import generate, write_files
+from robosc.targets.cpp.naming import file_name
+from robosc.targets.ros.runtime.parameters import declarations
+from support.generated import example_supervisor
+from support.launch_stub import launch_actions
+from support.models import bundle_of
+from support.node_logs import entries_of
+from support.rclcpp_nodes import compiled, missing, run, sent
+
+TARGETS = ("ros1-cpp", "ros2-cpp")
+FOLLOWER = "line_follower/line_follower"
+NAVIGATION = "navigation/navigation"
+PACKAGE = "line_follower_controller"
+
+
+def supervisor_of(body: str) -> Supervisor:
+    made = make_supervisor(bundle_of(body))
+    assert made.supervisor is not None, made.reason
+    return made.supervisor
+
+
+def robot(body: str) -> Supervisor:
+    return supervisor_of(f"robot Robot {{ {body} }}")
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("name", [FOLLOWER, "maze_solver/maze_solver", NAVIGATION])
+def test_a_package_is_complete_and_the_same_each_time(target: str, name: str) -> None:
+    files = generate(example_supervisor(name), target)
+    assert generate(example_supervisor(name), target) == files
+    root = ElementTree.fromstring(files["package.xml"])
+    package = root.findtext("name")
+    assert package is not None
+    assert package in files["CMakeLists.txt"]
+    needed = {item.text for item in root.findall("depend")}
+    assert ({"roscpp"} if target == "ros1-cpp" else {"rclcpp"}) | {"diagnostic_msgs", "std_msgs"} <= needed
+    # Whatever is included is a package that is asked for, a file that is there, or of the system.
+    client = {"ros", "boost"} if target == "ros1-cpp" else set()
+    for path, text in files.items():
+        if path.endswith((".cpp", ".hpp", ".c", ".h")):
+            for included in re.findall(r"#include <(\w+)/", text):
+                optional = {"actionlib", "rclcpp_action", "sys"}
+                assert included in needed | client | optional, (path, included)
+            for included in re.findall(r'#include "([^"]+)"', text):
+                there = (Path("/package") / path).parent / included
+                assert str(there.resolve().relative_to("/package")) in files, (path, included)
+            # The runtime's own prefix is the robot's in generated files.
+            assert not re.search(r"\brobot_[a-z]\w*_t\b", text), path
+    dependencies = [name for name in needed if name]
+    assert all(name in files["CMakeLists.txt"] for name in dependencies)
+
+
+def test_the_actions_client_library_is_needed_for_actions_only() -> None:
+    for target, library in (("ros1-cpp", "actionlib"), ("ros2-cpp", "rclcpp_action")):
+        for name, is_needed in ((FOLLOWER, False), (NAVIGATION, True)):
+            files = generate(example_supervisor(name), target)
+            assert (f"<depend>{library}</depend>" in files["package.xml"]) is is_needed
+            assert (library in files["CMakeLists.txt"]) is is_needed
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_parameters_stand_in_file_code_and_readme(target: str) -> None:
+    files = generate(example_supervisor(FOLLOWER), target)
+    given = yaml.safe_load(files["config/parameters.yaml"])
+    values = given if target == "ros1-cpp" else given["/**"]["ros__parameters"]
+    expected = {item.name: item.default for item in declarations(("/cmd_vel",)) if item.name != "use_sim_time"}
+    assert values == expected
+    for name, default in expected.items():
+        assert f"| `{name}` | `{json.dumps(default)}` |" in files["README.md"]
+        assert f'{{"{name}", Value(' in files["src/node.cpp"]
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_the_readme_names_every_topic_and_says_how_far_it_was_tested(target: str) -> None:
+    text = generate(example_supervisor(FOLLOWER), target)["README.md"]
+    for topic in (
+        "/line/correction",
+        "/line/lost",
+        "/scan",
+        "/emergency_stop/stop",
+        "/cmd_vel",
+        "/diagnostics",
+        "/state",
+    ):
+        assert f"| `{topic}` |" in text
+    assert ("were not\nlinked to rclcpp itself" in text) is (target == "ros2-cpp")
+    assert "needs" in text
+    services = generate(example_supervisor(NAVIGATION), target)["README.md"]
+    assert "| `/calibrate` | `std_srvs/" in services
+    assert "| `/navigate_to_pose` | `nav2_msgs/" in services
+
+
+def test_the_launch_files_start_the_node_with_its_parameters(tmp_path: Path) -> None:
+    root = ElementTree.fromstring(generate(example_supervisor(FOLLOWER), "ros1-cpp")["launch/controller.launch"])
+    node = root.find("node")
+    assert node is not None
+    assert (node.get("pkg"), node.get("type"), node.get("name")) == (PACKAGE, "controller", PACKAGE)
+    write_files(generate(example_supervisor(FOLLOWER), "ros2-cpp"), tmp_path)
+    found = launch_actions(tmp_path / "launch/controller.launch.py", tmp_path)
+    (started,) = found["Node"]
+    assert (started.named["package"], started.named["executable"]) == (PACKAGE, "controller")
+
+
+@pytest.mark.parametrize(
+    ("body", "problem"),
+    [
+        (
+            'component C { outgoing message m with identifier: "/a b", type: none }',
+            "the identifier '/a b' of 'm' is no",
+        ),
+        (
+            "datatype object O { class: double } interface i use Thing from some_msgs"
+            " component C { outgoing message m with type: O links i }",
+            "no message in C++ has a field 'class', which is a keyword there",
+        ),
+        (
+            "datatype object O { new: double } interface i use Thing from some_msgs"
+            " component C { incoming message m with type: O links i }",
+            "no message in C++ has a field 'new', which is a keyword there",
+        ),
+        (
+            "interface i use Thing from namespace component C { outgoing message m with type: none links i }",
+            "the package 'namespace' is called like a keyword of C++",
+        ),
+        (
+            'component C { outgoing message m with identifier: "/diagnostics", type: string }',
+            "the topic /diagnostics is of the type std_msgs/String, but every generated node publishes",
+        ),
+        (
+            "interface i use X from robot_controller component C { outgoing message m with type: none links i }",
+            "the generated package would be called robot_controller, like a package whose types it uses",
+        ),
+        (
+            "component C { outgoing message m with type: string"
+            ' behaviour { variable t: string = "" on response from m do t := value initial marked state s { } } }',
+            "it does not do received texts that are kept",
+        ),
+    ],
+)
+@pytest.mark.parametrize("target", TARGETS)
+def test_what_it_cannot_do_is_refused_with_its_name(target: str, body: str, problem: str) -> None:
+    with pytest.raises(UnsupportedModelError) as raised:
+        generate(robot(body), target)
+    message = str(raised.value)
+    assert message.startswith(f"target {target}: ")
+    assert problem in message
+    assert "\n" not in message
+    assert message.count("target ") == 1
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_layer_is_refused(target: str) -> None:
+    supervisor = example_supervisor("line_follower/line_follower_layer", Deployment.LAYER)
+    with pytest.raises(UnsupportedModelError, match=f"target {target}: .*this version generates controllers only"):
+        generate(supervisor, target)
+
+
+@pytest.mark.parametrize(
+    ("type_name", "expected"),
+    [("Twist", "twist"), ("LaserScan", "laser_scan"), ("PointCloud2", "point_cloud2"), ("BMSStatus", "bms_status")],
+)
+def test_files_of_types_are_called_as_rosidl_calls_them(type_name: str, expected: str) -> None:
+    assert file_name(type_name) == expected
+
+
+MISFIT = """
+robot Misfit {
+    datatype object Wrong { x: string w: double }
+    interface i use Vector3 from geometry_msgs
+    component C { outgoing message m with identifier: "/m", type: Wrong links i }
+}
+"""
+
+
+@pytest.mark.skipif(missing("geometry_msgs") is not None, reason=str(missing("geometry_msgs")))
+def test_the_compiler_names_a_field_that_does_not_fit(tmp_path: Path) -> None:
+    with pytest.raises(AssertionError) as raised:
+        compiled(supervisor_of(MISFIT), tmp_path)
+    message = str(raised.value)
+    assert "in the model it is a string, in the message it is not" in message
+    assert re.search(r"has no member named .w.", message)
+
+
+HOSTILE = r"""
+robot None {
+    datatype object int { x: double }
+    datatype enum goto_ from string to { value = "*/ \" ' \\ ??/ %d </name>" -> break default -> auto }
+    interface i use Vector3 from geometry_msgs
+    component namespace {
+        incoming message delete with identifier: "/a", type: string
+        incoming message new with identifier: "/b", type: int links i
+        outgoing message template with identifier: "/c", type: goto_
+        outgoing message LONG with identifier: "/d", type: boolean
+        behaviour {
+            variable class: goto_ = auto
+            variable robot_t: integer
+            variable this: string = "\"; system(\"x\"); // \\ ' ??/ %s é"
+            on response from template do class := value
+            on response from LONG do robot_t := 7
+            initial marked state std { on request to delete on request to new }
+        }
+    }
+    requirement delete needs namespace.class = break
+    provide delete with "\"; import os; */ %s ??/ \\ é"
+    provide new with { x: -0.5 }
+}
+""".replace("LONG", "n" * 150)
+
+
+@pytest.mark.skipif(missing("geometry_msgs") is not None, reason=str(missing("geometry_msgs")))
+@pytest.mark.xdist_group("ros2_cpp_node")
+def test_names_and_texts_of_a_hostile_model_stay_names_and_texts(tmp_path: Path) -> None:
+    program = compiled(supervisor_of(HOSTILE), tmp_path / "package")
+    lines = ["message /c nothing", "message /d 1", "message /c */ \" ' \\ ??/ %d </name>", "message /d 0", "signal 15"]
+    done = run(program, lines, "every:=event", "period:=3600", f"log_folder:={tmp_path / 'log'}")
+    assert (done.returncode, done.stderr) == (0, "")
+    published = {name: data for word, name, data in sent(done.stdout) if word == "publish"}
+    assert '"; import os; */ %s ??/ \\ é' in published["/a"].replace('\\"', '"').replace("\\\\", "\\")
+    assert "x: -0.50000" in published["/b"]
+    entries = entries_of(tmp_path / "log")
+    variables = [entry["state"]["namespace"]["variables"] for entry in entries if entry["kind"] == "event"]
+    assert variables[0] == {"class": "auto", "robot_t": 0, "this": '"; system("x"); // \\ \' ??/ %s é'}
+    assert {item["class"] for item in variables} == {"auto", "break"}
+    assert variables[-1]["robot_t"] == 7

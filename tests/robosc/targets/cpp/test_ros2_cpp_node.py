@@ -1,0 +1,288 @@
+"""Generated rclcpp nodes, compiled against a stand-in for rclcpp with the real messages, and run event by event."""
+
+import json
+import math
+import re
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import pytest
+
+from robosc.supervisor import make_supervisor
+from robosc.supervisor.structure import Supervisor
+from support.models import EXAMPLES, bundle_of
+from support.node_logs import comparable, entries_of, replayed
+from support.rclcpp_nodes import SANITIZERS, compiled, missing, run, sent
+
+MODELS = Path(__file__).parents[3] / "models"
+END = "signal 15"
+BY_EVENT = ("every:=event", "period:=3600")
+
+pytestmark = [
+    pytest.mark.skipif(
+        missing("geometry_msgs", "sensor_msgs", "std_srvs", "test_msgs") is not None,
+        reason=str(missing("geometry_msgs", "sensor_msgs", "std_srvs", "test_msgs")),
+    ),
+    # One worker compiles each node once.
+    pytest.mark.xdist_group("ros2_cpp_node"),
+]
+
+
+def supervisor_of(text: str) -> Supervisor:
+    made = make_supervisor(bundle_of(text))
+    assert made.supervisor is not None, made.reason
+    return made.supervisor
+
+
+@pytest.fixture(scope="module")
+def maze() -> Supervisor:
+    return supervisor_of((EXAMPLES / "maze_solver" / "maze_solver.rscd").read_text())
+
+
+@pytest.fixture(scope="module")
+def maze_node(maze: Supervisor, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return compiled(maze, tmp_path_factory.mktemp("maze"))
+
+
+@pytest.fixture(scope="module")
+def courier() -> Supervisor:
+    # A variable of type string cannot take a received text in C.
+    text = (MODELS / "courier" / "model.rscd").read_text()
+    return supervisor_of(text.replace("variable text: string", "").replace("do text := value.^message ", ""))
+
+
+@pytest.fixture(scope="module")
+def courier_node(courier: Supervisor, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return compiled(courier, tmp_path_factory.mktemp("courier"), *SANITIZERS)
+
+
+def scan(dice: Random) -> str:
+    count = dice.choice([0, 1, 271, 360, 360, 360, 400])
+    distances = [dice.choice([0.2, 0.5, 0.7, 1.5, 3.0]) for _ in range(count)]
+    for _ in range(dice.choice([0, 0, 3])):
+        if distances:
+            distances[dice.randrange(count)] = dice.choice([math.nan, math.inf, -1.0])
+    return f"message /scan {' '.join(map(str, distances))}"
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_it_does_what_the_reference_executor_does(maze: Supervisor, maze_node: Path, seed: int, tmp_path: Path) -> None:
+    dice = Random(seed)
+    lines = [scan(dice) if dice.random() < 0.7 else "message /rotate_done" for _ in range(200)]
+    done = run(maze_node, [*lines, END], *BY_EVENT, f"log_folder:={tmp_path}")
+    assert (done.returncode, done.stderr) == (0, "")
+    entries = entries_of(tmp_path)
+    reference = replayed(maze, entries)
+    assert comparable(entries) == comparable(reference.entries)
+    assert len([entry for entry in entries if entry["kind"] == "event" and entry["controllable"]]) > 50
+    # What the log tells went out: the same messages with the same data.
+    topics = {"rotate_left": "/rotate_left", "rotate_right": "/rotate_right", "/cmd_vel": "/cmd_vel"}
+    told = [(topics.get(name, "/cmd_vel"), data) for name, data in reference.middleware.sent]
+    published = sent(done.stdout)
+    assert [name for _, name, _ in published] == [name for name, _ in told]
+    for (_, _, yaml), (_, data) in zip(published, told, strict=True):
+        assert numbers_of(yaml) == pytest.approx(sorted(leaves(data)))
+
+
+def leaves(data: Any) -> list[float]:
+    """The numbers of given data that are not zero."""
+    if isinstance(data, dict):
+        return [number for part in data.values() for number in leaves(part)]
+    return [float(data)] if data else []
+
+
+def numbers_of(yaml: str) -> list[float]:
+    numbers = (float(item) for item in re.findall(r": (-?[0-9.e+-]+)", yaml))
+    return sorted(number for number in numbers if number)
+
+
+def test_the_other_way_of_comparing_can_fail(maze: Supervisor, maze_node: Path, tmp_path: Path) -> None:
+    lines = [f"message /scan {' '.join(['3.0'] * 360)}", "message /rotate_done", END]
+    run(maze_node, lines, *BY_EVENT, f"log_folder:={tmp_path}")
+    entries = entries_of(tmp_path)
+    assert comparable(entries) == comparable(replayed(maze, entries).entries)
+    del entries[0]
+    assert comparable(entries) != comparable(replayed(maze, entries).entries)
+
+
+def test_orders_of_the_courier_end_in_every_way(courier: Supervisor, courier_node: Path, tmp_path: Path) -> None:
+    lines = [
+        # There is no server.
+        "message /order/power",
+        "message /order/count",
+        "message /allowed 1",
+        # Now there is.
+        "server /power 1",
+        "server /count 1",
+        "message /order/power",
+        "answer /power 1 fine",
+        "message /order/count",
+        "accept /count",
+        "feedback /count 0 1 1",
+        "feedback /count 3 5",
+        "result /count 4 0 1 1 2 3",
+        "message /order/count",
+        "reject /count",
+        "message /order/count",
+        "accept /count",
+        "result /count 6",
+        "message /order/count",
+        "accept /count",
+        # Not allowed any more: it is cancelled.
+        "message /allowed 0",
+        "refuse /count 0",
+        "result /count 5",
+        END,
+    ]
+    done = run(courier_node, lines, *BY_EVENT, "server_wait:=0", f"log_folder:={tmp_path}")
+    assert (done.returncode, done.stderr.count("\n")) == (0, 1)
+    assert "[WARN] starting without a server of /power, /wind, /count, /arm/reach" in done.stderr
+    entries = entries_of(tmp_path)
+    assert comparable(entries) == comparable(replayed(courier, entries).entries)
+    events = [entry["event"] for entry in entries if entry["kind"] == "event"]
+    assert events.count("power.error") == 1
+    assert events.count("power.response") == 1
+    assert events.count("count.error") == 3
+    assert events.count("count.cancel") == 1
+    assert events.count("count.response") == 1
+    assert events.count("count.feedback") == 2
+    goals = [(word, data) for word, name, data in sent(done.stdout) if name == "/count"]
+    assert goals == [("goal", "{order: 5}")] * 4 + [("cancel", "")]
+    assert ("call", "/power", "{data: true}") in sent(done.stdout)
+    (count,) = [entry for entry in entries if entry.get("event") == "count.response"]
+    assert count["data"] == {"sequence": [0, 1, 1, 2, 3]}
+    assert count["state"]["Counter"]["variables"] == {"seen": 3, "total": 5}
+
+
+SERVERS = [f"server {name} 1" for name in ("/power", "/wind", "/count", "/arm/reach")]
+
+
+def test_what_comes_before_the_start_is_held_and_goals_are_cancelled_at_the_end(
+    courier: Supervisor, courier_node: Path, tmp_path: Path
+) -> None:
+    # Nobody is there to be asked while the orders come; of each topic as many are held as its depth.
+    early = ["message /order/count", "message /allowed 0", *["message /allowed 1"] * 10]
+    late = ["wait goal /count", "accept /count", "wait publish /cmd_vel", END]
+    end = ["wait cancel /count", "refuse /count 0", "result /count 5"]
+    done = run(courier_node, [*early, *SERVERS, *late, *end], "period:=0.01", f"log_folder:={tmp_path}")
+    assert (done.returncode, done.stderr) == (0, "")
+    entries = entries_of(tmp_path)
+    events = [entry["event"] for entry in entries if entry["kind"] == "event"]
+    assert events[0] == "order_count.response"
+    assert events.count("allowed.response") == 10
+    requested = [event for event in events if event.endswith(".request")]
+    assert requested[0] == "count.request"
+    assert {"kind": "stop", "what": "SIGTERM"}.items() <= next(e for e in entries if e["kind"] == "stop").items()
+    doings = [(word, name) for word, name, _ in sent(done.stdout)]
+    # The wheels stop before the goal is cancelled, and nothing follows.
+    assert doings[-2:] == [("publish", "/cmd_vel"), ("cancel", "/count")]
+    assert numbers_of(sent(done.stdout)[-2][2]) == []
+
+
+def test_a_fault_stops_the_robot_and_is_told_at_the_end(maze_node: Path, tmp_path: Path) -> None:
+    lines = ["message /scan nan", END]
+    done = run(maze_node, lines, *BY_EVENT, "on_unknown:=fault", f"log_folder:={tmp_path}")
+    assert done.returncode == 1
+    assert done.stderr == "maze_solver_controller: something was unknown\n"
+    name, last = sent(done.stdout)[-1][1:]
+    assert (name, numbers_of(last)) == ("/cmd_vel", [])
+    assert "fault" in {entry["kind"] for entry in entries_of(tmp_path)}
+
+
+def test_a_server_that_is_lost_fails_its_calls(courier_node: Path, tmp_path: Path) -> None:
+    lines = [*SERVERS, "message /order/wind", "wait call /wind", "server /wind 0"]
+    waited = ["wait publish /state"] * 60
+    done = run(courier_node, [*lines, *waited, END], "period:=0.025", "publish_state:=true", f"log_folder:={tmp_path}")
+    assert done.returncode == 0, done.stderr
+    events = [entry["event"] for entry in entries_of(tmp_path) if entry["kind"] == "event"]
+    assert events[-2:] == ["wind.error", "wind.reset"]
+
+
+DRIVING = [*SERVERS, "message /allowed 1", "message /order/count", "wait goal /count"]
+A_WHILE = ["wait publish /state"] * 60
+WATCHED = ("period:=0.025", "publish_state:=true")
+
+
+def test_a_lost_goal_is_cancelled_when_its_server_is_seen_again(courier_node: Path, tmp_path: Path) -> None:
+    lines = [*DRIVING, "accept /count", "server /count 0", *A_WHILE, "server /count 1", "wait cancel /count"]
+    # Of another one it becomes known only later that it was accepted.
+    lines += ["refuse /count 3", "result /count 5", "message /order/count", "wait goal /count", "server /count 0"]
+    lines += [*A_WHILE, "accept /count", "wait cancel /count", "refuse /count 0", END]
+    done = run(courier_node, lines, *WATCHED, f"log_folder:={tmp_path}")
+    assert (done.returncode, done.stderr) == (0, "")
+    events = [entry["event"] for entry in entries_of(tmp_path) if entry["kind"] == "event"]
+    assert events.count("count.error") == 2
+    assert events.count("count.cancel") == 0
+
+
+@pytest.mark.parametrize(("code", "status"), [(1, 1), (2, 0)])
+def test_a_running_goal_whose_cancel_is_refused_is_a_fault(courier_node: Path, code: int, status: int) -> None:
+    # Unless the server does not know the goal: then it is lost, and nothing runs.
+    lines = [
+        *DRIVING,
+        "accept /count",
+        "message /allowed 0",
+        "wait cancel /count",
+        f"refuse /count {code}",
+        *A_WHILE,
+        END,
+    ]
+    done = run(courier_node, lines, *WATCHED)
+    assert done.returncode == status
+    told = "courier_controller: the cancel of a running goal was refused\n"
+    assert done.stderr == (told if status else "")
+
+
+@pytest.mark.parametrize(
+    ("parameter", "expected"),
+    [
+        ("period:=0", "parameter 'period' is 0; it must be 0.0001 seconds or more"),
+        ("period:=fast", "parameter 'period' is 'fast'; it must be"),
+        ("policy:=quick", "parameter 'policy' is 'quick'; it must be one of fair, priority, random"),
+        ("priority:=[jump]", "parameter 'priority': 'jump' is not a request; there is rotate_left, rotate_right, "),
+        ("seed:=0.5", "parameter 'seed' is 0.5; it must be an integer"),
+        ("max_age:=[/scan]", "parameter 'max_age' is '/scan'; it must be topic=seconds, such as /scan=0.5"),
+        ("max_age:=[/scan=-1]", "parameter 'max_age' is '/scan=-1'; it must be topic=seconds"),
+        ("max_age:=[/scam=1]", "parameter 'max_age': '/scam' is not the identifier of an outgoing message"),
+        ("release_identifiers:=[/scan]", "parameter 'release_identifiers': '/scan' is not the identifier of an inc"),
+        ("topic_prefix:=robot1", "parameter 'topic_prefix' is 'robot1'; it must be empty or the beginning"),
+        ("topic_prefix:=/1", "parameter 'topic_prefix' is '/1'; it must be empty or the beginning"),
+        ("publish_state:=1", "parameter 'publish_state' is 1; it must be true or false"),
+        ("service_timeout:=-1", "parameter 'service_timeout' is -1; it must be a number of seconds, 0 or more"),
+        ("log_folder:=/proc/none", "parameter 'log_folder': /proc/none: "),
+    ],
+)
+def test_a_wrong_parameter_is_one_clear_error(maze_node: Path, parameter: str, expected: str) -> None:
+    done = run(maze_node, [END], parameter)
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"maze_solver_controller: {expected}")
+    assert done.stderr.count("\n") == 1
+
+
+def test_states_and_prefix(maze_node: Path) -> None:
+    lines = [f"message /robot1/scan {' '.join(['3.0'] * 360)}", *["wait publish /robot1/state"] * 3, END]
+    done = run(maze_node, lines, "topic_prefix:=/robot1/", "publish_state:=true", "period:=0.001")
+    assert done.returncode == 0, done.stderr
+    found = sent(done.stdout)
+    assert {name for _, name, _ in found} <= {f"/robot1/{name}" for name in ("cmd_vel", "state", *ROTATIONS)}
+    texts = [data for _, name, data in found if name == "/robot1/state"]
+    taken = []
+    for text in texts:
+        inner = re.fullmatch(r'\{data: "(.*)"\}', text)
+        assert inner is not None
+        state = json.loads(inner[1].replace('\\"', '"'))
+        assert state["definition"]["name"] == "MazeSolver"
+        assert state["current"]["LidarSensor"]["variables"].keys() == {"front", "right", "back_right"}
+        taken += state["transitions"]
+    numbers = {
+        transition["id"]
+        for component in state["definition"]["components"]
+        for item in component.get("behaviour", {}).get("states", ())
+        for transition in item["transitions"]
+    }
+    assert taken
+    assert set(taken) <= numbers
+
+
+ROTATIONS = ("rotate_left", "rotate_right")

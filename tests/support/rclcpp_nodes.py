@@ -1,0 +1,68 @@
+"""Generated rclcpp nodes on a stand-in for the middleware: compiled with the real messages, driven line by line."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from robosc.supervisor.structure import Supervisor
+from robosc.targets import generate, write_files
+
+STAND_IN = Path(__file__).with_name("rclcpp_stand_in")
+WARNINGS = "-Wall -Wextra -Wpedantic -Werror".split()
+SANITIZERS = "-g1 -fsanitize=address,undefined -fno-sanitize-recover=all".split()
+LIMIT_S = 60.0
+
+
+def missing(*packages: str) -> str | None:
+    """What is missing to compile such nodes with the messages of some packages, as a reason to skip."""
+    lacking = [name for name in ("gcc", "g++") if shutil.which(name) is None]
+    include = Path(sys.prefix) / "include"
+    lacking += [
+        f"the C++ messages of {name}"
+        for name in ("rcl_interfaces", "action_msgs", "diagnostic_msgs", "std_msgs", *packages)
+        if not (include / name).is_dir()
+    ]
+    return f"not installed: {', '.join(lacking)}" if lacking else None
+
+
+def compiled(supervisor: Supervisor, folder: Path, *options: str) -> Path:
+    """The program of a node, compiled without a warning."""
+    write_files(generate(supervisor, "ros2-cpp"), folder)
+    source = folder / "src"
+    (engine,) = source.glob("*_supervisor.c")
+    packages = sorted((Path(sys.prefix) / "include").iterdir())
+    includes = [word for path in packages if path.is_dir() for word in ("-isystem", str(path))]
+    program = folder / "controller"
+    both = [*WARNINGS, *options, "-ffp-contract=off"]
+    for command in (
+        ["gcc", "-std=c99", *both, "-c", engine.name, "-o", "engine.o"],
+        ["g++", "-std=c++17", *both, "-I.", f"-I{STAND_IN}", *includes, "node.cpp", "engine.o", "-o", str(program)],
+    ):
+        done = subprocess.run(command, cwd=source, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr[:6000]
+    return program
+
+
+def run(program: Path, lines: Sequence[str], *parameters: str) -> subprocess.CompletedProcess[str]:
+    """Run a node on what happens to it, with parameters such as `period:=0.02`; the last line is to end it."""
+    arguments = [word for parameter in parameters for word in ("-p", parameter)]
+    return subprocess.run(
+        [str(program), "--ros-args", *arguments],
+        input="".join(f"{line}\n" for line in lines),
+        capture_output=True,
+        text=True,
+        timeout=LIMIT_S,
+        env={"PATH": os.environ["PATH"]},
+        check=False,
+    )
+
+
+def sent(output: str, but: str = "/diagnostics") -> list[tuple[str, str, str]]:
+    """What a node did: word (publish, call, goal, cancel), name, and the data, of each but one topic."""
+    found = [re.fullmatch(r"(\w+) (\S+) (.*)", line) for line in output.splitlines()]
+    assert all(found), output
+    return [(match[1], match[2], match[3]) for match in found if match and match[2] != but]

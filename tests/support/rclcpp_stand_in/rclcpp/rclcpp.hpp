@@ -1,0 +1,372 @@
+// A stand-in for rclcpp of ROS 2 Jazzy within one process: of what generated nodes use, the same signatures.
+
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <cstdio>
+#include <functional>
+#include <future>
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "builtin_interfaces/msg/time.hpp"
+#include "rcl_interfaces/msg/parameter_descriptor.hpp"
+#include "rosidl_runtime_cpp/traits.hpp"
+#include "stand_in.hpp"
+
+#define RCLCPP_STAND_IN_LOG(level, logger, ...)                                                                        \
+    do {                                                                                                               \
+        (void)(logger);                                                                                                \
+        std::fprintf(stderr, "[" level "] " __VA_ARGS__);                                                              \
+        std::fprintf(stderr, "\n");                                                                                    \
+    } while (0)
+#define RCLCPP_INFO(logger, ...) RCLCPP_STAND_IN_LOG("INFO", logger, __VA_ARGS__)
+#define RCLCPP_WARN(logger, ...) RCLCPP_STAND_IN_LOG("WARN", logger, __VA_ARGS__)
+#define RCLCPP_ERROR(logger, ...) RCLCPP_STAND_IN_LOG("ERROR", logger, __VA_ARGS__)
+
+namespace rclcpp {
+
+class InitOptions {};
+
+enum class SignalHandlerOptions { All, SigInt, SigTerm, None };
+
+class Context;
+
+namespace detail {
+
+inline std::vector<std::string>& arguments()
+{
+    static std::vector<std::string> made;
+    return made;
+}
+
+inline bool& is_running()
+{
+    static bool made = false;
+    return made;
+}
+
+}  // namespace detail
+
+inline void init(int argc, char const* const* argv, const InitOptions& = InitOptions(),
+    SignalHandlerOptions options = SignalHandlerOptions::All)
+{
+    if (options != SignalHandlerOptions::None) {
+        throw std::runtime_error("the handlers of rclcpp would end the context before the robot is stopped");
+    }
+    detail::arguments().assign(argv, argv + argc);
+    detail::is_running() = true;
+}
+
+inline bool ok(std::shared_ptr<Context> = nullptr) { return detail::is_running(); }
+
+inline bool shutdown(std::shared_ptr<Context> = nullptr, const std::string& = "user called rclcpp::shutdown()")
+{
+    return std::exchange(detail::is_running(), false);
+}
+
+class Logger {};
+
+class Time {
+public:
+    explicit Time(int64_t nanoseconds = 0) : nanoseconds_(nanoseconds) {}
+
+    operator builtin_interfaces::msg::Time() const
+    {
+        builtin_interfaces::msg::Time message;
+        message.sec = static_cast<int32_t>(nanoseconds_ / 1000000000);
+        message.nanosec = static_cast<uint32_t>(nanoseconds_ % 1000000000);
+        return message;
+    }
+
+private:
+    int64_t nanoseconds_;
+};
+
+struct KeepLast {
+    explicit KeepLast(size_t given) : depth(given) {}
+    size_t depth;
+};
+
+class QoS {
+public:
+    QoS(const KeepLast& history) : depth_(history.depth) {}  // NOLINT: it is implicit there, too
+    QoS(size_t depth) : depth_(depth) {}                     // NOLINT
+    QoS& reliable() { return *this; }
+    QoS& best_effort() { return *this; }
+    QoS& durability_volatile() { return *this; }
+    QoS& transient_local() { return *this; }
+
+private:
+    size_t depth_;
+};
+
+class PublisherBase {
+public:
+    template <typename DurationRepT = int64_t, typename DurationT = std::milli>
+    bool wait_for_all_acked(
+        std::chrono::duration<DurationRepT, DurationT> = std::chrono::duration<DurationRepT, DurationT>(-1)) const
+    {
+        return true;
+    }
+};
+
+template <typename MessageT, typename AllocatorT = std::allocator<void>>
+class Publisher : public PublisherBase {
+public:
+    using SharedPtr = std::shared_ptr<Publisher>;
+
+    explicit Publisher(std::string topic) : topic_(std::move(topic)) {}
+
+    void publish(const MessageT& message) { stand_in::print("publish", topic_, to_yaml(message, true)); }
+
+private:
+    std::string topic_;
+};
+
+class SubscriptionBase {
+public:
+    using SharedPtr = std::shared_ptr<SubscriptionBase>;
+    virtual ~SubscriptionBase() = default;
+};
+
+template <typename MessageT>
+class Subscription : public SubscriptionBase {
+public:
+    using SharedPtr = std::shared_ptr<Subscription>;
+};
+
+template <typename ServiceT>
+class Client {
+public:
+    using SharedPtr = std::shared_ptr<Client>;
+    using SharedRequest = std::shared_ptr<typename ServiceT::Request>;
+    using SharedResponse = std::shared_ptr<typename ServiceT::Response>;
+    using Promise = std::promise<SharedResponse>;
+    using SharedFuture = std::shared_future<SharedResponse>;
+
+    struct SharedFutureAndRequestId {
+        SharedFuture future;
+        int64_t request_id;
+    };
+
+    explicit Client(const std::string& name) : name_(name)
+    {
+        stand_in::world().orders[{"answer", name}] = [this](std::istream& in) {
+            if (pending_.empty()) {
+                stand_in::print("nobody waits for", name_, "");
+                return;
+            }
+            Promise promise;
+            promise.set_value(std::make_shared<typename ServiceT::Response>(
+                stand_in::parsed<typename ServiceT::Response>(in)));
+            const auto callback = pending_.begin()->second;
+            pending_.erase(pending_.begin());
+            callback(promise.get_future().share());
+        };
+    }
+
+    bool service_is_ready() const { return stand_in::world().servers[name_]; }
+
+    template <typename CallbackT>
+    SharedFutureAndRequestId async_send_request(SharedRequest request, CallbackT&& callback)
+    {
+        const int64_t number = ++last_;
+        stand_in::print("call", name_, to_yaml(*request, true));
+        pending_[number] = std::forward<CallbackT>(callback);
+        return {{}, number};
+    }
+
+    bool remove_pending_request(int64_t request_id) { return pending_.erase(request_id) != 0U; }
+
+private:
+    std::string name_;
+    int64_t last_ = 0;
+    std::map<int64_t, std::function<void(SharedFuture)>> pending_;
+};
+
+enum ParameterType : uint8_t {
+    PARAMETER_NOT_SET,
+    PARAMETER_BOOL,
+    PARAMETER_INTEGER,
+    PARAMETER_DOUBLE,
+    PARAMETER_STRING,
+    PARAMETER_BYTE_ARRAY,
+    PARAMETER_BOOL_ARRAY,
+    PARAMETER_INTEGER_ARRAY,
+    PARAMETER_DOUBLE_ARRAY,
+    PARAMETER_STRING_ARRAY,
+};
+
+class ParameterValue {
+public:
+    ParameterValue() = default;
+    explicit ParameterValue(bool value) : value_(value) {}
+    explicit ParameterValue(int value) : value_(static_cast<int64_t>(value)) {}
+    explicit ParameterValue(int64_t value) : value_(value) {}
+    explicit ParameterValue(double value) : value_(value) {}
+    explicit ParameterValue(const std::string& value) : value_(value) {}
+    explicit ParameterValue(const char* value) : value_(std::string(value)) {}
+    explicit ParameterValue(const std::vector<std::string>& value) : value_(value) {}
+
+    ParameterType get_type() const
+    {
+        static const ParameterType types[] = {PARAMETER_NOT_SET, PARAMETER_BOOL, PARAMETER_INTEGER, PARAMETER_DOUBLE,
+            PARAMETER_STRING, PARAMETER_STRING_ARRAY};
+        return types[value_.index()];
+    }
+
+    template <typename T>
+    const T& get() const
+    {
+        return std::get<T>(value_);
+    }
+
+private:
+    std::variant<std::monostate, bool, int64_t, double, std::string, std::vector<std::string>> value_;
+};
+
+inline std::string to_string(const ParameterValue&) { return "not set"; }
+
+namespace node_interfaces {
+
+class NodeParametersInterface {
+public:
+    using SharedPtr = std::shared_ptr<NodeParametersInterface>;
+
+    const std::map<std::string, ParameterValue>& get_parameter_overrides() const { return overrides; }
+
+    std::map<std::string, ParameterValue> overrides;
+};
+
+}  // namespace node_interfaces
+
+class Node {
+public:
+    using SharedPtr = std::shared_ptr<Node>;
+
+    explicit Node(const std::string& name)
+        : name_(name), parameters_(std::make_shared<node_interfaces::NodeParametersInterface>())
+    {
+        const std::vector<std::string>& given = detail::arguments();
+        for (size_t k = 0; k + 1 < given.size(); k++) {
+            const size_t mark = given[k + 1].find(":=");
+            if (given[k] == "-p" && mark != std::string::npos) {
+                parameters_->overrides[given[k + 1].substr(0, mark)] = parsed(given[k + 1].substr(mark + 2));
+            }
+        }
+    }
+
+    const char* get_fully_qualified_name() const
+    {
+        full_ = "/" + name_;
+        return full_.c_str();
+    }
+
+    Logger get_logger() const { return {}; }
+
+    Time now() const
+    {
+        return Time(std::chrono::duration_cast<std::chrono::nanoseconds>(
+            std::chrono::system_clock::now().time_since_epoch())
+                        .count());
+    }
+
+    const ParameterValue& declare_parameter(const std::string& name, const ParameterValue& default_value,
+        const rcl_interfaces::msg::ParameterDescriptor& = rcl_interfaces::msg::ParameterDescriptor(),
+        bool ignore_override = false)
+    {
+        const auto found = parameters_->overrides.find(name);
+        const bool is_given = found != parameters_->overrides.end() && !ignore_override;
+        return declared_[name] = is_given ? found->second : default_value;
+    }
+
+    bool has_parameter(const std::string& name) const { return declared_.count(name) > 0; }
+
+    node_interfaces::NodeParametersInterface::SharedPtr get_node_parameters_interface() { return parameters_; }
+
+    template <typename MessageT>
+    typename Publisher<MessageT>::SharedPtr create_publisher(const std::string& topic_name, const QoS&)
+    {
+        return std::make_shared<Publisher<MessageT>>(topic_name);
+    }
+
+    template <typename MessageT, typename CallbackT>
+    typename Subscription<MessageT>::SharedPtr create_subscription(
+        const std::string& topic_name, const QoS&, CallbackT&& callback)
+    {
+        stand_in::world().topics[topic_name].push_back(
+            [function = std::function<void(typename MessageT::ConstSharedPtr)>(callback)](std::istream& in) {
+                function(std::make_shared<const MessageT>(stand_in::parsed<MessageT>(in)));
+            });
+        return std::make_shared<Subscription<MessageT>>();
+    }
+
+    template <typename ServiceT>
+    typename Client<ServiceT>::SharedPtr create_client(const std::string& service_name)
+    {
+        return std::make_shared<Client<ServiceT>>(service_name);
+    }
+
+private:
+    static ParameterValue parsed(const std::string& text)
+    {
+        if (text == "true" || text == "false") {
+            return ParameterValue(text == "true");
+        }
+        if (text.size() > 1 && text.front() == '[') {
+            std::vector<std::string> items;
+            std::istringstream in(text.substr(1, text.size() - 2));
+            for (std::string item; std::getline(in, item, ',');) {
+                items.push_back(item);
+            }
+            return ParameterValue(items);
+        }
+        size_t end = 0;
+        try {
+            const double number = std::stod(text, &end);
+            if (end == text.size()) {
+                return text.find_first_of(".e") == std::string::npos ? ParameterValue(static_cast<int64_t>(number))
+                                                                     : ParameterValue(number);
+            }
+        } catch (const std::exception&) {
+            end = 0;
+        }
+        return ParameterValue(text);
+    }
+
+    std::string name_;
+    mutable std::string full_;
+    node_interfaces::NodeParametersInterface::SharedPtr parameters_;
+    std::map<std::string, ParameterValue> declared_;
+};
+
+namespace executors {
+
+class SingleThreadedExecutor {
+public:
+    void add_node(std::shared_ptr<Node> node_ptr, bool notify = true)
+    {
+        (void)notify;
+        node_ = std::move(node_ptr);
+    }
+
+    void spin_once(std::chrono::nanoseconds timeout = std::chrono::nanoseconds(-1))
+    {
+        const auto whole = std::chrono::duration_cast<std::chrono::milliseconds>(timeout);
+        stand_in::step(static_cast<int>(whole.count()));
+    }
+
+private:
+    std::shared_ptr<Node> node_;
+};
+
+}  // namespace executors
+
+}  // namespace rclcpp

@@ -1,0 +1,162 @@
+// The world of a node on the stand-in for rclcpp: the test writes on standard input what happens to the node, a line
+// each, and the node's doings are printed on standard output. One thread, no network.
+//
+//   message TOPIC DATA            a message comes
+//   server NAME 1                 a service or action has a server (0: it has none)
+//   answer NAME DATA              the oldest call of a service is answered
+//   accept NAME, reject NAME      the answer to the last goal of an action
+//   feedback NAME DATA
+//   result NAME CODE DATA         4: succeeded, 5: canceled, 6: aborted
+//   refuse NAME CODE              the answer to a cancel (0: it is accepted)
+//   signal NUMBER
+//   wait WORD NAME                go on when the node has done that once more
+//
+// DATA depends on the type: the value of `data`, the ranges of a scan, `success` and `message` of a reply, `sequence`.
+
+#pragma once
+
+#include <csignal>
+#include <cstdint>
+#include <functional>
+#include <iostream>
+#include <map>
+#include <poll.h>
+#include <sstream>
+#include <string>
+#include <type_traits>
+#include <unistd.h>
+#include <utility>
+#include <vector>
+
+namespace stand_in {
+
+#define STAND_IN_HAS(Name, field)                                                                                      \
+    template <class M, class = void>                                                                                   \
+    struct Name : std::false_type {};                                                                                  \
+    template <class M>                                                                                                 \
+    struct Name<M, std::void_t<decltype(std::declval<M&>().field)>> : std::true_type {};
+
+STAND_IN_HAS(HasData, data)
+STAND_IN_HAS(HasRanges, ranges)
+STAND_IN_HAS(HasSuccess, success)
+STAND_IN_HAS(HasSequence, sequence)
+
+template <class T>
+void read_list(std::istream& in, std::vector<T>& list)
+{
+    // Unlike `>>`, this reads nan and inf.
+    for (std::string word; in >> word;) {
+        list.push_back(static_cast<T>(std::stod(word)));
+    }
+}
+
+template <class M>
+M parsed(std::istream& in)
+{
+    M message;
+    if constexpr (HasData<M>::value) {
+        std::string rest;
+        std::getline(in >> std::ws, rest);
+        if constexpr (std::is_same<decltype(message.data), std::string>::value) {
+            message.data = rest;
+        } else {
+            message.data = static_cast<decltype(message.data)>(std::stod(rest));
+        }
+    } else if constexpr (HasRanges<M>::value) {
+        read_list(in, message.ranges);
+        message.range_max = 100.0F;
+        message.angle_increment = message.ranges.empty() ? 0.0F : 6.2831853F / static_cast<float>(message.ranges.size());
+    } else if constexpr (HasSuccess<M>::value) {
+        in >> message.success;
+        std::getline(in >> std::ws, message.message);
+    } else if constexpr (HasSequence<M>::value) {
+        read_list(in, message.sequence);
+    }
+    return message;
+}
+
+using Handler = std::function<void(std::istream&)>;
+
+struct World {
+    std::map<std::string, std::vector<Handler>> topics;
+    // By word and name.
+    std::map<std::pair<std::string, std::string>, Handler> orders;
+    std::map<std::string, bool> servers;
+    std::map<std::string, int> done;
+    std::string input;
+    bool is_over = false;
+};
+
+inline World& world()
+{
+    static World made;
+    return made;
+}
+
+inline void obey(const std::string& line)
+{
+    std::istringstream in(line);
+    std::string word;
+    std::string name;
+    in >> word >> name;
+    if (word == "message") {
+        for (const Handler& handler : world().topics[name]) {
+            std::istringstream rest(line.substr(static_cast<std::size_t>(in.tellg()) == std::string::npos
+                    ? line.size()
+                    : static_cast<std::size_t>(in.tellg())));
+            handler(rest);
+        }
+    } else if (word == "server") {
+        in >> world().servers[name];
+    } else if (word == "signal") {
+        std::raise(std::stoi(name));
+    } else {
+        const auto found = world().orders.find({word, name});
+        if (found == world().orders.end()) {
+            std::cout << "no order: " << line << std::endl;
+        } else {
+            found->second(in);
+        }
+    }
+}
+
+// Handle one line, waiting for it for so long.
+inline void step(int timeout_ms)
+{
+    World& here = world();
+    std::size_t end = here.input.find('\n');
+    if (end == std::string::npos && !here.is_over) {
+        pollfd waited{0, POLLIN, 0};
+        if (poll(&waited, 1, timeout_ms) > 0) {
+            char buffer[65536];
+            const ssize_t count = read(0, buffer, sizeof buffer);
+            here.is_over = count == 0;
+            if (count > 0) {
+                here.input.append(buffer, static_cast<std::size_t>(count));
+            }
+        }
+        end = here.input.find('\n');
+    } else if (end == std::string::npos) {
+        poll(nullptr, 0, timeout_ms);
+    }
+    if (end != std::string::npos) {
+        const std::string line = here.input.substr(0, end);
+        if (line.compare(0, 5, "wait ") == 0 && here.done[line.substr(5)]-- <= 0) {
+            here.done[line.substr(5)] = 0;
+            poll(nullptr, 0, timeout_ms < 5 ? timeout_ms : 5);
+            return;
+        }
+        here.input.erase(0, end + 1);
+        if (line.compare(0, 5, "wait ") != 0) {
+            obey(line);
+        }
+    }
+}
+
+inline void print(const std::string& what, const std::string& name, const std::string& yaml)
+{
+    world().done[what + " " + name]++;
+    std::cout << what << " " << name << " " << yaml << std::endl;
+}
+
+}  // namespace stand_in

@@ -1,11 +1,13 @@
 """Loads generated Python packages, and compares what they do with the interpreter."""
 
 import importlib
+import importlib.abc
+import importlib.machinery
 import itertools
 import math
 import sys
 import types
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -72,6 +74,38 @@ def load_system(supervisor: Supervisor) -> Any:
         for name in [name for name in sys.modules if name == package or name.startswith(f"{package}.")]:
             del sys.modules[name]
     return module.Supervisor()
+
+
+def loaded_package(files: GeneratedFiles) -> Callable[[str], Any]:
+    """A function that imports the modules of a generated Python package, by their name in it, out of memory.
+
+    All of them are executed once, from their generated texts, in a package of their own name that nothing else knows.
+    """
+    package = f"generated_{next(_numbers)}"
+    texts = {path.partition("/")[2].removesuffix(".py").replace("/", "."): text for path, text in files.items()}
+    modules: dict[str, Any] = {}
+
+    class Finder(importlib.abc.MetaPathFinder, importlib.abc.InspectLoader):
+        def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> Any:
+            name = fullname.removeprefix(f"{package}").lstrip(".")
+            if fullname.partition(".")[0] != package or not {name, f"{name}.__init__".lstrip(".")} & texts.keys():
+                return None
+            return importlib.machinery.ModuleSpec(fullname, self, is_package=name not in texts)
+
+        def get_source(self, fullname: str) -> str:
+            name = fullname.removeprefix(f"{package}").lstrip(".")
+            return texts[name if name in texts else f"{name}.__init__".lstrip(".")]
+
+    finder = Finder()
+    sys.meta_path.insert(0, finder)
+    try:
+        for name in texts:
+            modules[name] = importlib.import_module(f"{package}.{name}".removesuffix(".__init__"))
+    finally:
+        sys.meta_path.remove(finder)
+        for name in [name for name in sys.modules if name.partition(".")[0] == package]:
+            del sys.modules[name]
+    return modules.__getitem__
 
 
 def python_text(supervisor: Supervisor) -> str:

@@ -1,0 +1,77 @@
+"""Every target does what the reference executor does: the same runs, compared step by step."""
+
+from pathlib import Path
+from random import Random
+
+import msgspec
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robosc.errors import UnsupportedModelError
+from robosc.model.structure import Deployment
+from robosc.supervisor.structure import Supervisor
+from robosc.targets import generate
+from support.c99 import GCC
+from support.equivalence.c99_target import C99Target
+from support.equivalence.python_targets import PythonTarget, generated_python, observe
+from support.equivalence.random_scenarios import random_scenario
+from support.equivalence.targets import compare
+from support.generated import example_supervisor, loaded_package
+from support.random_controllers import random_controller, random_robot
+from support.random_supervisors import random_supervisor
+
+ROBOTS = ["line_follower", "maze_solver", "navigation", "object_finder", "ball_pusher", "person_follower"]
+needs_gcc = pytest.mark.skipif(GCC is None, reason="gcc is not installed")
+
+
+def python_target(supervisor: Supervisor) -> PythonTarget:
+    return generated_python(supervisor, loaded_package(generate(supervisor, "python")))
+
+
+def _some_supervisor(seed: int) -> Supervisor:
+    """A random robot, of one kind or another."""
+    match Random(seed).randrange(3):
+        case 0:
+            return msgspec.structs.replace(random_supervisor(seed), deployment=Deployment.CONTROLLER)
+        case 1:
+            return random_robot(seed)
+        case _:
+            return random_controller(seed) or random_robot(seed)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_an_example_in_python(robot: str) -> None:
+    supervisor = example_supervisor(f"{robot}/{robot}")
+    for seed in range(4):
+        scenario = random_scenario(supervisor, seed, 150)
+        compare(python_target(supervisor), scenario, observe(supervisor, scenario))
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.integers(0, 2**32 - 1))
+def test_random_robots_in_python(seed: int) -> None:
+    supervisor = _some_supervisor(seed)
+    scenario = random_scenario(supervisor, seed, 60)
+    compare(python_target(supervisor), scenario, observe(supervisor, scenario))
+
+
+@needs_gcc
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_an_example_in_c(robot: str, tmp_path: Path) -> None:
+    supervisor = example_supervisor(f"{robot}/{robot}")
+    scenario = random_scenario(supervisor, 7, 400)
+    compare(C99Target(supervisor, tmp_path), scenario, observe(supervisor, scenario))
+
+
+@needs_gcc
+@settings(deadline=None, max_examples=6)
+@given(st.integers(0, 2**32 - 1))
+def test_random_robots_in_c(tmp_path_factory: pytest.TempPathFactory, seed: int) -> None:
+    supervisor = _some_supervisor(seed)
+    scenario = random_scenario(supervisor, seed, 120)
+    try:
+        target = C99Target(supervisor, tmp_path_factory.mktemp("c"))
+    except UnsupportedModelError:
+        return  # The random models hold what C cannot keep, too: received texts.
+    compare(target, scenario, observe(supervisor, scenario))

@@ -16,12 +16,14 @@ from support.c99 import GCC
 from support.equivalence.c99_target import C99Target
 from support.equivalence.python_targets import PythonTarget, generated_python, observe
 from support.equivalence.random_scenarios import random_scenario
+from support.equivalence.recorded import FOLDER, read_recorded, recorded_text
 from support.equivalence.targets import compare
+from support.equivalence.worlds import WORLDS, live
 from support.generated import example_supervisor, loaded_package
 from support.random_controllers import random_controller, random_robot
 from support.random_supervisors import random_supervisor
 
-ROBOTS = ["line_follower", "maze_solver", "navigation", "object_finder", "ball_pusher", "person_follower"]
+ROBOTS = sorted(WORLDS)
 needs_gcc = pytest.mark.skipif(GCC is None, reason="gcc is not installed")
 
 
@@ -38,6 +40,38 @@ def _some_supervisor(seed: int) -> Supervisor:
             return random_robot(seed)
         case _:
             return random_controller(seed) or random_robot(seed)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_the_reference_does_what_was_recorded(robot: str) -> None:
+    """After a change that is meant: `python tests/equivalence/record.py`."""
+    file = FOLDER / f"{robot}.jsonl"
+    assert recorded_text(*live(robot)) == file.read_text(encoding="utf-8")
+    scenario = read_recorded(robot)
+    supervisor = example_supervisor(f"{robot}/{robot}")
+    assert recorded_text(scenario, observe(supervisor, scenario)) == file.read_text(encoding="utf-8")
+
+
+def test_the_recorded_runs_show_every_request() -> None:
+    for robot in ROBOTS:
+        text = (FOLDER / f"{robot}.jsonl").read_text(encoding="utf-8")
+        for item in example_supervisor(f"{robot}/{robot}").model.communications:
+            assert f'"{item.events[0]}"' in text, item.name
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_a_recorded_run_in_python(robot: str) -> None:
+    supervisor = example_supervisor(f"{robot}/{robot}")
+    scenario = read_recorded(robot)
+    compare(python_target(supervisor), scenario, observe(supervisor, scenario))
+
+
+@needs_gcc
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_a_recorded_run_in_c(robot: str, tmp_path: Path) -> None:
+    supervisor = example_supervisor(f"{robot}/{robot}")
+    scenario = read_recorded(robot)
+    compare(C99Target(supervisor, tmp_path), scenario, observe(supervisor, scenario))
 
 
 @pytest.mark.parametrize("robot", ROBOTS)

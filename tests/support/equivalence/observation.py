@@ -110,7 +110,8 @@ def _seen(issued: Sequence[Issued], sight: Sight) -> list[Any]:
         else:
             subject = sight.topics.get(name, name) if kind == "publish" else name
             found.append([kind, subject, {path: part for path, value in data.items() if (part := _on_wire(value))}])
-    return found
+    # A middleware keeps the order on each topic; between topics, the event log tells it.
+    return sorted(found, key=lambda item: item[:2])
 
 
 def _on_wire(value: Any) -> Any:

@@ -24,7 +24,8 @@ from support.equivalence.scenario import Action, Scenario
 
 # Numbers that a float of 32 bits holds, too, but for the hostile ones.
 _DOUBLES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 6.0, -0.25, -1.0, -2.0)
-_INTEGERS = (0, 1, 2, 3, 4, 5, 6, 7, 100, -1, -2)
+# Numbers that any integer field holds, but for the hostile ones.
+_INTEGERS = (0, 1, 2, 3, 4, 5, 6, 7, 100)
 _TEXTS = ("", "a", "it's", '"""\n\\', "é")
 _OUTCOMES = ("succeeded", "succeeded", "rejected", "aborted", "cancelled", "lost")
 
@@ -69,7 +70,7 @@ class Dice:
             case BooleanType():
                 return dice.choice((True, False))
             case IntegerType():
-                return dice.choice((*_INTEGERS, 2**31, -(2**40)) if self._is_hostile else _INTEGERS)
+                return dice.choice((*_INTEGERS, -1, -2, 2**31, -(2**40)) if self._is_hostile else _INTEGERS)
             case DoubleType():
                 return dice.choice((*_DOUBLES, math.nan, math.inf, 1e308) if self._is_hostile else _DOUBLES)
             case StringType():
@@ -165,6 +166,18 @@ def _replies(model: Model, target: PythonTarget, dice: Random, drawn: Dice, outc
     return found
 
 
+def node_settings(model: Model, policy: str = "fair") -> dict[str, Any]:
+    """Settings under which a node decides whenever something comes, and never else."""
+    sensors = {item.identifier for item in model.communications if item.max_age is not None}
+    return {
+        "every": "event",
+        "period_s": 3600.0,
+        "policy": policy,
+        # They must have been seen, but the test may take its time.
+        "max_age_s": dict.fromkeys(sorted(sensors), 3600.0),
+    }
+
+
 def node_scenario(supervisor: Supervisor, seed: int, length: int) -> Scenario:
     """A run for a node with real servers: each decision comes with something that comes.
 
@@ -172,7 +185,7 @@ def node_scenario(supervisor: Supervisor, seed: int, length: int) -> Scenario:
     that the controller cancels ends.
     """
     dice = Random(seed)
-    settings = {"every": "event", "period_s": 3600.0, "policy": dice.choice(("fair", "priority"))}
+    settings = node_settings(supervisor.model, dice.choice(("fair", "priority")))
     scenario = Scenario((), settings)
     target = reference(supervisor)
     target.start(scenario)
@@ -188,6 +201,23 @@ def node_scenario(supervisor: Supervisor, seed: int, length: int) -> Scenario:
         actions.append(action)
         seen = target.do(action)
         actions += follow(seen, target)
+    return Scenario(tuple(actions), settings)
+
+
+def for_node(supervisor: Supervisor, scenario: Scenario) -> Scenario:
+    """The messages of a recorded run for a node, whose services answer at once as they did last."""
+    settings = node_settings(supervisor.model)
+    answers = {action.subject: action.data for action in scenario.actions if action.do == "reply"}
+    target = reference(supervisor)
+    target.start(Scenario((), settings))
+    actions: list[Action] = []
+    for action in scenario.actions:
+        if action.do == "message":
+            actions.append(action)
+            seen = target.do(action)
+            while asked := [name for kind, name, _ in seen.issued if kind == "call"]:
+                actions.append(Action("reply", asked[0], answers[asked[0]]))
+                seen = target.do(actions[-1])
     return Scenario(tuple(actions), settings)
 
 

@@ -1,0 +1,91 @@
+"""The generated ROS 2 node does what the reference executor does, over DDS, step by step."""
+
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from robosc.expressions import Binary, DoubleType, EnumType, Expression, Received
+from robosc.language import load_bundle
+from robosc.model.structure import CommunicationKind, Interface, Property
+from robosc.supervisor import make_supervisor
+from robosc.supervisor.structure import Supervisor
+from support.equivalence.python_targets import observe
+from support.equivalence.random_scenarios import for_node, node_scenario
+from support.equivalence.recorded import read_recorded
+from support.equivalence.ros2_target import ros2_target
+from support.equivalence.targets import compare
+from support.generated import example_supervisor
+from support.random_controllers import random_controller
+
+pytest.importorskip("rclpy", reason="ROS 2 (rclpy) is not installed")
+
+pytestmark = pytest.mark.ros2
+
+# The navigation example asks for interfaces that no package index has.
+ROBOTS = ["line_follower", "maze_solver", "object_finder", "ball_pusher", "person_follower"]
+COURIER = Path(__file__).parents[1] / "models" / "courier" / "model.rscd"
+
+
+LINKS = {
+    CommunicationKind.SERVICE: Interface("Empty", "std_srvs"),
+    CommunicationKind.ACTION: Interface("Fibonacci", "test_msgs"),
+}
+POINT = Interface("Point", "geometry_msgs")
+
+
+def on_ros(supervisor: Supervisor) -> Supervisor:
+    """A random robot with types that ROS has: its samples of two integers come as points."""
+    names = {"n": "x", "m": "y"}
+
+    def renamed(expression: Expression) -> Expression:
+        if isinstance(expression, Received):
+            return Received((names[str(expression.path[0])],))
+        if isinstance(expression, Binary):
+            return msgspec.structs.replace(expression, left=renamed(expression.left), right=renamed(expression.right))
+        return expression
+
+    model = supervisor.model
+    enums = tuple(
+        msgspec.structs.replace(
+            item,
+            rules=tuple(msgspec.structs.replace(rule, condition=renamed(rule.condition)) for rule in item.rules),
+        )
+        for item in model.enums
+    )
+    parts = tuple(Property(name, DoubleType()) for name in names.values())
+    communications = tuple(
+        msgspec.structs.replace(
+            item, interface=POINT if isinstance(item.response, EnumType) else LINKS.get(item.kind, item.interface)
+        )
+        for item in model.communications
+    )
+    objects = tuple(msgspec.structs.replace(item, properties=parts) for item in model.objects)
+    changed = msgspec.structs.replace(model, enums=enums, objects=objects, communications=communications)
+    return msgspec.structs.replace(supervisor, model=changed)
+
+
+@pytest.mark.parametrize("seed", [4, 21, 33, 36])
+def test_a_random_robot(seed: int, tmp_path: Path) -> None:
+    made = random_controller(seed)
+    assert made is not None
+    supervisor = on_ros(made)
+    scenario = node_scenario(supervisor, seed, 60)
+    compare(ros2_target(supervisor, tmp_path), scenario, observe(supervisor, scenario))
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_a_recorded_run(robot: str, tmp_path: Path) -> None:
+    supervisor = example_supervisor(f"{robot}/{robot}")
+    scenario = for_node(supervisor, read_recorded(robot))
+    compare(ros2_target(supervisor, tmp_path), scenario, observe(supervisor, scenario))
+
+
+def test_services_and_actions(tmp_path: Path) -> None:
+    supervisor = make_supervisor(load_bundle(COURIER)).supervisor
+    assert supervisor is not None
+    scenario = node_scenario(supervisor, 1, 200)
+    seen = observe(supervisor, scenario)
+    asked = {(kind, name) for item in seen for kind, name, _ in item.issued}
+    assert asked >= {("call", "power"), ("call", "wind"), ("goal", "count"), ("goal", "reach"), ("cancel", "count")}
+    compare(ros2_target(supervisor, tmp_path), scenario, seen)

@@ -7,7 +7,7 @@ import pytest
 
 from robosc.expressions import Binary, DoubleType, EnumType, Expression, Received
 from robosc.language import load_bundle
-from robosc.model.structure import CommunicationKind, Interface, Property
+from robosc.model.structure import CommunicationKind, Deployment, Interface, Property
 from robosc.supervisor import make_supervisor
 from robosc.supervisor.structure import Supervisor
 from support.equivalence.python_targets import observe
@@ -16,7 +16,10 @@ from support.equivalence.recorded import read_recorded
 from support.equivalence.ros2_target import ros2_target
 from support.equivalence.targets import compare
 from support.generated import example_supervisor
+from support.hostile import hostile_text
+from support.models import model_of
 from support.random_controllers import random_controller
+from support.random_supervisors import CERTIFICATE
 
 pytest.importorskip("rclpy", reason="ROS 2 (rclpy) is not installed")
 
@@ -89,3 +92,13 @@ def test_services_and_actions(tmp_path: Path) -> None:
     asked = {(kind, name) for item in seen for kind, name, _ in item.issued}
     assert asked >= {("call", "power"), ("call", "wind"), ("goal", "count"), ("goal", "reach"), ("cancel", "count")}
     compare(ros2_target(supervisor, tmp_path), scenario, seen)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_hostile_robot(seed: int, tmp_path: Path) -> None:
+    canary = tmp_path / "canary"
+    model = model_of(hostile_text(seed, canary, is_on_ros=True))
+    supervisor = Supervisor(model, Deployment.CONTROLLER, (), CERTIFICATE)
+    scenario = node_scenario(supervisor, seed, 60)
+    compare(ros2_target(supervisor, tmp_path), scenario, observe(supervisor, scenario))
+    assert not canary.exists()

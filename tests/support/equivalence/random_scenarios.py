@@ -8,6 +8,7 @@ from typing import Any
 from robosc.expressions import (
     ArrayType,
     BooleanType,
+    Constant,
     DoubleType,
     EnumType,
     IntegerType,
@@ -15,6 +16,7 @@ from robosc.expressions import (
     ObjectType,
     StringType,
     Type,
+    leaves,
 )
 from robosc.model.structure import CommunicationKind, Model
 from robosc.supervisor.structure import Supervisor
@@ -44,6 +46,7 @@ class Dice:
         self._dice = dice
         self._is_hostile = is_hostile
         self._topics: dict[str, list[Type]] = {}
+        self._texts = (*_TEXTS, *_texts_of(model))
         for item in model.communications:
             if item.kind is CommunicationKind.OUTGOING_MESSAGE and item.response is not None:
                 self._topics.setdefault(item.identifier, []).append(item.response)
@@ -74,9 +77,9 @@ class Dice:
             case DoubleType():
                 return dice.choice((*_DOUBLES, math.nan, math.inf, 1e308) if self._is_hostile else _DOUBLES)
             case StringType():
-                return dice.choice(_TEXTS)
+                return dice.choice(self._texts)
             case ArrayType(element=element):
-                if dice.random() < 0.6:
+                if isinstance(self._source(element), DoubleType) and dice.random() < 0.6:
                     return self._scan(element)
                 return [self.datum(element) for _ in range(dice.randint(0, 4))]
             case ObjectType():
@@ -102,6 +105,17 @@ class Dice:
         return self._model.enum(type_.name).source if isinstance(type_, EnumType) else type_
 
 
+def _texts_of(model: Model) -> list[str]:
+    """The texts that rules of enums ask for."""
+    rules = [rule.condition for enum in model.enums for rule in enum.rules]
+    return [
+        leaf.value
+        for rule in rules
+        for leaf in leaves(rule)
+        if isinstance(leaf, Constant) and isinstance(leaf.value, str)
+    ]
+
+
 def random_settings(model: Model, dice: Random) -> dict[str, Any]:
     """Settings under which targets must agree: all but the policy `random`, which C draws from another generator."""
     requests = [item.name for item in model.communications if item.kind is not CommunicationKind.OUTGOING_MESSAGE]
@@ -115,8 +129,8 @@ def random_settings(model: Model, dice: Random) -> dict[str, Any]:
         "every": dice.choice(("period", "event")),
         "on_unknown": dice.choice(("default", "default", "keep", "fault")),
         "release_identifiers": tuple(topic for topic in topics if dice.random() < 0.7),
-        "service_timeout_s": dice.choice((1.5, 10.0)),
-        "action_timeout_s": dice.choice((None, None, 2.0)),
+        "service_timeout_s": dice.choice((0.25, 1.5, 10.0)),
+        "action_timeout_s": dice.choice((None, 0.5, 2.0)),
     }
 
 

@@ -1,5 +1,6 @@
 """Every target does what the reference executor does: the same runs, compared step by step."""
 
+from dataclasses import replace
 from pathlib import Path
 from random import Random
 
@@ -17,11 +18,13 @@ from support.equivalence.c99_target import C99Target
 from support.equivalence.python_targets import PythonTarget, generated_python, observe
 from support.equivalence.random_scenarios import random_scenario
 from support.equivalence.recorded import FOLDER, read_recorded, recorded_text
+from support.equivalence.scenario import Action, Scenario
 from support.equivalence.targets import compare
 from support.equivalence.worlds import WORLDS, live
 from support.generated import example_supervisor, loaded_package
+from support.models import model_of
 from support.random_controllers import random_controller, random_robot
-from support.random_supervisors import random_supervisor
+from support.random_supervisors import CERTIFICATE, random_supervisor
 
 ROBOTS = sorted(WORLDS)
 needs_gcc = pytest.mark.skipif(GCC is None, reason="gcc is not installed")
@@ -109,3 +112,48 @@ def test_random_robots_in_c(tmp_path_factory: pytest.TempPathFactory, seed: int)
     except UnsupportedModelError:
         return  # The random models hold what C cannot keep, too: received texts.
     compare(target, scenario, observe(supervisor, scenario))
+
+
+TWO_WHEELS = """robot TwoWheels {
+    interface twist use Vector3 from geometry_msgs
+    datatype object Speed { x: double }
+    component Button {
+        outgoing message press with type: none
+        behaviour { initial marked state up { on response from press goto down } marked state down { } }
+    }
+    component Left {
+        incoming message left with identifier: "/left", type: Speed links twist
+        behaviour { initial marked state idle { on request to left goto driving } marked state driving { } }
+    }
+    component Right {
+        incoming message right with identifier: "/right", type: Speed links twist
+        behaviour { initial marked state idle { on request to right goto driving } marked state driving { } }
+    }
+    requirement { left, right } needs Button.up
+    provide left with { x: 1.0 }
+    provide right with { x: 1.0 }
+}"""
+
+
+@needs_gcc
+def test_what_is_released_together_goes_out_in_the_order_of_sending(tmp_path: Path) -> None:
+    supervisor = Supervisor(model_of(TWO_WHEELS), Deployment.CONTROLLER, (), CERTIFICATE)
+    settings = {"policy": "priority", "priority": ("right", "left"), "release_identifiers": ("/left", "/right")}
+    tick = Action("tick")
+    scenario = Scenario((tick, tick, tick, Action("message", "press"), tick), settings)
+    seen = observe(supervisor, scenario)
+    assert [name for kind, name, _ in seen[4].issued if kind == "default"] == ["/right", "/left"]
+    compare(python_target(supervisor), scenario, seen)
+    compare(C99Target(supervisor, tmp_path), scenario, seen)
+
+
+def test_a_difference_is_told_in_one_line() -> None:
+    supervisor = Supervisor(model_of(TWO_WHEELS), Deployment.CONTROLLER, (), CERTIFICATE)
+    scenario = Scenario((Action("tick"), Action("message", "press")))
+    seen = observe(supervisor, scenario)
+    seen[2] = replace(seen[2], state={**(seen[2].state or {}), "Button": {"state": "up", "variables": {}}})
+    with pytest.raises(AssertionError) as raised:
+        compare(python_target(supervisor), scenario, seen)
+    message = str(raised.value).splitlines()[0]
+    what = '{"do": "message", "subject": "press"}'
+    assert message == f'python, step 2, {what}: state differs: Button: state: expected "up", found "down"'

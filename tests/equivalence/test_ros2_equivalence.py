@@ -11,9 +11,10 @@ from robosc.model.structure import CommunicationKind, Deployment, Interface, Pro
 from robosc.supervisor import make_supervisor
 from robosc.supervisor.structure import Supervisor
 from support.equivalence.python_targets import observe
-from support.equivalence.random_scenarios import for_node, node_scenario
+from support.equivalence.random_scenarios import for_node, node_scenario, node_settings
 from support.equivalence.recorded import read_recorded
 from support.equivalence.ros2_target import ros2_target
+from support.equivalence.scenario import Action, Scenario
 from support.equivalence.targets import compare
 from support.generated import example_supervisor
 from support.hostile import hostile_text
@@ -102,3 +103,27 @@ def test_a_hostile_robot(seed: int, tmp_path: Path) -> None:
     scenario = node_scenario(supervisor, seed, 60)
     compare(ros2_target(supervisor, tmp_path), scenario, observe(supervisor, scenario))
     assert not canary.exists()
+
+
+SIDES = """robot Sides {
+    interface vector use Vector3 from geometry_msgs
+    datatype object Vector { x: double y: double }
+    component C {
+        outgoing message side with identifier: "/side", type: boolean
+        incoming message go with identifier: "/go", type: Vector links vector
+        behaviour {
+            variable is_left: boolean
+            on response from side do is_left := value
+            initial marked state ready { on request to go }
+        }
+    }
+    provide go with { x: 1.0 } if C.is_left
+    provide go with { y: 2.0 }
+}"""
+
+
+def test_what_a_request_leaves_out_has_its_default(tmp_path: Path) -> None:
+    supervisor = Supervisor(model_of(SIDES), Deployment.CONTROLLER, (), CERTIFICATE)
+    actions = tuple(Action("message", "/side", is_left) for is_left in (True, False, True, True, False))
+    scenario = Scenario(actions, node_settings(supervisor.model))
+    compare(ros2_target(supervisor, tmp_path), scenario, observe(supervisor, scenario))

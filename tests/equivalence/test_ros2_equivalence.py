@@ -10,10 +10,11 @@ from robosc.language import load_bundle
 from robosc.model.structure import CommunicationKind, Deployment, Interface, Property
 from robosc.supervisor import make_supervisor
 from robosc.supervisor.structure import Supervisor
-from support.equivalence.python_targets import observe
+from support.equivalence.node_target import timed_log
+from support.equivalence.python_targets import observe, reference
 from support.equivalence.random_scenarios import for_node, node_scenario, node_settings
 from support.equivalence.recorded import read_recorded
-from support.equivalence.ros2_target import ros2_target
+from support.equivalence.ros2_target import Ros2Surroundings, ros2_target
 from support.equivalence.scenario import Action, Scenario
 from support.equivalence.targets import compare
 from support.generated import example_supervisor
@@ -127,3 +128,31 @@ def test_what_a_request_leaves_out_has_its_default(tmp_path: Path) -> None:
     actions = tuple(Action("message", "/side", is_left) for is_left in (True, False, True, True, False))
     scenario = Scenario(actions, node_settings(supervisor.model))
     compare(ros2_target(supervisor, tmp_path), scenario, observe(supervisor, scenario))
+
+
+@pytest.mark.parametrize("robot", ["line_follower", "maze_solver"])
+def test_a_node_that_decides_by_its_own_timer(robot: str, tmp_path: Path) -> None:
+    """When it decided is known from its log afterwards: the reference, deciding then, must have done the same.
+
+    With every request in a list of priorities a decision that issues nothing leaves no trace in the controller.
+    """
+    supervisor = example_supervisor(f"{robot}/{robot}")
+    model = supervisor.model
+    requests = tuple(i.name for i in model.communications if i.kind is CommunicationKind.INCOMING_MESSAGE)
+    settings = {"policy": "priority", "priority": requests, "period_s": 0.02}
+    messages = tuple(action for action in read_recorded(robot).actions if action.do == "message")[:40]
+    surroundings = Ros2Surroundings(supervisor, tmp_path)
+    log = timed_log(surroundings, Scenario(messages, settings), tmp_path / "events", model)
+    target = reference(supervisor)
+    seen = [*target.start(Scenario((), settings)).log]
+    left = list(messages)
+    while len(seen) < len(log):
+        is_decision = log[len(seen)].get("controllable") is True
+        if not is_decision and len(left) < len(messages):
+            # The timer ticked after the last message: what was enabled then was issued.
+            assert seen[-1].get("controllable") is True or not any(
+                event.endswith(".request") for event in target.do(Action("wait")).enabled or ()
+            )
+        seen += target.do(Action("tick") if is_decision else left.pop(0)).log
+    assert seen == log
+    assert not left

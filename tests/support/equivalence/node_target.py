@@ -8,6 +8,7 @@ step or at the end, where the node is stopped and everything it has said is read
 
 import json
 import time
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
@@ -46,6 +47,41 @@ class Surroundings(Protocol):
 
     def close(self) -> None:
         """End everything, whatever has happened."""
+
+
+class TickingSurroundings(Surroundings, Protocol):
+    """Those of a node that decides by its own timer."""
+
+    def wait_for_ticks(self, count: int) -> None:
+        """Wait until the timer has ticked so often."""
+
+
+def timed_log(surroundings: TickingSurroundings, scenario: Scenario, folder: Path, model: Model) -> list[Entry]:
+    """The event log of a node that decides by its own timer, while the messages of a scenario come to it.
+
+    The timer has ticked at least once after each message was taken.
+    """
+    sizes = Counter(i.identifier for i in model.communications if i.kind is CommunicationKind.OUTGOING_MESSAGE)
+    target = NodeTarget("timed", model, surroundings, folder)
+    surroundings.start(scenario, folder)
+    taken = 0
+    log: list[Entry] = []
+    try:
+        for action in scenario.actions:
+            taken += sizes[action.subject]
+            surroundings.send(action.subject, action.data)
+            began = time.monotonic()
+            while sum(1 for item in log if item.get("controllable") is False) < taken:
+                assert time.monotonic() < began + LIMIT_S, f"waited {LIMIT_S} s in vain for {action}"
+                surroundings.spin()
+                target._look()
+                log = target._log
+            # The first of them may have been on its way already.
+            surroundings.wait_for_ticks(2)
+        log = list(target.close().log)
+    finally:
+        surroundings.close()
+    return log
 
 
 class NodeTarget:

@@ -54,7 +54,9 @@ class Ros2Surroundings:
         host = self._stack.enter_context(ServerHost(domain)) if servers(self._model) else None
         self._connect(host)
         from diagnostic_msgs.msg import DiagnosticArray
+        from std_msgs.msg import String
 
+        self._states = self._peer.receive(String, "/state")
         reports = self._peer.receive(DiagnosticArray, "/diagnostics")
         parameters = folder.parent / "parameters.yaml"
         parameters.write_text(json.dumps({"/**": {"ros__parameters": _parameters(scenario, folder)}}))
@@ -107,6 +109,11 @@ class Ros2Surroundings:
         message = load_message(found.interface.package, found.interface.type)()
         _fill(message, data)
         self._peer.publish(message, topic)
+
+    def wait_for_ticks(self, count: int) -> None:
+        """Wait until the node's own timer has ticked: it tells its state each time."""
+        seen = len(self._states)
+        self._peer.spin_until(lambda: len(self._states) >= seen + count, LIMIT_S, "ticks of the node", self._node)
 
     def answer(self, action: Action) -> None:
         """Let a server do it."""
@@ -196,6 +203,7 @@ def _parameters(scenario: Scenario, folder: Path) -> dict[str, Any]:
         "on_unknown": settings.on_unknown,
         "log_folder": str(folder),
         "server_wait": LIMIT_S,
+        "publish_state": True,
     }
     if settings.max_age_s:
         found["max_age"] = [f"{topic}={age}" for topic, age in settings.max_age_s.items()]

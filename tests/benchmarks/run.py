@@ -1,16 +1,18 @@
 """Prints every benchmark table of the project, measured side by side in one run.
 
-Usage: run.py [cold-start] [conditions] [execution] [language] [ros2] [synthesis]      (all of them without an argument)
+Usage: run.py [cold-start] [conditions] [execution] [language] [synthesis]      (all of them without an argument)
 """
 
 import sys
 from collections.abc import Callable
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import cold_start
 import conditions
 import execution
 import language
-import ros2_cycle
 import synthesis
 
 TABLES: dict[str, Callable[[], str]] = {
@@ -18,7 +20,6 @@ TABLES: dict[str, Callable[[], str]] = {
     "conditions": conditions.table,
     "execution": execution.table,
     "language": language.table,
-    "ros2": ros2_cycle.table,
     "synthesis": synthesis.table,
 }
 

@@ -436,10 +436,10 @@ def test_nothing_runs_while_a_goal_and_a_call_are_under_way(porter: Porter) -> N
     porter.allow(True)
     handle, reply = porter.send_goal(), porter.call()
     porter.until(lambda: bool(server.handles and service.requests), "both to be under way")
-    before = porter.layer.cpu_s()
+    before = porter.layer.processor_s()
     porter.peer.spin_for(2.0)
     # A loop that asks again and again whether there is an answer would take all of it.
-    assert porter.layer.cpu_s() - before < 1.0
+    assert porter.layer.processor_s() - before < 1.0
     server.end(End.SUCCEED)
     service.answer(success=True)
     assert porter.wait_for(reply, "the reply").success

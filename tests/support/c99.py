@@ -125,16 +125,7 @@ class Reference:
         if settings.policy == "random":
             seed = settings.seed
             executor._new_policy = lambda: Splitmix(seed)  # type: ignore[method-assign]
-        words: list[Any] = ["n", ("fair", "priority", "random").index(settings.policy), len(settings.priority)]
-        words += [self.numbers[name] for name in settings.priority]
-        words += [settings.seed, int(settings.every == "event")]
-        words += [("default", "keep", "fault").index(settings.on_unknown)]
-        words += [_microseconds(settings.service_timeout_s), _microseconds(settings.action_timeout_s)]
-        for item in self.model.communications:
-            is_sensor = item.kind is CommunicationKind.OUTGOING_MESSAGE
-            age = settings.max_age_s.get(item.identifier, item.max_age) if is_sensor else None
-            words.append(0 if age is None else _microseconds(age))
-        words += [int(topic in (settings.release_identifiers or ())) for topic in self.topics]
+        words = settings_words(self.layout, settings)
         self.executor = executor
         self._told(words)
         return executor
@@ -224,7 +215,7 @@ class Reference:
 
     def tell(self, kind: str, *words: object) -> None:
         """Give the generated code, too, a command that the executor was given."""
-        self._told([kind, _microseconds(self.clock.now_s), *words])
+        self._told([kind, microseconds(self.clock.now_s), *words])
 
     def let_fail(self, *names: str) -> None:
         """Let these callbacks fail from now on, and no others."""
@@ -272,7 +263,7 @@ class Reference:
         """One random command."""
         dice, executor = self.dice, self.executor
         self.clock.advance(dice.choice([0, 1, 1] if self.is_calm else [0, 0, 1, 1, 1, 2, 4, 9, 33]) * 0.125)
-        now = _microseconds(self.clock.now_s)
+        now = microseconds(self.clock.now_s)
         back = events_back(self.layout)
         kinds = ["start", "tick", "watch", "stop", "restart", "failing", "receive", "back", "failed", "goal"]
         weights = [4, 8, 0, 0, 0, 0] if self.is_calm else [0.3, 4, 0.5, 0.15, 0.6, 0.3]
@@ -324,7 +315,7 @@ class Reference:
             shared: Any = datum if number == chosen else None
             if number != chosen and isinstance(type_, DoubleType) and type(datum) is int:
                 shared = float(datum)
-            words += self._words(type_, shared, is_root=True)
+            words += data_words(self.layout, type_, shared, is_root=True)
         self.executor.receive(identifier, datum)
         self._told(words)
 
@@ -336,7 +327,7 @@ class Reference:
         datum = None if type_ is None else self._datum(self.layout.source(type_))
         words: list[object] = ["b", now, events_back(self.layout).index(event), number]
         if type_ is not None:
-            words += self._words(self.layout.source(type_), datum, is_root=True)
+            words += data_words(self.layout, type_, datum, is_root=True)
         if is_service:
             self.executor.on_reply(number, datum)
         elif kind == "feedback":
@@ -389,32 +380,51 @@ class Reference:
                 return [self._datum(element) for _ in range(dice.randint(0, 4))]
         raise AssertionError(type_)
 
-    def _words(self, type_: Type, datum: Any, is_root: bool = False) -> list[object]:
-        type_ = self.layout.source(type_)
-        match type_:
-            case BooleanType():
-                return [-1 if datum is None or not isinstance(datum, bool) else int(datum)]
-            case IntegerType():
-                return [-(2**63) if datum is None else datum]
-            case DoubleType():
-                return ["nan" if datum is None else repr(float(datum))]
-            case StringType():
-                return ["?" if datum is None else _hex(datum)]
-            case ArrayType(element=element):
-                if datum is None:
-                    return [-1]
-                return [len(datum), *(word for item in datum for word in self._words(element, item))]
-            case ObjectType(name=name):
-                if datum is None and is_root:
-                    return [0]
-                parts = [
-                    word
-                    for item in self.model.object(name).properties
-                    if not isinstance(item.type, NoneType)
-                    for word in self._words(item.type, None if datum is None else datum[item.name])
-                ]
-                return [1, *parts] if is_root else parts
-        raise AssertionError(type_)
+
+def settings_words(layout: Layout, settings: Settings) -> list[object]:
+    """The command that makes generated code begin with settings, which are spelled out."""
+    numbers = {name: number for number, name in enumerate(layout.communications)}
+    words: list[object] = ["n", ("fair", "priority", "random").index(settings.policy), len(settings.priority)]
+    words += [numbers[name] for name in settings.priority]
+    words += [settings.seed, int(settings.every == "event")]
+    words += [("default", "keep", "fault").index(settings.on_unknown)]
+    words += [microseconds(settings.service_timeout_s), microseconds(settings.action_timeout_s)]
+    for item in layout.model.communications:
+        is_sensor = item.kind is CommunicationKind.OUTGOING_MESSAGE
+        age = settings.max_age_s.get(item.identifier, item.max_age) if is_sensor else None
+        words.append(0 if age is None else microseconds(age))
+    return words + [int(topic in (settings.release_identifiers or ())) for topic in layout.topics]
+
+
+def data_words(layout: Layout, type_: Type, datum: Any, is_root: bool = False) -> list[object]:
+    """Received data of a type as the test program reads it; what is not there, or of another type, is unknown."""
+    type_ = layout.source(type_)
+    match type_:
+        case BooleanType():
+            return [int(datum) if isinstance(datum, bool) else -1]
+        case IntegerType():
+            return [datum if isinstance(datum, int) and not isinstance(datum, bool) else -(2**63)]
+        case DoubleType():
+            is_number = isinstance(datum, int | float) and not isinstance(datum, bool)
+            return [repr(float(datum)) if is_number else "nan"]
+        case StringType():
+            return [_hex(datum) if isinstance(datum, str) else "?"]
+        case ArrayType(element=element):
+            if not isinstance(datum, list):
+                return [-1]
+            return [len(datum), *(word for item in datum for word in data_words(layout, element, item))]
+        case ObjectType(name=name):
+            if is_root and not isinstance(datum, dict):
+                return [0]
+            given = datum if isinstance(datum, dict) else {}
+            parts = [
+                word
+                for item in layout.model.object(name).properties
+                if not isinstance(item.type, NoneType)
+                for word in data_words(layout, item.type, given.get(item.name))
+            ]
+            return [1, *parts] if is_root else parts
+    raise AssertionError(type_)
 
 
 def _paths(value: Any, path: tuple[str, ...]) -> list[tuple[str, ...]]:
@@ -437,7 +447,8 @@ def _hex(text: str) -> str:
     return "x" + text.encode("utf-8", "surrogatepass").hex()
 
 
-def _microseconds(seconds: float | None) -> int:
+def microseconds(seconds: float | None) -> int:
+    """Time as generated code has it; None is never."""
     return _MASK if seconds is None else round(seconds * 1e6)
 
 

@@ -17,7 +17,7 @@ from robosc.supervisor.structure import Supervisor
 from robosc.targets import generate
 from robosc.targets.c99.layer import request_parameters
 from robosc.targets.c99.layout import event_data, make_layout
-from support.c99 import GCC, WARNINGS, Reference, _hex, _microseconds, replay
+from support.c99 import GCC, WARNINGS, Reference, _hex, data_words, microseconds, replay
 from support.c99_layer_main import CALLBACKS, TOKENS, layer_program
 from support.c99_main import batch_types, events_back
 
@@ -83,12 +83,12 @@ class LayerReference(Reference):
         executor = Layer(self.system, self, self, settings, self.clock, self)
         settings = executor.settings
         words: list[object] = ["n", ("default", "keep", "fault").index(settings.on_unknown)]
-        words += [_microseconds(settings.service_timeout_s), _microseconds(settings.action_timeout_s)]
-        words.append(_microseconds(settings.command_timeout_s))
+        words += [microseconds(settings.service_timeout_s), microseconds(settings.action_timeout_s)]
+        words.append(microseconds(settings.command_timeout_s))
         for item in self.model.communications:
             is_sensor = item.kind is CommunicationKind.OUTGOING_MESSAGE
             age = settings.max_age_s.get(item.identifier, item.max_age) if is_sensor else None
-            words.append(0 if age is None else _microseconds(age))
+            words.append(0 if age is None else microseconds(age))
         words += [int(topic in (settings.release_identifiers or ())) for topic in self.topics]
         self.executor = executor
         self._told(words)
@@ -172,7 +172,7 @@ class LayerReference(Reference):
         """One random command."""
         dice = self.dice
         self.clock.advance(dice.choice([0, 1, 1] if self.is_calm else [0, 0, 1, 1, 1, 2, 4, 9, 33]) * 0.125)
-        now = _microseconds(self.clock.now_s)
+        now = microseconds(self.clock.now_s)
         kinds: list[tuple[float, Callable[[int], None]]] = [
             (4 if self.is_calm else 0.6, self._start),
             (3, self._watch),
@@ -244,7 +244,7 @@ class LayerReference(Reference):
             shared: Any = datum if number == chosen else None
             if number != chosen and isinstance(type_, DoubleType) and type(datum) is int:
                 shared = float(datum)
-            words += self._words(type_, shared, is_root=True)
+            words += data_words(self.layout, type_, shared, is_root=True)
         return datum, words
 
     def _ask(self, now: int) -> None:
@@ -344,7 +344,7 @@ class LayerReference(Reference):
         token = self.remember(datum)
         words: list[object] = ["b", now, events_back(self.layout).index(event), number, token]
         if type_ is not None:
-            words += self._words(self.layout.source(type_), datum, is_root=True)
+            words += data_words(self.layout, type_, datum, is_root=True)
         if is_service:
             self.executor.on_reply(number, datum)
         elif kind == "feedback":
@@ -375,7 +375,7 @@ class LayerReference(Reference):
         data = {"code": 1} if self.dice.random() < 0.5 else None
         token = -1 if data is None else self.remember(data)
         self.executor.on_goal_ended(number, outcome, data)
-        self._told(["e", _microseconds(self.clock.now_s), number, int(outcome == "cancelled"), token])
+        self._told(["e", microseconds(self.clock.now_s), number, int(outcome == "cancelled"), token])
 
 
 def compare_layer(supervisor: Supervisor, program: Path, dice: Random, runs: int, length: int) -> list[str]:

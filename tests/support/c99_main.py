@@ -31,13 +31,13 @@ _TOP = """
 #include <stdlib.h>
 #include <string.h>
 
-static char words[65536][96];
+static char words[8192][2048];
 static int failing;
 
 static const char *next_word(void)
 {
-    static char word[96];
-    if (scanf("%95s", word) != 1) {
+    static char word[4096];
+    if (scanf("%4095s", word) != 1) {
         exit(0);
     }
     return word;
@@ -214,6 +214,7 @@ int main(void)
         default: printf("what?\\n"); return 1;
         }
         print_state(now_us);
+        fflush(stdout);
     }
 }
 """

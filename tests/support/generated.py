@@ -72,6 +72,18 @@ def load_system(supervisor: Supervisor) -> Any:
     return load_module(supervisor).Supervisor()
 
 
+def loaded_file(files: GeneratedFiles) -> types.ModuleType:
+    """The generated module as a whole, from its file's text."""
+    ((path, text),) = files.items()
+    module = types.ModuleType(f"generated_{next(_numbers)}")
+    sys.modules[module.__name__] = module
+    try:
+        exec(compile(text, path, "exec", dont_inherit=True), module.__dict__)
+    finally:
+        del sys.modules[module.__name__]
+    return module
+
+
 def python_text(supervisor: Supervisor) -> str:
     """The generated module."""
     (text,) = generate(supervisor, "python").values()

@@ -117,8 +117,13 @@ class RosProcess:
         """Whether it has not ended."""
         return self._process.poll() is None
 
-    def cpu_s(self) -> float:
-        """Seconds of a processor that it has used so far."""
+    def resident_kb(self) -> int:
+        """Memory that it takes now."""
+        status = Path(f"/proc/{self._process.pid}/status").read_text()
+        return int(next(line.split()[1] for line in status.splitlines() if line.startswith("VmRSS:")))
+
+    def processor_s(self) -> float:
+        """Time of a processor that it has taken."""
         fields = Path(f"/proc/{self._process.pid}/stat").read_text().rpartition(")")[2].split()
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 

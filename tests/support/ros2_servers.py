@@ -105,6 +105,7 @@ class HeldService:
     """
 
     def __init__(self, host: ServerHost, service_class: Any, name: str) -> None:
+        self.service_class = service_class
         self.requests: list[Any] = []
         self._host = host
         self._gates: list[Gate] = []
@@ -160,7 +161,7 @@ class HeldAction:
         self.handles: list[Any] = []
         self.cancels = 0
         self._host = host
-        self._class = action_class
+        self.action_class = action_class
         self._gates: list[Gate] = []
         self._ends_on_cancel = cancels and ends_on_cancel
 
@@ -193,7 +194,7 @@ class HeldAction:
         end, fields = gate.wait() or (End.ABORT, {})
         getattr(handle, end.value)()
         gate.is_over = True
-        return self._class.Result(**fields)
+        return self.action_class.Result(**fields)
 
     def _watch(self, handle: Any, gate: Gate) -> None:
         """End a goal once its cancel is asked for: only after its server has answered that."""
@@ -204,7 +205,11 @@ class HeldAction:
 
     def feedback(self, **fields: Any) -> None:
         """Tell how far the last goal is."""
-        self.handles[-1].publish_feedback(self._class.Feedback(**fields))
+        self.handles[-1].publish_feedback(self.action_class.Feedback(**fields))
+
+    def is_last_over(self) -> bool:
+        """Whether the last goal has ended."""
+        return bool(self._gates) and self._gates[-1].is_over
 
     def end(self, how: End, **fields: Any) -> None:
         """End the last goal."""

@@ -1,0 +1,98 @@
+"""The robots that are measured, what comes to them, and a large one."""
+
+from types import SimpleNamespace
+from typing import Any
+
+from robosc.supervisor.structure import Supervisor
+from support.execution import supervisor_of
+from support.generated import example_supervisor
+from support.models import model_of
+
+CYCLES = 1000
+RUNS = 3
+
+# The paper's Table I: mean, minimum, maximum, standard deviation.
+WITHOUT = {"line_follower": "5 / 0 / 73 / 5", "maze_solver": "2 / 0 / 139 / 7"}
+WITH = {"line_follower": "34 / 11 / 160 / 25", "maze_solver": "40 / 9 / 660 / 40"}
+
+SMALL = ("line_follower", "maze_solver")
+LARGE = "60 components"
+_OTHER = {"line_follower": ("/line/correction", 0.1), "maze_solver": ("/rotate_done", None), LARGE: ("/seen7", True)}
+_SCANS = tuple(SimpleNamespace(ranges=[distance] * 360) for distance in (3.0, 0.2))
+
+_LARGE_SENSORS = 28
+
+
+def supervisor(name: str) -> Supervisor:
+    """The supervisor of a robot."""
+    return supervisor_of(model_of(_large_text())) if name == LARGE else example_supervisor(f"{name}/{name}")
+
+
+def feed(name: str, number: int) -> tuple[str, Any]:
+    """What comes: every other time a scan, whose obstacle comes and goes every 50 times."""
+    return ("/scan", _SCANS[number // 50 % 2]) if number % 2 else _OTHER[name]
+
+
+def _large_text() -> str:
+    """A line follower with more around it: sensors that are fine or not, and a lamp for each that may then shine."""
+    begin = """
+        interface twist use Twist from geometry_msgs
+        interface laser_scan use LaserScan from sensor_msgs
+        datatype object Vector { x: double }
+        datatype object Twist { linear: Vector }
+        datatype object Scan { ranges: array(double) }
+        datatype enum Way from Scan to {
+            value.ranges[0] > 0.4 and value.ranges[20] > 0.4 and value.ranges[340] > 0.4 -> clear  default -> obstructed
+        }
+        component Lidar {
+            outgoing message scan with identifier: "/scan", type: Way links laser_scan
+            behaviour {
+                variable way: Way = obstructed
+                on response from scan do way := value
+                initial marked state unsafe { transition if way = clear goto safe }
+                marked state safe { transition if way = obstructed goto unsafe }
+            }
+        }
+        component Stop {
+            outgoing message stop with type: none
+            outgoing message resume with type: none
+            behaviour {
+                initial marked state running { on response from stop goto stopped }
+                marked state stopped { on response from resume goto running }
+            }
+        }
+        component Line {
+            outgoing message line with type: none
+            behaviour { initial marked state lost { on response from line goto found } marked state found { } }
+        }
+        component Platform {
+            incoming message move with identifier: "/cmd_vel", type: Twist links twist
+            incoming message halt with identifier: "/cmd_vel", type: Twist links twist
+            behaviour { initial marked state operational { on request to move  on request to halt } }
+        }
+        requirement move needs Lidar.safe and Stop.running
+        requirement halt needs Lidar.unsafe or Stop.stopped
+        provide move with { linear: { x: 0.15 } }
+    """
+    pairs = "".join(
+        f"""
+        component Sensor{number} {{
+            outgoing message seen{number} with identifier: "/seen{number}", type: boolean
+            behaviour {{
+                variable seen: boolean
+                on response from seen{number} do seen := value
+                initial marked state watching {{ }}
+            }}
+        }}
+        component Lamp{number} {{
+            incoming message shine{number} with identifier: "/shine{number}", type: none
+            behaviour {{
+                initial marked state dark {{ on request to shine{number} goto lit }}
+                marked state lit {{ on response from seen{number} goto dark }}
+            }}
+        }}
+        requirement shine{number} needs Sensor{number}.seen and Stop.running and Lidar.safe
+        """
+        for number in range(_LARGE_SENSORS)
+    )
+    return f"robot Large {{ {begin} {pairs} }}"

@@ -1,0 +1,191 @@
+"""Generated C99, compiled with sanitizers, as a process that is told what happens."""
+
+import subprocess
+from pathlib import Path
+from typing import IO, Any
+
+from robosc.automata.plants import communication_plant_name
+from robosc.execution.interpreter import describe
+from robosc.execution.runner import Status
+from robosc.execution.settings import settings_for
+from robosc.expressions import BooleanType, DoubleType, EnumType, StringType, Type
+from robosc.supervisor.structure import Supervisor
+from robosc.targets.c99.layout import PLANT_LOCATIONS, event_data, make_layout
+from robosc.targets.events import has_plant_location
+from support.c99 import SANITIZERS, compiled, data_words, microseconds, settings_words
+from support.c99_main import batch_types, events_back
+from support.equivalence.observation import Entry, Issued, Observation, Sight
+from support.equivalence.python_targets import Ids
+from support.equivalence.scenario import PERIOD_S, Action, Scenario
+
+_STATUSES = (Status.NEW, Status.WAITING, Status.RUNNING, Status.STOPPING, Status.STOPPED)
+
+
+class C99Target:
+    """A compiled test program around generated C.
+
+    Args:
+        supervisor: What is generated.
+        folder: Where to compile.
+        options: For the compiler.
+    """
+
+    name = "c99"
+    # Its callback for a log tells kind and event, or the topic of a release.
+    sight = Sight(log_keys=frozenset({"kind", "event", "identifier"}))
+
+    def __init__(self, supervisor: Supervisor, folder: Path, *options: str) -> None:
+        self._supervisor = supervisor
+        self._layout = make_layout(supervisor)
+        self._events = tuple(self._layout.events)
+        self._communications = tuple(self._layout.communications)
+        self._topics = tuple(self._layout.topics)
+        self._ids = Ids()
+        self._now_s = 0.0
+        program = compiled(supervisor, folder, *(options or SANITIZERS))
+        self._errors = (folder / "errors").open("w+", encoding="utf-8")
+        self._process = subprocess.Popen(
+            [program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors, text=True
+        )
+
+    def start(self, scenario: Scenario, awaited: Observation | None = None) -> Observation:
+        """Begin."""
+        settings = settings_for(scenario.all_settings(), describe(self._supervisor))
+        self._tell(settings_words(self._layout, settings))
+        return self._tell(["s", microseconds(self._now_s)])
+
+    def do(self, action: Action, awaited: Observation | None = None) -> Observation:
+        """Let one thing happen."""
+        self._now_s += PERIOD_S if action.do == "tick" else action.seconds
+        now, name, ids = microseconds(self._now_s), action.subject, self._ids
+        match action.do:
+            case "tick" | "wait" | "restart":
+                return self._tell([{"tick": "t", "wait": "w", "restart": "R"}[action.do], now])
+            case "stop":
+                return self._tell(["S", now, 0])
+            case "message":
+                words: list[object] = ["m", now, list(self._layout.received_topics).index(name)]
+                for type_ in batch_types(self._layout, name):
+                    words += data_words(self._layout, type_, action.data, is_root=True)
+                return self._tell(words)
+            case "reply":
+                return self._back(f"{name}.response", ids.end(name), action.data)
+            case "feedback":
+                return self._back(f"{name}.feedback", ids.last(name), action.data)
+            case "fail":
+                return self._tell(["f", now, ids.end(name)])
+            case "accept":
+                return self._tell(["a", now, ids.last(name)])
+            case "end" if action.how == "succeeded":
+                return self._back(f"{name}.response", ids.end(name), action.data)
+            case "end":
+                return self._tell(["e", now, ids.end(name)])
+        raise ValueError(action.do)
+
+    def _back(self, event: str, number: int, data: Any) -> Observation:
+        words = ["b", microseconds(self._now_s), events_back(self._layout).index(event), number]
+        type_ = event_data(self._layout.model, event)
+        return self._tell(words + ([] if type_ is None else data_words(self._layout, type_, data, is_root=True)))
+
+    def _tell(self, words: list[object]) -> Observation:
+        _pipe(self._process.stdin).write(" ".join(map(str, words)) + "\n")
+        _pipe(self._process.stdin).flush()
+        issued: list[Issued] = []
+        log: list[Entry] = []
+        for line in _pipe(self._process.stdout):
+            kind, *rest = line.split()
+            if kind == "state":
+                return self._observation(rest, issued, log)
+            if kind == "log":
+                log.append(self._entry(*rest))
+            else:
+                issued.append(self._issued(kind, rest))
+        self._process.wait()
+        self._errors.seek(0)
+        raise AssertionError(f"c99: the program ended: {self._errors.read()[-3000:]}")
+
+    def _entry(self, kind: str, number: str = "-1") -> Entry:
+        if kind == "release":
+            return {"kind": kind, "identifier": self._topics[int(number)]}
+        if int(number) < 0:
+            return {"kind": kind}
+        return {"kind": kind, "event": self._events[int(number)]}
+
+    def _issued(self, kind: str, words: list[str]) -> Issued:
+        if kind == "default":
+            return kind, self._topics[int(words[0])], {}
+        number = words.pop(0) if kind != "publish" else ""
+        name = self._communications[int(words.pop(0))]
+        if kind in ("call", "goal"):
+            self._ids.add(name, int(number))
+        return kind, name, {path: _given(text) for path, _, text in (word.partition("=") for word in words)}
+
+    def _observation(self, words: list[str], issued: list[Issued], log: list[Entry]) -> Observation:
+        left = iter(words)
+        state: dict[str, Any] = {}
+        for component, behaviour in self._layout.behaviours:
+            place = behaviour.states[int(next(left))].name
+            variables = {item.name: _value(item.type, next(left)) for item in behaviour.variables}
+            state[component] = {"state": place, "variables": variables}
+        plants = {
+            communication_plant_name(item): PLANT_LOCATIONS[item.kind][int(next(left))]
+            for item in self._layout.model.communications
+            if has_plant_location(item)
+        }
+        locations = {
+            item.name: plants[communication_plant_name(item)]
+            for item in self._layout.model.communications
+            if has_plant_location(item)
+        }
+        assert next(left) == "enabled"
+        flags = next(left) if self._layout.controllable else ""
+        named = dict(zip(left, left, strict=False))
+        return Observation(
+            issued=tuple(issued),
+            log=tuple(log),
+            state=state,
+            enabled=frozenset(
+                event for event, flag in zip(self._layout.controllable, flags, strict=True) if flag == "1"
+            ),
+            locations=locations,
+            status=(_STATUSES[int(named["status"])].value, named["fault"] == "1"),
+        )
+
+    def close(self) -> Observation:
+        """End the program: a sanitizer may still complain."""
+        _pipe(self._process.stdin).close()
+        left = _pipe(self._process.stdout).read()
+        self._process.wait()
+        self._errors.seek(0)
+        complaint = self._errors.read()
+        self._errors.close()
+        _pipe(self._process.stdout).close()
+        assert not complaint and not left, complaint or left
+        return Observation()
+
+
+def _pipe(pipe: IO[str] | None) -> IO[str]:
+    assert pipe is not None
+    return pipe
+
+
+def _given(text: str) -> Any:
+    return _text(text) if text.startswith("x") else float(text)
+
+
+def _text(word: str) -> str:
+    return bytes.fromhex(word[1:]).decode("utf-8", "surrogatepass")
+
+
+def _value(type_: Type, word: str) -> Any:
+    match type_:
+        case BooleanType():
+            return word == "1"
+        case DoubleType():
+            return float(word)
+        case StringType():
+            return _text(word)
+        case EnumType(values=values):
+            return values[int(word)]
+        case _:
+            return int(word)

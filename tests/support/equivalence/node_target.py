@@ -1,0 +1,165 @@
+"""A generated node on real middleware: what it publishes and calls, and its event log, step by step.
+
+A node's own timers would decide at times that no test knows. So it is run with the longest period and with `every`
+set to `event`: each decision comes with what came, and the run is a function of what is sent. After each step the test
+waits until as much has come as the reference showed, no longer than a limit; what comes too much is found in the next
+step or at the end, where the node is stopped and everything it has said is read.
+"""
+
+import json
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+from robosc.model.structure import CommunicationKind, Model
+from support.equivalence.observation import Entry, Issued, Observation, Sight, entry
+from support.equivalence.scenario import Action, Scenario
+
+LIMIT_S = 15.0
+RESEND_S = 3.0
+
+
+class Surroundings(Protocol):
+    """A node and everything around it, on one kind of ROS."""
+
+    def start(self, scenario: Scenario, folder: Path) -> None:
+        """Start the node with the settings of a scenario and `folder` for its event log; wait until it runs."""
+
+    def send(self, topic: str, data: Any) -> None:
+        """Publish a message."""
+
+    def answer(self, action: Action) -> None:
+        """Let a server do what an action says: `reply`, `accept`, `feedback`, `end`."""
+
+    def take_issued(self) -> list[Issued]:
+        """What the node has asked for since the last time: `publish` on a topic, `call`, `goal`, `cancel`."""
+
+    def settle(self) -> None:
+        """Return when the node has handled what was sent to it and shows nothing of it."""
+
+    def spin(self) -> None:
+        """Handle what comes, for a moment; fail if the node has ended."""
+
+    def stop(self) -> None:
+        """Stop the node with a signal and wait for its end."""
+
+    def close(self) -> None:
+        """End everything, whatever has happened."""
+
+
+class TickingSurroundings(Surroundings, Protocol):
+    """Those of a node that decides by its own timer."""
+
+    def wait_for_ticks(self, count: int) -> None:
+        """Wait until the timer has ticked so often."""
+
+
+def timed_log(surroundings: TickingSurroundings, scenario: Scenario, folder: Path, model: Model) -> list[Entry]:
+    """The event log of a node that decides by its own timer, while the messages of a scenario come to it.
+
+    The timer has ticked at least once after each message was taken.
+    """
+    sizes = Counter(i.identifier for i in model.communications if i.kind is CommunicationKind.OUTGOING_MESSAGE)
+    target = NodeTarget("timed", model, surroundings, folder)
+    surroundings.start(scenario, folder)
+    taken = 0
+    log: list[Entry] = []
+    try:
+        for action in scenario.actions:
+            taken += sizes[action.subject]
+            surroundings.send(action.subject, action.data)
+            began = time.monotonic()
+            while sum(1 for item in log if item.get("controllable") is False) < taken:
+                assert time.monotonic() < began + LIMIT_S, f"waited {LIMIT_S} s in vain for {action}"
+                surroundings.spin()
+                target._look()
+                log = target._log
+            # The first of them may have been on its way already.
+            surroundings.wait_for_ticks(2)
+        log = list(target.close().log)
+    finally:
+        surroundings.close()
+    return log
+
+
+class NodeTarget:
+    """A node as a target of the suite.
+
+    Args:
+        name: For messages.
+        model: What it was made from.
+        surroundings: Where it runs.
+        folder: For its event log.
+    """
+
+    def __init__(self, name: str, model: Model, surroundings: Surroundings, folder: Path) -> None:
+        self.name = name
+        topics = {i.name: i.identifier for i in model.communications if i.kind is CommunicationKind.INCOMING_MESSAGE}
+        self.sight = Sight(topics=topics)
+        self._surroundings = surroundings
+        self._folder = folder
+        self._read = 0
+        self._issued: list[Issued] = []
+        self._log: list[Entry] = []
+        self._is_stopped = False
+
+    def start(self, scenario: Scenario, awaited: Observation) -> Observation:
+        """Start the node."""
+        self._surroundings.start(scenario, self._folder)
+        return self._wait_for(awaited)
+
+    def do(self, action: Action, awaited: Observation) -> Observation:
+        """Let one thing happen, and wait until it shows."""
+        if action.do == "message":
+            self._surroundings.send(action.subject, action.data)
+            # Sensors' topics may lose a message; one that comes always shows in the log.
+            return self._wait_for(awaited, lambda: self._surroundings.send(action.subject, action.data))
+        self._surroundings.answer(action)
+        return self._wait_for(awaited)
+
+    def _wait_for(self, awaited: Observation, resend: Callable[[], None] | None = None) -> Observation:
+        if not awaited.log and not awaited.issued:
+            self._surroundings.settle()
+        began = time.monotonic()
+        while True:
+            self._surroundings.spin()
+            self._look()
+            if len(self._log) >= len(awaited.log) and len(self._issued) >= len(awaited.issued):
+                break
+            if time.monotonic() > began + LIMIT_S:
+                break
+            if resend and not self._log and time.monotonic() > began + RESEND_S:
+                resend()
+                resend = None
+        return self._taken()
+
+    def _look(self) -> None:
+        self._issued += self._surroundings.take_issued()
+        for path in self._folder.glob("*.jsonl"):
+            text = path.read_text(encoding="utf-8")
+            lines = text[: text.rfind("\n") + 1].splitlines()
+            self._log += [entry(json.loads(line)) for line in lines[self._read :]]
+            self._read = len(lines)
+
+    def _taken(self) -> Observation:
+        found = Observation(issued=tuple(self._issued), log=tuple(self._log))
+        self._issued, self._log = [], []
+        return found
+
+    def close(self) -> Observation:
+        """Stop it; what it said but for its safe stop."""
+        if self._is_stopped:
+            return Observation()
+        self._is_stopped = True
+        try:
+            self._surroundings.stop()
+            self._look()
+        finally:
+            self._surroundings.close()
+        stop = next((number for number, item in enumerate(self._log) if item["kind"] == "stop"), len(self._log))
+        self._log = self._log[:stop]
+        # What brings the robot to rest: all-default messages, and cancels.
+        self._issued = [item for item in self._issued if item[2] or item[0] in ("call", "goal")]
+        return self._taken()

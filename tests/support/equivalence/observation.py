@@ -1,0 +1,144 @@
+"""What a controller shows after each action, and the one message about what differs from the reference."""
+
+import json
+import struct
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from robosc.execution.event_log import plain
+
+MAXIMUM_FLOAT32 = 3.4028234663852886e38
+
+Issued = tuple[str, str, Mapping[str, Any]]
+"""`publish`, `default`, `call`, `goal` or `cancel`; of what (`default`: a topic); the data that was given, by path."""
+
+Entry = Mapping[str, Any]
+"""An entry of the event log without its times."""
+
+_TIMES = frozenset({"time", "decision_us"})
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What is seen of a controller after an action; None: this target does not show it.
+
+    Attributes:
+        issued: What it asked of the world meanwhile, in order.
+        log: What it wrote into its event log meanwhile.
+        state: The state of each component and its variables.
+        enabled: Every controllable event that is allowed.
+        locations: Where each service and action is.
+        status: What the executor is doing, and whether it is faulty.
+    """
+
+    issued: tuple[Issued, ...] = ()
+    log: tuple[Entry, ...] = ()
+    state: Mapping[str, Any] | None = None
+    enabled: frozenset[str] | None = None
+    locations: Mapping[str, str] | None = None
+    status: tuple[str, bool] | None = None
+
+
+@dataclass(frozen=True)
+class Sight:
+    """How much a target shows.
+
+    Attributes:
+        topics: For a target seen over a middleware, the topic of each message: which of those on a topic was sent is
+            not to be seen, nor which properties were given; a field may have less precision than the model's number.
+        log_keys: Which parts of an entry of the log it tells; None: all.
+    """
+
+    topics: Mapping[str, str] | None = None
+    log_keys: frozenset[str] | None = None
+
+
+FULL = Sight()
+
+
+def flat(data: Any, path: str = "") -> dict[str, Any]:
+    """Data of a request by path; numbers and truth values as floats, since not every target has all of them."""
+    if isinstance(data, dict):
+        return {
+            name: part
+            for key, value in data.items()
+            for name, part in flat(value, f"{path}.{key}" if path else key).items()
+        }
+    if data is None:
+        return {}
+    return {path: data if isinstance(data, str) else float(data)}
+
+
+def entry(found: Mapping[str, Any]) -> Entry:
+    """An entry of an event log as JSON has it, without its times."""
+    return {key: plain(value) for key, value in found.items() if key not in _TIMES}
+
+
+def difference(target: str, number: int, what: str, expected: Observation, found: Observation, sight: Sight) -> str:
+    """The first thing that differs, in words; empty if nothing does.
+
+    Args:
+        target: Its name.
+        number: Which step.
+        what: What happened in it.
+        expected: What the reference showed.
+        found: What the target showed.
+        sight: How much it shows.
+    """
+    pairs: list[tuple[str, Any, Any]] = [
+        ("what it asks for", _seen(expected.issued, sight), _seen(found.issued, sight)),
+        ("the event log", _told(expected.log, sight), _told(found.log, sight)),
+    ]
+    for name in ("state", "locations", "enabled", "status"):
+        if getattr(found, name) is not None:
+            pairs.append((name, getattr(expected, name), getattr(found, name)))
+    for name, left, right in pairs:
+        if left != right:
+            detail = _detail(left, right)
+            return f"{target}, step {number}, {what[:300]}: {name} differs: {detail}"
+    return ""
+
+
+def _seen(issued: Sequence[Issued], sight: Sight) -> list[Any]:
+    if sight.topics is None:
+        return [list(item) for item in issued]
+    found = []
+    for kind, name, data in issued:
+        if kind == "default":
+            found.append(["publish", name, {}])
+        else:
+            subject = sight.topics.get(name, name) if kind == "publish" else name
+            found.append([kind, subject, {path: part for path, value in data.items() if (part := _on_wire(value))}])
+    # A middleware keeps the order on each topic; between topics, the event log tells it.
+    return sorted(found, key=lambda item: item[:2])
+
+
+def _on_wire(value: Any) -> Any:
+    if not isinstance(value, float) or abs(value) > MAXIMUM_FLOAT32:
+        return value
+    return struct.unpack("f", struct.pack("f", value))[0]
+
+
+def _told(log: Sequence[Entry], sight: Sight) -> list[Entry]:
+    if sight.log_keys is None:
+        return list(log)
+    return [{key: value for key, value in item.items() if key in sight.log_keys} for item in log]
+
+
+def _detail(left: Any, right: Any) -> str:
+    """What is expected and what is found, of the first part that differs."""
+    if isinstance(left, dict) and isinstance(right, dict):
+        for key in [*left, *(key for key in right if key not in left)]:
+            if key not in left or key not in right or left[key] != right[key]:
+                return f"{key}: {_detail(left.get(key), right.get(key))}"
+    if isinstance(left, list) and isinstance(right, list) and len(left) == len(right):
+        number = next(number for number in range(len(left)) if left[number] != right[number])
+        return f"{number + 1} of {len(left)}: {_detail(left[number], right[number])}"
+    if isinstance(left, frozenset) and isinstance(right, frozenset):
+        return f"expected also {sorted(left - right)}, found also {sorted(right - left)}"
+    return f"expected {_text(left)}, found {_text(right)}"
+
+
+def _text(value: Any) -> str:
+    return json.dumps(value, default=list)[:600]

@@ -1,0 +1,177 @@
+"""Executors in Python: the reference on the interpreted system, and a generated module on its own."""
+
+from types import SimpleNamespace
+from typing import Any
+
+from robosc.execution import clock, event_log, executor, settings
+from robosc.execution.interpreter import InterpretedSystem
+from robosc.model.structure import Communication, CommunicationKind, Model
+from robosc.supervisor.structure import Supervisor
+from robosc.targets.events import events, is_controllable
+from support.equivalence.observation import FULL, Issued, Observation, entry, flat
+from support.equivalence.scenario import PERIOD_S, Action, Scenario
+
+
+class Ids:
+    """Calls and goals under way, by the ids that an executor gave them."""
+
+    def __init__(self) -> None:
+        self._open: dict[str, list[int]] = {}
+
+    def add(self, name: str, number: int) -> None:
+        """It was called."""
+        self._open.setdefault(name, []).append(number)
+
+    def last(self, name: str) -> int:
+        """The last one under way."""
+        return self._open[name][-1]
+
+    def end(self, name: str) -> int:
+        """The last one, which is over."""
+        return self._open[name].pop()
+
+    def count(self, name: str) -> int:
+        """How many are under way."""
+        return len(self._open.get(name, ()))
+
+
+class _World:
+    """A middleware that remembers what it is asked for."""
+
+    def __init__(self, ids: Ids) -> None:
+        self._ids = ids
+        self.issued: list[Issued] = []
+
+    def prepare(self, communication: str, data: Any) -> Any:
+        return data
+
+    def is_default(self, communication: str, message: Any) -> bool:
+        return not any(flat(message).values())
+
+    def publish(self, communication: str, message: Any) -> None:
+        self.issued.append(("publish", communication, flat(message)))
+
+    def publish_default(self, identifier: str) -> None:
+        self.issued.append(("default", identifier, {}))
+
+    def call(self, communication: str, request_id: int, message: Any) -> None:
+        self.issued.append(("call", communication, flat(message)))
+        self._ids.add(communication, request_id)
+
+    def send_goal(self, communication: str, goal_id: int, message: Any) -> None:
+        self.issued.append(("goal", communication, flat(message)))
+        self._ids.add(communication, goal_id)
+
+    def cancel_goal(self, communication: str, goal_id: int) -> None:
+        self.issued.append(("cancel", communication, {}))
+
+
+class PythonTarget:
+    """A system and an executor in this process.
+
+    Args:
+        name: For messages.
+        model: What it was made from.
+        system: The controlled system.
+        runtime: Holds `Executor`, `Settings`, `ManualClock` and `MemoryLog`, as a generated module does.
+    """
+
+    sight = FULL
+
+    def __init__(self, name: str, model: Model, system: Any, runtime: Any) -> None:
+        self.name = name
+        self.ids = Ids()
+        self._model = model
+        self._system = system
+        self._runtime = runtime
+        self._events = tuple(event for event in events(model) if is_controllable(event))
+        self._servers = [item.name for item in model.communications if _is_server(item)]
+        self._clock = runtime.ManualClock()
+        self._log = runtime.MemoryLog()
+        self._world = _World(self.ids)
+        self._executor: Any = None
+
+    def start(self, scenario: Scenario, awaited: Observation | None = None) -> Observation:
+        """Begin."""
+        settings = self._runtime.Settings(**scenario.all_settings()._asdict())
+        self._executor = self._runtime.Executor(self._system, self._world, settings, self._clock, self._log)
+        self._executor.start()
+        return self._observation()
+
+    def do(self, action: Action, awaited: Observation | None = None) -> Observation:
+        """Let one thing happen."""
+        executor, ids, name = self._executor, self.ids, action.subject
+        match action.do:
+            case "tick":
+                self._clock.advance(PERIOD_S)
+                executor.tick()
+            case "wait":
+                self._clock.advance(action.seconds)
+                executor.watch()
+            case "message":
+                executor.receive(name, action.data)
+            case "reply":
+                executor.on_reply(ids.end(name), action.data)
+            case "fail":
+                executor.on_call_failed(ids.end(name), "lost")
+            case "accept":
+                executor.on_goal_accepted(ids.last(name))
+            case "feedback":
+                executor.on_feedback(ids.last(name), action.data)
+            case "end":
+                executor.on_goal_ended(ids.end(name), action.how, action.data)
+            case "stop":
+                executor.stop("test")
+            case "restart":
+                executor.restart()
+            case _:
+                raise ValueError(action.do)
+        return self._observation()
+
+    def _observation(self) -> Observation:
+        issued, self._world.issued = tuple(self._world.issued), []
+        log = tuple(entry(item) for item in self._log.entries)
+        self._log.entries.clear()
+        return Observation(
+            issued=issued,
+            log=log,
+            state=self._system.state(),
+            enabled=frozenset(event for event in self._events if self._system.enabled(event)),
+            locations={name: self._system.location(name) for name in self._servers},
+            status=(self._executor.status.value, self._executor.is_faulty),
+        )
+
+    def close(self) -> Observation:
+        """Nothing to end."""
+        return Observation()
+
+
+def _is_server(item: Communication) -> bool:
+    return item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
+
+
+def reference(supervisor: Supervisor) -> PythonTarget:
+    """The yardstick: the executor of RoboSC on the interpreted system."""
+    runtime = SimpleNamespace(
+        Executor=executor.Executor,
+        Settings=settings.Settings,
+        ManualClock=clock.ManualClock,
+        MemoryLog=event_log.MemoryLog,
+    )
+    return PythonTarget("reference", supervisor.model, InterpretedSystem(supervisor), runtime)
+
+
+def observe(supervisor: Supervisor, scenario: Scenario) -> list[Observation]:
+    """What the reference shows: at the start, and after each action."""
+    target = reference(supervisor)
+    return [target.start(scenario), *(target.do(action) for action in scenario.actions)]
+
+
+def generated_python(supervisor: Supervisor, module: Any) -> PythonTarget:
+    """A generated module.
+
+    Args:
+        supervisor: What it was generated from.
+        module: The module.
+    """
+    return PythonTarget("python", supervisor.model, module.Supervisor(), module)

@@ -1,0 +1,248 @@
+"""Random runs: what is likely to bring a controller on, with data that is often at a border."""
+
+import math
+from collections.abc import Sequence
+from random import Random
+from typing import Any
+
+from robosc.expressions import (
+    ArrayType,
+    BooleanType,
+    Constant,
+    DoubleType,
+    EnumType,
+    IntegerType,
+    NoneType,
+    ObjectType,
+    StringType,
+    Type,
+    leaves,
+)
+from robosc.model.structure import CommunicationKind, Model
+from robosc.supervisor.structure import Supervisor
+from support.equivalence.observation import Observation
+from support.equivalence.python_targets import PythonTarget, reference
+from support.equivalence.scenario import Action, Scenario
+
+# Numbers that a float of 32 bits holds, too, but for the hostile ones.
+_DOUBLES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 6.0, -0.25, -1.0, -2.0)
+# Numbers that any integer field holds, but for the hostile ones.
+_INTEGERS = (0, 1, 2, 3, 4, 5, 6, 7, 100)
+_TEXTS = ("", "a", "it's", '"""\n\\', "é")
+_OUTCOMES = ("succeeded", "succeeded", "rejected", "aborted", "cancelled", "lost")
+
+
+class Dice:
+    """Draws data and actions.
+
+    Args:
+        model: Whose.
+        dice: Source of chance.
+        is_hostile: Whether data may be missing, not a number, or too large.
+    """
+
+    def __init__(self, model: Model, dice: Random, *, is_hostile: bool) -> None:
+        self._model = model
+        self._dice = dice
+        self._is_hostile = is_hostile
+        self._topics: dict[str, list[Type]] = {}
+        self._texts = (*_TEXTS, *_texts_of(model))
+        for item in model.communications:
+            if item.kind is CommunicationKind.OUTGOING_MESSAGE and item.response is not None:
+                self._topics.setdefault(item.identifier, []).append(item.response)
+
+    def message(self) -> Action | None:
+        """A message on some topic: what all messages of the model read of it."""
+        if not self._topics:
+            return None
+        topic = self._dice.choice(sorted(self._topics))
+        return Action("message", topic, self.datum(*self._topics[topic]))
+
+    def received(self, name: str, part: str) -> Any:
+        """Data of a reply, feedback or result."""
+        return self.datum(getattr(self._model.communication(name), part))
+
+    def datum(self, *types: Type) -> Any:
+        """What may come as something of all these types."""
+        dice = self._dice
+        sources = [self._source(type_) for type_ in types]
+        # In C, a number that is missing is NaN.
+        if self._is_hostile and not isinstance(sources[0], DoubleType) and dice.random() < 0.05:
+            return None
+        match sources[0]:
+            case BooleanType():
+                return dice.choice((True, False))
+            case IntegerType():
+                return dice.choice((*_INTEGERS, -1, -2, 2**31, -(2**40)) if self._is_hostile else _INTEGERS)
+            case DoubleType():
+                return dice.choice((*_DOUBLES, math.nan, math.inf, 1e308) if self._is_hostile else _DOUBLES)
+            case StringType():
+                return dice.choice(self._texts)
+            case ArrayType(element=element):
+                if isinstance(self._source(element), DoubleType) and dice.random() < 0.6:
+                    return self._scan(element)
+                return [self.datum(element) for _ in range(dice.randint(0, 4))]
+            case ObjectType():
+                found: dict[str, list[Type]] = {}
+                for source in sources:
+                    if isinstance(source, ObjectType):
+                        for part in self._model.object(source.name).properties:
+                            found.setdefault(part.name, []).append(part.type)
+                return {name: self.datum(*parts) for name, parts in found.items()}
+            case NoneType():
+                return None
+        raise AssertionError(types)
+
+    def _scan(self, element: Type) -> list[Any]:
+        """Much of the same, as a scan has it, and something in the way."""
+        beams = [self.datum(element)] * 360
+        for _ in range(self._dice.choice((0, 0, 1, 2))):
+            begin = self._dice.choice((0, 15, 20, 225, 270, 330, 345))
+            beams[begin : begin + 10] = [self.datum(element)] * len(beams[begin : begin + 10])
+        return beams
+
+    def _source(self, type_: Type) -> Type:
+        return self._model.enum(type_.name).source if isinstance(type_, EnumType) else type_
+
+
+def _texts_of(model: Model) -> list[str]:
+    """The texts that rules of enums ask for."""
+    rules = [rule.condition for enum in model.enums for rule in enum.rules]
+    return [
+        leaf.value
+        for rule in rules
+        for leaf in leaves(rule)
+        if isinstance(leaf, Constant) and isinstance(leaf.value, str)
+    ]
+
+
+def random_settings(model: Model, dice: Random) -> dict[str, Any]:
+    """Settings under which targets must agree: all but the policy `random`, which C draws from another generator."""
+    requests = [item.name for item in model.communications if item.kind is not CommunicationKind.OUTGOING_MESSAGE]
+    # In source order: C takes no order of them.
+    sent = [item for item in model.communications if item.kind is CommunicationKind.INCOMING_MESSAGE]
+    topics = list(dict.fromkeys(item.identifier for item in sent))
+    policy = dice.choice(("fair", "fair", "priority"))
+    return {
+        "policy": policy,
+        "priority": tuple(dice.sample(requests, dice.randint(0, len(requests)))) if policy == "priority" else (),
+        "every": dice.choice(("period", "event")),
+        "on_unknown": dice.choice(("default", "default", "keep", "fault")),
+        "release_identifiers": tuple(topic for topic in topics if dice.random() < 0.7),
+        "service_timeout_s": dice.choice((0.25, 1.5, 10.0)),
+        "action_timeout_s": dice.choice((None, 0.5, 2.0)),
+    }
+
+
+def random_scenario(supervisor: Supervisor, seed: int, length: int, *, is_hostile: bool = True) -> Scenario:
+    """A run that follows what the reference asks for: replies come to calls that were made."""
+    dice = Random(seed)
+    scenario = Scenario((), random_settings(supervisor.model, dice))
+    target = reference(supervisor)
+    target.start(scenario)
+    drawn = Dice(supervisor.model, dice, is_hostile=is_hostile)
+    actions: list[Action] = []
+    for _ in range(length):
+        action = _next(supervisor.model, target, dice, drawn)
+        actions.append(action)
+        target.do(action)
+    return Scenario(tuple(actions), scenario.settings)
+
+
+def _next(model: Model, target: PythonTarget, dice: Random, drawn: Dice) -> Action:
+    chance = dice.random()
+    if chance < 0.02:
+        return Action("wait", seconds=dice.choice((0.25, 1.0, 2.5, 12.0)))
+    if chance < 0.03:
+        return Action("restart") if dice.random() < 0.7 else Action("stop")
+    if chance < 0.4:
+        return Action("tick")
+    if chance < 0.65 and (replies := _replies(model, target, dice, drawn, _OUTCOMES)):
+        return dice.choice(replies)
+    return drawn.message() or Action("tick")
+
+
+def _replies(model: Model, target: PythonTarget, dice: Random, drawn: Dice, outcomes: Sequence[str]) -> list[Action]:
+    """What servers may say now."""
+    found = []
+    for item in model.communications:
+        if not target.ids.count(item.name):
+            continue
+        if item.kind is CommunicationKind.SERVICE:
+            found.append(Action("reply", item.name, drawn.received(item.name, "response")))
+            found.append(Action("fail", item.name))
+        else:
+            how = dice.choice(outcomes)
+            result = drawn.received(item.name, "response") if how == "succeeded" else None
+            found.append(Action("end", item.name, result, how=how))
+            found.append(Action("feedback", item.name, drawn.received(item.name, "feedback")))
+            found.append(Action("accept", item.name))
+    return found
+
+
+def node_settings(model: Model, policy: str = "fair") -> dict[str, Any]:
+    """Settings under which a node decides whenever something comes, and never else."""
+    sensors = {item.identifier for item in model.communications if item.max_age is not None}
+    return {
+        "every": "event",
+        "period_s": 3600.0,
+        "policy": policy,
+        # They must have been seen, but the test may take its time.
+        "max_age_s": dict.fromkeys(sorted(sensors), 3600.0),
+    }
+
+
+def node_scenario(supervisor: Supervisor, seed: int, length: int) -> Scenario:
+    """A run for a node with real servers: each decision comes with something that comes.
+
+    The period is as long as can be, so that no timer decides at its own will; servers accept every goal, and a goal
+    that the controller cancels ends.
+    """
+    dice = Random(seed)
+    settings = node_settings(supervisor.model, dice.choice(("fair", "priority")))
+    scenario = Scenario((), settings)
+    target = reference(supervisor)
+    target.start(scenario)
+    drawn = Dice(supervisor.model, dice, is_hostile=False)
+    actions: list[Action] = []
+    while len(actions) < length:
+        chance = dice.random()
+        replies = _replies(supervisor.model, target, dice, drawn, ("succeeded", "aborted"))
+        replies = [item for item in replies if item.do not in ("accept", "fail")]
+        action = dice.choice(replies) if replies and chance < 0.4 else drawn.message()
+        if action is None:
+            break
+        actions.append(action)
+        seen = target.do(action)
+        actions += follow(seen, target)
+    return Scenario(tuple(actions), settings)
+
+
+def for_node(supervisor: Supervisor, scenario: Scenario) -> Scenario:
+    """The messages of a recorded run for a node, whose services answer at once as they did last."""
+    settings = node_settings(supervisor.model)
+    answers = {action.subject: action.data for action in scenario.actions if action.do == "reply"}
+    target = reference(supervisor)
+    target.start(Scenario((), settings))
+    actions: list[Action] = []
+    for action in scenario.actions:
+        if action.do == "message":
+            actions.append(action)
+            seen = target.do(action)
+            while asked := [name for kind, name, _ in seen.issued if kind == "call"]:
+                actions.append(Action("reply", asked[0], answers[asked[0]]))
+                seen = target.do(actions[-1])
+    return Scenario(tuple(actions), settings)
+
+
+def follow(seen: Observation, target: PythonTarget) -> list[Action]:
+    """What servers do at once: accept goals, end those that are cancelled."""
+    found = []
+    waiting = list(seen.issued)
+    while waiting:
+        kind, name, _ = waiting.pop(0)
+        if kind in ("goal", "cancel"):
+            action = Action("accept", name) if kind == "goal" else Action("end", name, how="cancelled")
+            found.append(action)
+            waiting += target.do(action).issued
+    return found

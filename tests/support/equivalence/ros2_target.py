@@ -1,0 +1,252 @@
+"""The generated ROS 2 package as a node of its own process, over DDS."""
+
+import json
+import signal
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from robosc.execution.interpreter import describe
+from robosc.model.structure import CommunicationKind
+from robosc.supervisor.structure import Supervisor
+from robosc.targets import generate, write_files
+from robosc.targets.ros.runtime.messages import basic_field, load_message, load_server, message_name
+from robosc.targets.ros.topics import servers, topics
+from support.equivalence.node_target import LIMIT_S, NodeTarget
+from support.equivalence.observation import Issued, flat
+from support.equivalence.scenario import Action, Scenario
+from support.ros2 import Peer, RosProcess, environment, own_domain
+from support.ros2_servers import End, HeldAction, HeldService, ServerHost
+
+_DEPTH = 1000
+_RUNNING = ("running", "waiting for the first message")
+_ENDS = {"succeeded": End.SUCCEED, "aborted": End.ABORT, "cancelled": End.CANCEL}
+
+
+class Ros2Surroundings:
+    """A node on a domain of its own, and everything that it talks to in this process.
+
+    Args:
+        supervisor: What the node is generated from.
+        folder: For files and output.
+    """
+
+    def __init__(self, supervisor: Supervisor, folder: Path) -> None:
+        self._supervisor = supervisor
+        self._model = supervisor.model
+        self._folder = folder
+        self._stack = ExitStack()
+        self._issued: list[Issued] = []
+        self._services: dict[str, HeldService] = {}
+        self._actions: dict[str, HeldAction] = {}
+        self._seen: dict[str, int] = {}
+        self._cancelled: dict[str, int] = {}
+        self._settled: Any = None
+
+    def start(self, scenario: Scenario, folder: Path) -> None:
+        """Start node and surroundings."""
+        files = generate(self._supervisor, "ros2")
+        write_files(files, self._folder / "package")
+        package = next(path.partition("/")[0] for path in files if path.endswith("/node.py"))
+        domain = self._stack.enter_context(own_domain())
+        variables = environment(domain, self._folder)
+        self._peer = self._stack.enter_context(Peer(domain, variables))
+        host = self._stack.enter_context(ServerHost(domain)) if servers(self._model) else None
+        self._connect(host)
+        from diagnostic_msgs.msg import DiagnosticArray
+        from std_msgs.msg import String
+
+        self._states = self._peer.receive(String, "/state")
+        reports = self._peer.receive(DiagnosticArray, "/diagnostics")
+        parameters = folder.parent / "parameters.yaml"
+        parameters.write_text(json.dumps({"/**": {"ros__parameters": _parameters(scenario, folder)}}))
+        command = ["-m", f"{package}.node", "--ros-args", "--params-file", str(parameters)]
+        self._node = self._stack.enter_context(
+            RosProcess(command, variables, self._folder / "run", [self._folder / "package"])
+        )
+        self._peer.wait_for_peers([item.identifier for item in topics(self._model)])
+        self._peer.spin_until(
+            # Only the node tells when it no longer waits for its servers.
+            lambda: any(status.message.startswith(_RUNNING) for report in reports for status in report.status),
+            LIMIT_S,
+            "the node to run",
+            self._node,
+        )
+        self._peer.spin_until(self._is_connected, LIMIT_S, "connections", self._node)
+
+    def _connect(self, host: ServerHost | None) -> None:
+        for topic in topics(self._model):
+            message_class = load_message(topic.interface.package, topic.interface.type)
+            if topic.received:
+                self._peer.publisher(message_class, topic.identifier, _DEPTH)
+            if topic.published:
+                self._receive(message_class, topic.identifier)
+        for item in self._model.communications:
+            if host is None or item.kind not in (CommunicationKind.SERVICE, CommunicationKind.ACTION):
+                continue
+            info = next(i for i in describe(self._supervisor).communications if i.name == item.name)
+            is_action = item.kind is CommunicationKind.ACTION
+            type_ = load_server(_ServerType(is_action, str(info.package), str(info.interface)))  # type: ignore[arg-type]
+            self._seen[item.name] = 0
+            if is_action:
+                self._actions[item.name] = HeldAction(host, type_, item.identifier)
+            else:
+                self._services[item.name] = HeldService(host, type_, item.identifier)
+
+    def _receive(self, message_class: Any, topic: str) -> None:
+        def receive(message: Any) -> None:
+            self._issued.append(("publish", topic, _given(message)))
+
+        self._peer.node.create_subscription(message_class, topic, receive, _DEPTH)
+
+    def _is_connected(self) -> bool:
+        names = [topic.identifier for topic in topics(self._model) if topic.received]
+        return all(self._peer.publisher(None, name).get_subscription_count() for name in names)
+
+    def send(self, topic: str, data: Any) -> None:
+        """Publish."""
+        found = next(item for item in topics(self._model) if item.identifier == topic)
+        message = load_message(found.interface.package, found.interface.type)()
+        _fill(message, data)
+        self._peer.publish(message, topic)
+
+    def wait_for_ticks(self, count: int) -> None:
+        """Wait until the node's own timer has ticked: it tells its state each time."""
+        seen = len(self._states)
+        self._peer.spin_until(lambda: len(self._states) >= seen + count, LIMIT_S, "ticks of the node", self._node)
+
+    def answer(self, action: Action) -> None:
+        """Let a server do it."""
+        name = action.subject
+        match action.do:
+            case "reply":
+                self._services[name].answer(**_fields(self._response(name), action.data))
+            case "accept":
+                server = self._actions[name]
+                self._peer.spin_until(lambda: len(server.handles) == self._seen[name], LIMIT_S, "the goal", self._node)
+            case "feedback":
+                self._actions[name].feedback(**_fields(self._actions[name].action_class.Feedback, action.data))
+            case "end" if action.how == "cancelled":
+                # As soon as the cancel comes, the server ends the goal.
+                server = self._actions[name]
+                self._peer.spin_until(server.is_last_over, LIMIT_S, "the cancelled goal's end", self._node)
+            case "end":
+                result = _fields(self._actions[name].action_class.Result, action.data)
+                self._actions[name].end(_ENDS[action.how], **result)
+            case _:
+                raise ValueError(action.do)
+
+    def _response(self, name: str) -> Any:
+        return self._services[name].service_class.Response
+
+    def take_issued(self) -> list[Issued]:
+        """What came since the last time."""
+        found, self._issued = self._issued, []
+        for kind, server_of in (("call", self._services), ("goal", self._actions)):
+            for name, server in server_of.items():
+                requests = server.requests
+                while self._seen[name] < len(requests):
+                    found.append((kind, name, _given(requests[self._seen[name]])))
+                    self._seen[name] += 1
+        for name, action in self._actions.items():
+            found += [("cancel", name, {})] * (action.cancels - self._cancelled.get(name, 0))
+            self._cancelled[name] = action.cancels
+        return found
+
+    def settle(self) -> None:
+        """Two questions to the node, one after the other: between the answers it has looked at all that came."""
+        from rcl_interfaces.srv import GetParameters
+
+        if self._settled is None:
+            name = self._model_node()
+            self._settled = self._peer.node.create_client(GetParameters, f"{name}/get_parameters")
+            self._peer.spin_until(self._settled.service_is_ready, LIMIT_S, "the node's parameters", self._node)
+        for _ in range(2):
+            future = self._settled.call_async(GetParameters.Request(names=["period"]))
+            self._peer.spin_until(future.done, LIMIT_S, "an answer of the node", self._node)
+
+    def _model_node(self) -> str:
+        own = {"test_peer", "test_servers"}
+        (name,) = [name for name in self._peer.node.get_node_names() if name not in own]
+        return f"/{name}"
+
+    def spin(self) -> None:
+        """For a moment."""
+        self._peer.spin_for(0.002)
+        assert self._node.is_running, self._node.stderr
+
+    def stop(self) -> None:
+        """By a signal."""
+        self._node.signal(signal.SIGTERM)
+        assert self._node.wait() == 0, self._node.stderr
+        self._peer.spin_for(0.1)
+
+    def close(self) -> None:
+        """End it all."""
+        self._stack.close()
+
+
+class _ServerType:
+    """As much of a server as loading its type needs."""
+
+    def __init__(self, is_action: bool, package: str, type_: str) -> None:
+        self.is_action, self.package, self.type = is_action, package, type_
+
+
+def _parameters(scenario: Scenario, folder: Path) -> dict[str, Any]:
+    """The settings as the node's parameters."""
+    settings = scenario.all_settings()
+    found: dict[str, Any] = {
+        "period": settings.period_s,
+        "policy": settings.policy,
+        "every": settings.every,
+        "on_unknown": settings.on_unknown,
+        "log_folder": str(folder),
+        "server_wait": LIMIT_S,
+        "publish_state": True,
+    }
+    if settings.max_age_s:
+        found["max_age"] = [f"{topic}={age}" for topic, age in settings.max_age_s.items()]
+    if settings.priority:
+        found["priority"] = list(settings.priority)
+    if settings.release_identifiers is not None:
+        found["release_identifiers"] = list(settings.release_identifiers) or [""]
+    return found
+
+
+def _fill(message: Any, data: Any) -> None:
+    """Put plain data into a message."""
+    if data is None:
+        return
+    given = data if isinstance(data, dict) else {basic_field(type(message)): data}
+    for name, value in given.items():
+        if isinstance(value, dict):
+            _fill(getattr(message, name), value)
+        else:
+            setattr(message, name, value)
+
+
+def _fields(message_class: Any, data: Any) -> dict[str, Any]:
+    """The fields of a reply with plain data in it."""
+    message = message_class()
+    _fill(message, data)
+    return {name: getattr(message, name) for name in message.get_fields_and_field_types()}
+
+
+def _given(message: Any) -> dict[str, Any]:
+    """What a message holds, by path; what has its default is left out."""
+    fields = message.get_fields_and_field_types()
+    if message_name(type(message)).startswith("std_msgs/") and "data" in fields:
+        return {path: value for path, value in flat(message.data).items() if value}
+    return {path: value for path, value in flat(_plain(message)).items() if value}
+
+
+def _plain(message: Any) -> Any:
+    if not hasattr(message, "get_fields_and_field_types"):
+        return message if isinstance(message, bool | int | float | str) else None
+    return {name: _plain(getattr(message, name)) for name in message.get_fields_and_field_types() if name != "header"}
+
+
+def ros2_target(supervisor: Supervisor, folder: Path) -> NodeTarget:
+    """The target `ros2`."""
+    return NodeTarget("ros2", supervisor.model, Ros2Surroundings(supervisor, folder), folder / "events")

@@ -43,7 +43,7 @@ bindings: $(READY) ## regenerate the gRPC bindings
 lock: $(READY) ## choose new versions and write requirements.lock
 	$(BIN)/pip-compile --quiet --upgrade --strip-extras --allow-unsafe --generate-hashes --all-build-deps \
 	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host \
-	  --extra server --extra client --extra ros2 --extra bridge --extra dev \
+	  --extra server --extra client --extra ros2 --extra examples --extra bridge --extra dev \
 	  --output-file requirements.lock pyproject.toml
 
 benchmark: $(READY) ## print the tables of tests/benchmarks

@@ -1,15 +1,15 @@
 #!/bin/sh
 # Makes a virtual environment with colcon and the generators of ROS 2 interfaces: sh deploy/make_colcon_environment.sh DIR
-# For machines without an installed ROS 2: DIR/colcon (see below) builds packages there, with a C++ compiler and CMake.
+# For machines without an installed ROS 2: DIR/colcon builds packages there, with a C++ compiler and CMake.
 # PYTHON chooses the interpreter; otherwise that of .venv is taken.
 set -eu
 case $1 in /*) venv=$1 ;; *) venv=$PWD/$1 ;; esac
 cd "$(dirname "$0")/.."
 python=${PYTHON:-.venv/bin/python}
-if [ ! -x "$python" ]; then
+command -v "$python" >/dev/null || {
     echo "there is no $python: say \`make environment\`, or PYTHON=/path/to/python3.12" >&2
     exit 1
-fi
+}
 
 # A Python with ROS 2 hands these down, and other programs must not load its libraries.
 unset LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE PYTHONPATH
@@ -27,7 +27,7 @@ grep -rIlE "$built" "$venv/share" "$venv/lib/cmake" --include='*.cmake' | while 
     sed -i -E "s#$built/include/python3\.[0-9]+#$include#g; s#$built/lib/python3\.[0-9]+/site-packages#$packages#g" "$file"
 done
 
-# What must be set wherever colcon runs. A folder of its own: programs beside it must not become shadowed by ours.
+# What must be set wherever colcon runs. Outside of bin, whose own colcon it calls.
 cat >"$venv/colcon" <<END
 #!/bin/sh
 # colcon with this environment's ROS 2 as the underlay; no other workspace may be sourced.
@@ -41,3 +41,4 @@ fi
 exec colcon "\$verb" "\$@"
 END
 chmod +x "$venv/colcon"
+touch "$venv/.ready"

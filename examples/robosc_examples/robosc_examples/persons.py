@@ -96,4 +96,6 @@ def _person(scan: Scan, beams: list[int]) -> tuple[float, Person]:
     ]
     ahead_m = sum(place[0] for place in places) / len(places)
     left_m = sum(place[1] for place in places) / len(places)
-    return math.dist(places[0], places[-1]), Person(ahead_m, left_m, min(1.0, len(beams) / SURE_BEAMS))
+    # Not from end to end: a wall all around ends where it begins.
+    width_m = max(math.dist(places[0], place) for place in places)
+    return width_m, Person(ahead_m, left_m, min(1.0, len(beams) / SURE_BEAMS))

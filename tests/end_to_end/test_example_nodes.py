@@ -269,6 +269,7 @@ WRONG_PARAMETERS = [
     ("line_detector", "line:=red", "parameter 'line' is 'red'; it must be one of 'dark', 'light'"),
     ("line_detector", "top:=1.0", "parameter 'top' is 1; it must be below 'bottom', which is 1"),
     ("person_detector", "widest:=0.01", "parameter 'narrowest' is 0.05; it must be below 'widest', which is 0.01"),
+    ("person_detector", "beams:=2.5", "parameter 'beams' is 2.5; it must be a whole number"),
     ("stop_panel", "buttons:=['x']", "parameter 'buttons' has 'x'; it must be name=/topic, such as go=/button"),
     ("stop_panel", "buttons:=['run=/x']", "parameter 'buttons' has 'run=/x', but the key 'r' is taken"),
     ("stop_panel", "buttons:=3", "parameter 'buttons' is 3; it must be a list of texts"),

@@ -39,7 +39,7 @@ class DriveToPose(Wheels):
         self._tolerance_m = self.number("tolerance", 0.05, 0.005, 1.0, "Metres by which a goal may be missed.")
         self._turn_tolerance_rad = self.number("turn_tolerance", 0.05, 0.01, 3.2, "Radians by which it may be off.")
         self._patience_s = self.number("patience", 5.0, 0.1, 600.0, "Seconds without progress before a recovery.")
-        self._recoveries = int(self.number("recoveries", 3, 0, 1000, "Recoveries before a goal is given up."))
+        self._recoveries = self.count("recoveries", 3, 0, 1000, "Recoveries before a goal is given up.")
         self._frame = self.text("frame", "odom", "Frame of the goals.")
         if not self._frame:
             raise ParameterError("parameter 'frame' is empty; it must name the frame of the odometry")

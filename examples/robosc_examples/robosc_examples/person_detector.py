@@ -28,7 +28,7 @@ class PersonDetector(HelperNode):
             self.number("narrowest", usual.narrowest_m, 0, 10, "Least width of a person in metres."),
             self.number("widest", usual.widest_m, 0, 10, "Largest width of a person in metres."),
             self.number("gap", usual.gap_m, 0.001, 10, "Neighbouring ranges that differ by more are of two things."),
-            int(self.number("beams", usual.beams, 2, 1000, "Least number of beams on a person.")),
+            self.count("beams", usual.beams, 2, 1000, "Least number of beams on a person."),
         )
         if self._settings.narrowest_m >= self._settings.widest_m:
             raise ParameterError(

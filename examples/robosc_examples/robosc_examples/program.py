@@ -61,6 +61,17 @@ class HelperNode(Node):  # type: ignore[misc]  # rclpy has no types
             )
         return float(value)
 
+    def count(self, name: str, default: int, minimum: int, maximum: int, meaning: str) -> int:
+        """The value of a parameter that is a whole number.
+
+        Raises:
+            ParameterError: It is none, or out of its range.
+        """
+        value = self.number(name, default, minimum, maximum, meaning)
+        if not value.is_integer():
+            raise ParameterError(f"parameter '{name}' is {value:g}; it must be a whole number")
+        return int(value)
+
     def text(self, name: str, default: str, meaning: str, choices: Sequence[str] = ()) -> str:
         """The value of a parameter that is a text, one of the choices if there are any.
 
@@ -166,8 +177,12 @@ def run(name: str, make: Callable[[], HelperNode], args: Sequence[str] | None = 
     except Exception as error:
         _complain(name, f"{type(error).__name__}: {error}")
         status = EXIT_FAULT
-    node.stop()
-    node.wait_until_delivered()
+    try:
+        node.stop()
+        node.wait_until_delivered()
+    except Exception as error:
+        _complain(name, f"{type(error).__name__}: {error}")
+        status = EXIT_FAULT
     spinner.shutdown()
     node.destroy_node()
     rclpy.try_shutdown()

@@ -75,6 +75,7 @@ def test_steering_comes_to_the_goal(x: float, y: float, yaw: float) -> None:
         speed = steered(distance, wrapped(math.atan2(y - at_y, x - at_x) - yaw), 0.2, 1.0)
         assert 0.0 <= speed.ahead_m_s <= 0.2
         assert abs(speed.turn_rad_s) <= 1.0
+        assert speed.turn_rad_s * wrapped(math.atan2(y - at_y, x - at_x) - yaw) >= 0.0
         yaw += 0.02 * speed.turn_rad_s
         at_x += 0.02 * speed.ahead_m_s * math.cos(yaw)
         at_y += 0.02 * speed.ahead_m_s * math.sin(yaw)

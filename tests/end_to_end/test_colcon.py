@@ -29,6 +29,8 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """The workspace as the README says: the example packages and the generated one below src."""
     folder = tmp_path_factory.mktemp("workspace")
     made = Workspace(folder)
+    # The project that it lies in has other settings, which are none of the packages'.
+    (folder / "pyproject.toml").write_text('[tool.pytest.ini_options]\naddopts = ["--no-such-option"]\n')
     for package in ("robosc_example_interfaces", "robosc_examples"):
         shutil.copytree(EXAMPLES / package, folder / "src" / package)
     generated_package("navigation", folder / "src" / "navigation_controller")

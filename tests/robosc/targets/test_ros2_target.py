@@ -115,6 +115,7 @@ def test_setup_py_installs_what_is_there(folder: Path, monkeypatch: pytest.Monke
     assert all((folder / path).is_file() for path in installed)
     assert {"package.xml", "launch/controller.launch.py", "config/parameters.yaml"} <= set(installed)
     assert f"script_dir=$base/lib/{PACKAGE}" in (folder / "setup.cfg").read_text()
+    assert "[tool:pytest]" in (folder / "setup.cfg").read_text()
 
 
 def test_the_launch_file_starts_the_node_with_its_parameters(folder: Path) -> None:

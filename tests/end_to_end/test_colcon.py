@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import shutil
 import signal
 from collections.abc import Iterator
@@ -10,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from support.colcon import Workspace
+from support.colcon import Workspace, locked
 from support.example_robots import Stage, generated_package, stage
 from support.kinematic_robot import KinematicRobot, Thing, World
 from support.models import EXAMPLES
@@ -18,8 +19,8 @@ from support.ros2 import RosProcess
 
 pytest.importorskip("rclpy", reason="ROS 2 (rclpy) is not installed")
 
-# One worker: everything is built once. The first run makes an environment, which takes a minute or more.
-pytestmark = [pytest.mark.ros2, pytest.mark.xdist_group("colcon"), pytest.mark.timeout(1200)]
+# The first run makes an environment, which takes a minute or more.
+pytestmark = [pytest.mark.ros2, pytest.mark.timeout(2000)]
 
 GOAL = (2.0, 0.5)
 
@@ -27,14 +28,20 @@ GOAL = (2.0, 0.5)
 @pytest.fixture(scope="module")
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """The workspace as the README says: the example packages and the generated one below src."""
-    folder = tmp_path_factory.mktemp("workspace")
+    own = tmp_path_factory.getbasetemp()
+    # All workers of a run share one, which whoever comes first builds.
+    shared = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+    folder, built = shared / "colcon_workspace", shared / "colcon_workspace.built"
     made = Workspace(folder)
-    # The project that it lies in has other settings, which are none of the packages'.
-    (folder / "pyproject.toml").write_text('[tool.pytest.ini_options]\naddopts = ["--no-such-option"]\n')
-    for package in ("robosc_example_interfaces", "robosc_examples"):
-        shutil.copytree(EXAMPLES / package, folder / "src" / package)
-    generated_package("navigation", folder / "src" / "navigation_controller")
-    made.colcon("build")
+    with locked(shared / "colcon_workspace.lock"):
+        if not built.exists():
+            for package in ("robosc_example_interfaces", "robosc_examples"):
+                shutil.copytree(EXAMPLES / package, folder / "src" / package, dirs_exist_ok=True)
+            generated_package("navigation", folder / "src" / "navigation_controller")
+            # The project that it lies in has other settings, which are none of the packages'.
+            (folder / "pyproject.toml").write_text('[tool.pytest.ini_options]\naddopts = ["--no-such-option"]\n')
+            made.colcon("build")
+            built.touch()
     return made
 
 

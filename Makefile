@@ -7,9 +7,11 @@ VENV := .venv
 BIN := $(VENV)/bin
 # The marker is younger than the lock and the project file when the environment is up to date.
 READY := $(VENV)/.ready
+# Another environment: colcon wants older packages than ours.
+COLCON := .venv-colcon
 PROTO := proto/robosc_api/v1/synthesis.proto
 
-.PHONY: demo test lint format bindings lock benchmark environment clean help
+.PHONY: demo test lint format bindings lock benchmark environment colcon clean help
 
 help:
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -19,6 +21,11 @@ environment: $(READY) ## make .venv from the lock
 $(READY): requirements.lock pyproject.toml deploy/make_environment.sh
 	sh deploy/make_environment.sh $(VENV)
 	@touch $(READY)
+
+colcon: $(COLCON)/.ready ## make .venv-colcon: builds ROS 2 packages without an installed ROS 2
+
+$(COLCON)/.ready: deploy/requirements-colcon.txt deploy/make_colcon_environment.sh | $(READY)
+	PYTHON=$(BIN)/python sh deploy/make_colcon_environment.sh $(COLCON)
 
 demo: $(READY) ## run the line follower from model to moving robot
 	$(BIN)/python deploy/demo/demo.py
@@ -40,14 +47,17 @@ bindings: $(READY) ## regenerate the gRPC bindings
 	$(BIN)/python -m grpc_tools.protoc -Iproto --python_out=proto --pyi_out=proto --grpc_python_out=proto \
 	  robosc_api/v1/synthesis.proto
 
-lock: $(READY) ## choose new versions and write requirements.lock
+lock: $(READY) ## choose new versions and write the locks
 	$(BIN)/pip-compile --quiet --upgrade --strip-extras --allow-unsafe --generate-hashes --all-build-deps \
 	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host \
-	  --extra server --extra client --extra ros2 --extra bridge --extra dev \
+	  --extra server --extra client --extra ros2 --extra examples --extra bridge --extra dev \
 	  --output-file requirements.lock pyproject.toml
+	$(BIN)/pip-compile --quiet --upgrade --strip-extras --allow-unsafe --generate-hashes \
+	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host \
+	  --output-file deploy/requirements-colcon.txt deploy/requirements-colcon.in
 
 benchmark: $(READY) ## print the tables of tests/benchmarks
 	$(BIN)/python tests/benchmarks/run.py
 
 clean: ## remove the environment and everything generated
-	rm -rf $(VENV) out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) $(COLCON) out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

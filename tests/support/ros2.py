@@ -88,10 +88,18 @@ class RosProcess:
         variables: Environment on top of this process's.
         folder: Folder for its output.
         python_path: Folders to import from.
+        stdin: What it reads: a file descriptor, or one of the constants of `subprocess`.
+        program: The interpreter, or another program.
     """
 
     def __init__(
-        self, command: Sequence[str], variables: Mapping[str, str], folder: Path, python_path: Sequence[Path] = ()
+        self,
+        command: Sequence[str],
+        variables: Mapping[str, str],
+        folder: Path,
+        python_path: Sequence[Path] = (),
+        stdin: int = subprocess.DEVNULL,
+        program: str = sys.executable,
     ) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self._error_file = folder / "stderr.txt"
@@ -99,9 +107,9 @@ class RosProcess:
         path = os.pathsep.join([*map(str, python_path), os.environ.get("PYTHONPATH", "")]).rstrip(os.pathsep)
         with self._error_file.open("wb") as error, self._output_file.open("wb") as output:
             self._process = subprocess.Popen(
-                [sys.executable, *command],
+                [program, *command],
                 env={**os.environ, **variables, "PYTHONPATH": path},
-                stdin=subprocess.DEVNULL,
+                stdin=stdin,
                 stdout=output,
                 stderr=error,
                 cwd=folder,
@@ -111,6 +119,11 @@ class RosProcess:
     def stderr(self) -> str:
         """What it has written to standard error so far."""
         return self._error_file.read_text(errors="replace")
+
+    @property
+    def stdout(self) -> str:
+        """What it has written to standard output so far."""
+        return self._output_file.read_text(errors="replace")
 
     @property
     def is_running(self) -> bool:

@@ -116,6 +116,7 @@ def test_setup_py_installs_what_is_there(folder: Path, monkeypatch: pytest.Monke
     assert all((folder / path).is_file() for path in installed)
     assert {"package.xml", "launch/controller.launch.py", "config/parameters.yaml"} <= set(installed)
     assert f"script_dir=$base/lib/{PACKAGE}" in (folder / "setup.cfg").read_text()
+    assert "[tool:pytest]" in (folder / "setup.cfg").read_text()
 
 
 def test_the_launch_file_starts_the_node_with_its_parameters(folder: Path) -> None:
@@ -174,9 +175,9 @@ def test_services_and_actions_stand_in_the_package() -> None:
     files = generate(example_supervisor(NAVIGATION), "ros2")
     readme = files["README.md"]
     assert "| `/calibrate` | `std_srvs/srv/Trigger` | service | calibrate |" in readme
-    assert "| `/navigate_to_pose` | `nav2_msgs/action/NavigateToPose` | action | navigate |" in readme
+    assert "| `/navigate_to_pose` | `robosc_example_interfaces/action/NavigateToPose` | action | navigate |" in readme
     dependencies = {item.text for item in ElementTree.fromstring(files["package.xml"]).findall("exec_depend")}
-    assert {"std_srvs", "nav2_msgs", "diagnostic_msgs"} <= dependencies
+    assert {"std_srvs", "robosc_example_interfaces", "diagnostic_msgs"} <= dependencies
     assert "start_navigation = " in files["setup.py"]
 
 

@@ -1,0 +1,36 @@
+"""Starts the line follower: its controller and its line detector. The stop panel wants a terminal of its own."""
+
+from pathlib import Path
+
+from ament_index_python.packages import get_package_share_directory
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+
+CONTROLLER = "line_follower_controller"
+
+
+def generate_launch_description() -> LaunchDescription:
+    """The nodes; wheels and sensors are the robot's own."""
+    parameters = Path(get_package_share_directory(CONTROLLER)) / "config" / "parameters.yaml"
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument("image", default_value="/image", description="Topic of the camera."),
+            DeclareLaunchArgument(
+                "resample_scans", default_value="false", description="For a LiDAR without 360 beams."
+            ),
+            Node(
+                package="robosc_examples",
+                executable="line_detector",
+                output="screen",
+                remappings=[("/image", LaunchConfiguration("image"))],
+            ),
+            Node(
+                package=CONTROLLER,
+                executable="controller",
+                output="screen",
+                parameters=[str(parameters), {"resample_scans": LaunchConfiguration("resample_scans")}],
+            ),
+        ]
+    )

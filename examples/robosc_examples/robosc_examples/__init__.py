@@ -1,0 +1,1 @@
+"""The nodes around the example robots: what sees, turns, pushes, drives, announces and stops for their controllers."""

@@ -1,0 +1,101 @@
+"""What in a laser scan is as wide as a person. Without ROS."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+FULL_CIRCLE_RAD = math.tau - 0.1
+SURE_BEAMS = 5
+
+
+class PersonSettings(NamedTuple):
+    """What counts as a person.
+
+    Attributes:
+        narrowest_m: Least width.
+        widest_m: Largest width.
+        gap_m: Neighbouring ranges that differ by more are of two things.
+        beams: Least number of beams.
+    """
+
+    narrowest_m: float = 0.05
+    widest_m: float = 0.7
+    gap_m: float = 0.15
+    beams: int = 3
+
+
+class Person(NamedTuple):
+    """Metres ahead and to the left, and how sure it is, 0 to 1."""
+
+    ahead_m: float
+    left_m: float
+    confidence: float
+
+    @property
+    def distance_m(self) -> float:
+        """How far away."""
+        return math.hypot(self.ahead_m, self.left_m)
+
+
+class Scan(NamedTuple):
+    """A laser scan: beams counter-clockwise, and the ranges that can be believed."""
+
+    ranges: Sequence[float]
+    start_rad: float
+    step_rad: float
+    nearest_m: float
+    farthest_m: float
+
+
+def is_blind(scan: Scan) -> bool:
+    """Whether a scan tells nothing: no beams, no sensible angles or limits, or most of it unknown."""
+    sensible = all(map(math.isfinite, scan[1:])) and 0.0 <= scan.nearest_m < scan.farthest_m
+    if not sensible or scan.step_rad == 0.0 or not scan.ranges:
+        return True
+    # LiDARs tell free space as infinity, zero or beyond the farthest; never as NaN.
+    return sum(map(math.isnan, scan.ranges)) * 2 > len(scan.ranges)
+
+
+USUAL = PersonSettings()
+
+
+def find_person(scan: Scan, settings: PersonSettings = USUAL) -> Person | None:
+    """The nearest thing that is as wide as a person; None if there is none.
+
+    A thing is a row of neighbouring beams; in a full circle, the last beam is the first's neighbour.
+    """
+    found = (_person(scan, beams) for beams in _things(scan, settings.gap_m) if len(beams) >= settings.beams)
+    fitting = (item for width_m, item in found if settings.narrowest_m <= width_m <= settings.widest_m)
+    return min(fitting, key=lambda person: person.distance_m, default=None)
+
+
+def _things(scan: Scan, gap_m: float) -> list[list[int]]:
+    """The beams of each thing, by their numbers."""
+    things: list[list[int]] = []
+    for beam, range_m in enumerate(scan.ranges):
+        if not scan.nearest_m <= range_m <= scan.farthest_m:
+            continue
+        if things and things[-1][-1] == beam - 1 and abs(scan.ranges[beam - 1] - range_m) <= gap_m:
+            things[-1].append(beam)
+        else:
+            things.append([beam])
+    last = len(scan.ranges) - 1
+    is_circle = abs(scan.step_rad) * (last + 1) >= FULL_CIRCLE_RAD
+    meet = len(things) > 1 and things[0][0] == 0 and things[-1][-1] == last
+    if is_circle and meet and abs(scan.ranges[0] - scan.ranges[last]) <= gap_m:
+        things[0] = things.pop() + things[0]
+    return things
+
+
+def _person(scan: Scan, beams: list[int]) -> tuple[float, Person]:
+    """How wide a thing is, and where."""
+    places = [
+        (scan.ranges[beam] * math.cos(angle), scan.ranges[beam] * math.sin(angle))
+        for beam in beams
+        for angle in (scan.start_rad + beam * scan.step_rad,)
+    ]
+    ahead_m = sum(place[0] for place in places) / len(places)
+    left_m = sum(place[1] for place in places) / len(places)
+    # Not from end to end: a wall all around ends where it begins.
+    width_m = max(math.dist(places[0], place) for place in places)
+    return width_m, Person(ahead_m, left_m, min(1.0, len(beams) / SURE_BEAMS))

@@ -57,6 +57,33 @@ def test_the_line_follower_follows_its_line_and_stops_for_the_panel(at: Stage) -
     assert panel.wait() == 0
 
 
+def test_a_careless_line_follower_stands_still_behind_its_layer(at: Stage) -> None:
+    """It never heeds obstacles or the stop button itself; what it sends then is held back and told."""
+    from std_msgs.msg import Empty, String
+
+    blocked = at.peer.receive(String, "/blocked")
+    layer = at.supervised("line_follower_layer", "careless_line_follower")
+    at.helper("line_detector", "top:=0.0")
+    world = World()
+    robot = at.robot = KinematicRobot(at.peer, world, floor_picture)
+    robot.y = 0.1
+    at.until(lambda: robot.x > 0.3, "the robot to drive along the line", layer)
+
+    world.walls.append(Wall(robot.x + 0.5, -1.0, robot.x + 0.5, 1.0))
+    at.until(lambda: robot.speed == 0.0, "the robot to stop for a wall", layer)
+    before, x = len(blocked), robot.x
+    at.until(lambda: len(blocked) > before + 3, "what it sends now to be held back", layer)
+    assert (robot.speed, robot.x) == (0.0, x)
+    assert blocked[-1].data == "/cmd_vel"
+    world.walls.clear()
+    at.until(lambda: robot.speed > 0.0, "the robot to drive again", layer)
+
+    at.peer.publish(Empty(), "/emergency_stop/stop")
+    at.until(lambda: robot.speed == 0.0, "the stop button to stop it", layer)
+    at.go_on(0.5)
+    assert robot.speed == 0.0
+
+
 def test_the_maze_solver_turns_left_at_a_wall_by_a_right_angle(at: Stage) -> None:
     controller = at.controller("maze_solver")
     rotator = at.helper("rotator", "speed_limit:=1.5")

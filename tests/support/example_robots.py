@@ -9,6 +9,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from robosc.language import load_bundle
+from robosc.model.structure import Deployment
 from robosc.supervisor import make_supervisor
 from robosc.targets import generate, write_files
 from support.kinematic_robot import KinematicRobot
@@ -19,14 +20,17 @@ LIMIT_S = 20.0
 HELPERS = EXAMPLES / "robosc_examples"
 
 
-def generated_package(model: str, folder: Path) -> Path:
+def generated_package(model: str, folder: Path, deployment: Deployment = Deployment.CONTROLLER) -> Path:
     """The generated ROS 2 package of an example robot.
 
     Args:
-        model: Its name, which is that of its folder.
+        model: Its name, which is that of its folder; that of a layer has `_layer` at its end.
         folder: Where to put it.
+        deployment: Where its supervisor stands.
     """
-    made = make_supervisor(load_bundle(EXAMPLES / model / f"{model}.rscd"))
+    made = make_supervisor(
+        load_bundle(EXAMPLES / model.removesuffix("_layer") / f"{model}.rscd"), deployment=deployment
+    )
     assert made.supervisor is not None, made.reason
     write_files(generate(made.supervisor, "ros2"), folder)
     return folder
@@ -74,6 +78,12 @@ class Stage:
         package = generated_package(model, self._folder / model)
         given = [word for item in ("period:=0.05", *parameters) for word in ("-p", item)]
         return self.run(["-m", f"{model}_controller.start", "--ros-args", *given], [package])
+
+    def supervised(self, model: str, node: str) -> RosProcess:
+        """Start the supervision layer of an example robot with a helper node as the existing controller behind it."""
+        package = generated_package(model, self._folder / model, Deployment.LAYER)
+        controller = ["--controller", sys.executable, "-m", f"robosc_examples.{node}"]
+        return self.run(["-m", f"{model}_layer.start", *controller], [package, HELPERS])
 
     def end(self) -> None:
         """Ask all programs to end, so that they do so at the same time."""

@@ -31,7 +31,7 @@ demo: $(READY) ## run the line follower from model to moving robot
 	$(BIN)/python deploy/demo/demo.py
 
 test: $(READY) ## run every test
-	$(BIN)/python -m pytest -n 2 --dist loadgroup $(TESTS)
+	$(BIN)/python -m pytest -n 2 --dist loadscope $(TESTS)
 
 lint: $(READY) ## formatter, linter, types, import contracts, bindings
 	$(BIN)/ruff format --check .

@@ -28,9 +28,6 @@ DOCS = ROOT / "docs"
 CHAPTERS = read_chapters((DOCS / "tutorial.md").read_text(encoding="utf-8"))
 NEEDS_ROS = "deploy/demo/demo.py"
 
-# One process plays all chapters, in order; not beside another one of the group, because the last ones measure time.
-in_order = pytest.mark.xdist_group("real-time")
-
 
 class Reader:
     """Plays chapters in order, each once; whoever asks for one gets those before it.
@@ -90,7 +87,6 @@ def parameters() -> Iterator[Any]:
         yield pytest.param(number, id=chapter.title, marks=marks)
 
 
-@in_order
 @pytest.mark.parametrize("number", list(parameters()))
 def test_a_chapter_is_true(number: int, reader: Reader) -> None:
     reader.play_through(number)

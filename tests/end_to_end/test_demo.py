@@ -15,7 +15,7 @@ pytest.importorskip("rclpy", reason="the demonstration needs ROS 2 (the ros2 ext
 DEMO = Path(__file__).parents[2] / "deploy" / "demo" / "demo.py"
 LIMIT_S = 120.0
 
-pytestmark = [pytest.mark.ros2, pytest.mark.xdist_group("real-time")]
+pytestmark = pytest.mark.ros2
 
 
 @pytest.fixture

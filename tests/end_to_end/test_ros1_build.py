@@ -16,7 +16,6 @@ pytestmark = [
     pytest.mark.ros1,
     pytest.mark.skipif(missing() is not None, reason=str(missing())),
     pytest.mark.skipif(not Path("/usr/bin/catkin_make").exists(), reason="catkin is not installed"),
-    pytest.mark.xdist_group("catkin"),
 ]
 
 PACKAGE = "line_follower_controller"

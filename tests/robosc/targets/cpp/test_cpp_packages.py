@@ -222,7 +222,6 @@ robot None {
 
 
 @pytest.mark.skipif(missing("geometry_msgs") is not None, reason=str(missing("geometry_msgs")))
-@pytest.mark.xdist_group("ros2_cpp_node")
 def test_names_and_texts_of_a_hostile_model_stay_names_and_texts(tmp_path: Path) -> None:
     program = compiled(supervisor_of(HOSTILE), tmp_path / "package")
     lines = ["message /c nothing", "message /d 1", "message /c */ \" ' \\ ??/ %d </name>", "message /d 0", "signal 15"]

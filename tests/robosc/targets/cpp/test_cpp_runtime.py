@@ -18,7 +18,6 @@ GXX = shutil.which("g++")
 
 pytestmark = [
     pytest.mark.skipif(GXX is None, reason="g++ is not installed"),
-    pytest.mark.xdist_group("cpp_runtime"),
 ]
 
 MAIN = r"""

@@ -24,8 +24,6 @@ pytestmark = [
         missing("geometry_msgs", "sensor_msgs", "std_srvs", "test_msgs") is not None,
         reason=str(missing("geometry_msgs", "sensor_msgs", "std_srvs", "test_msgs")),
     ),
-    # One worker compiles each node once.
-    pytest.mark.xdist_group("ros2_cpp_node"),
 ]
 
 

@@ -1,11 +1,12 @@
-"""The generated `main.c`: a run with callbacks that print, and nothing that comes back."""
+"""The generated `main.c` of a controller: a run with callbacks that print, and nothing that comes back."""
 
 from robosc.model.structure import CommunicationKind
 from robosc.targets.c99.header import head
+from robosc.targets.c99.layout import Layout
 from robosc.targets.c99.unit import Unit
 
 _MAIN = """\
-/* An example: some periods of the robot with nothing but what happens by itself. */
+/* An example: {purpose}. */
 
 #include "{prefix}.h"
 
@@ -24,22 +25,22 @@ static void print_log(void *context, {prefix}_log_t kind, int what)
 
 int main(void)
 {{
-    static {prefix}_t robot;
+    static {prefix}_t {subject};
     {prefix}_callbacks_t callbacks = {{0}};
     uint64_t now_us = 0;
 {settings}
     callbacks.log = print_log;
-    if (!{prefix}_init(&robot, NULL, &callbacks)) {{
+    if (!{prefix}_init(&{subject}, NULL, &callbacks)) {{
         return 1;
     }}
-    printf("%lu bytes of RAM\\n", (unsigned long)sizeof robot);
-    {prefix}_start(&robot, now_us);
+    printf("%lu bytes of RAM\\n", (unsigned long)sizeof {subject});
+    {prefix}_start(&{subject}, now_us);
     for (int period = 0; period < 10; period++) {{
         now_us += UINT64_C(100000);
-        {prefix}_tick(&robot, now_us);
+{period}
     }}
-    printf("status %d after %" PRIu64 " us\\n", (int){prefix}_status(&robot, now_us), now_us);
-    {prefix}_stop(&robot, now_us, false);
+    printf("status %d after %" PRIu64 " us\\n", (int){prefix}_status(&{subject}, now_us), now_us);
+    {prefix}_stop(&{subject}, now_us, false);
     return 0;
 }}
 """
@@ -69,7 +70,7 @@ static bool print_{kind}(void *context, uint32_t id, const {prefix}_request_t *r
 }}
 """
 
-_CANCEL = """\
+CANCEL = """\
 static bool print_cancel(void *context, {prefix}_communication_t action, uint32_t id)
 {{
     (void)context;
@@ -81,7 +82,7 @@ static bool print_cancel(void *context, {prefix}_communication_t action, uint32_
 
 def example_file(unit: Unit) -> str:
     """The text of `main.c`."""
-    prefix, upper = unit.layout.prefix, unit.layout.upper
+    prefix = unit.layout.prefix
     texts: list[str] = []
     settings: list[str] = []
     if unit.layout.of_kind(CommunicationKind.INCOMING_MESSAGE):
@@ -91,15 +92,33 @@ def example_file(unit: Unit) -> str:
         texts.append(_SEND.replace("{kind}", "call"))
         settings.append("call = print_call")
     if unit.layout.of_kind(CommunicationKind.ACTION):
-        texts += [_SEND.replace("{kind}", "send_goal"), _CANCEL]
+        texts += [_SEND.replace("{kind}", "send_goal"), CANCEL]
         settings += ["send_goal = print_send_goal", "cancel_goal = print_cancel"]
-    return (
-        head(unit.layout.supervisor)
-        + "\n"
-        + _MAIN.format(
-            prefix=prefix,
-            upper=upper,
-            callbacks="\n".join(text.format(prefix=prefix) for text in texts),
-            settings="".join(f"\n    callbacks.{item};" for item in settings).lstrip("\n"),
-        )
+    tick = f"        {prefix}_tick(&robot, now_us);"
+    purpose = "some periods of the robot with nothing but what happens by itself"
+    return main_text(unit.layout, "robot", purpose, texts, settings, tick)
+
+
+def main_text(
+    layout: Layout, subject: str, purpose: str, callbacks: list[str], settings: list[str], period: str
+) -> str:
+    """The text of a `main.c`.
+
+    Args:
+        layout: Names.
+        subject: What the variable is called.
+        purpose: What it is an example of.
+        callbacks: Functions, with `{prefix}` in place of the prefix.
+        settings: What is assigned to which callback.
+        period: Statements of one period.
+    """
+    text = _MAIN.format(
+        prefix=layout.prefix,
+        upper=layout.upper,
+        subject=subject,
+        purpose=purpose,
+        callbacks="\n".join(item.format(prefix=layout.prefix) for item in callbacks),
+        settings="".join(f"\n    callbacks.{item};" for item in settings).lstrip("\n"),
+        period=period,
     )
+    return f"{head(layout.supervisor)}\n{text}"

@@ -1,53 +1,12 @@
 """The generated `main.c` of a supervision layer: a caller that asks for everything, and a robot that says nothing."""
 
 from robosc.model.structure import CommunicationKind
-from robosc.targets.c99.header import head
+from robosc.targets.c99.example import CANCEL, main_text
 from robosc.targets.c99.layer import request_parameters
 from robosc.targets.c99.layout import Layout
 from robosc.targets.c99.step import unknown_name
 from robosc.targets.c99.unit import Unit
 from robosc.targets.python.text import indent
-
-_MAIN = """\
-/* An example: a caller that asks for everything once a period, and a robot that says nothing. */
-
-#include "{prefix}.h"
-
-#include <inttypes.h>
-#include <stdio.h>
-
-{callbacks}
-static void print_log(void *context, {prefix}_log_t kind, int what)
-{{
-    (void)context;
-    if (kind == {upper}_LOG_EVENT) {{
-        const char *name = {prefix}_event_name(what);
-        printf("event %s\\n", name != NULL ? name : "?");
-    }}
-}}
-
-int main(void)
-{{
-    static {prefix}_t layer;
-    {prefix}_callbacks_t callbacks = {{0}};
-    uint64_t now_us = 0;
-{settings}
-    callbacks.log = print_log;
-    if (!{prefix}_init(&layer, NULL, &callbacks)) {{
-        return 1;
-    }}
-    printf("%lu bytes of RAM\\n", (unsigned long)sizeof layer);
-    {prefix}_start(&layer, now_us);
-    for (int period = 0; period < 10; period++) {{
-        now_us += UINT64_C(100000);
-{requests}
-        {prefix}_watch(&layer, now_us);
-    }}
-    printf("status %d after %" PRIu64 " us\\n", (int){prefix}_status(&layer, now_us), now_us);
-    {prefix}_stop(&layer, now_us, false);
-    return 0;
-}}
-"""
 
 _BLOCKED = """\
 static bool print_blocked(void *context, const char *identifier, {prefix}_refusal_t why)
@@ -91,15 +50,6 @@ static bool print_{kind}(void *context, uint32_t id, {prefix}_communication_t wh
     (void)context;
     (void)message;
     printf("{kind} %s, id %" PRIu32 "\\n", {prefix}_communication_name((int)what), id);
-    return true;
-}}
-"""
-
-_CANCEL = """\
-static bool print_cancel(void *context, {prefix}_communication_t action, uint32_t id)
-{{
-    (void)context;
-    printf("cancel %s, id %" PRIu32 "\\n", {prefix}_communication_name((int)action), id);
     return true;
 }}
 """
@@ -155,21 +105,13 @@ def layer_example_file(unit: Unit) -> str:
         texts.append(_TELL.replace("{kind}", "answer_default"))
         settings += ["call = print_call", "answer = print_answer", "answer_default = print_answer_default"]
     if layout.of_kind(CommunicationKind.ACTION):
-        texts += [_SEND.replace("{kind}", "send_goal"), _CANCEL, _TELL.replace("{kind}", "accept_goal")]
+        texts += [_SEND.replace("{kind}", "send_goal"), CANCEL, _TELL.replace("{kind}", "accept_goal")]
         texts += [_TELL.replace("{kind}", "reject_goal"), _HAND_ON.replace("{kind}", "pass_feedback"), _END]
         settings += ["send_goal = print_send_goal", "cancel_goal = print_cancel", "accept_goal = print_accept_goal"]
         settings += ["reject_goal = print_reject_goal", "pass_feedback = print_pass_feedback", "end_goal = print_end"]
-    return (
-        head(layout.supervisor)
-        + "\n"
-        + _MAIN.format(
-            prefix=layout.prefix,
-            upper=layout.upper,
-            callbacks="\n".join(text.format(prefix=layout.prefix) for text in texts),
-            settings="".join(f"\n    callbacks.{item};" for item in settings).lstrip("\n"),
-            requests="\n".join(indent(_requests(layout), 2)),
-        )
-    )
+    period = [*_requests(layout), f"{layout.prefix}_watch(&layer, now_us);"]
+    purpose = "a caller that asks for everything once a period, and a robot that says nothing"
+    return main_text(layout, "layer", purpose, texts, settings, "\n".join(indent(period, 2)))
 
 
 def _requests(layout: Layout) -> list[str]:

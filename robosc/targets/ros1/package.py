@@ -30,7 +30,7 @@ _RUNTIME_MODULES = {
     "late_controller": "robosc.targets.ros.runtime",
     "messages": "robosc.targets.ros.runtime",
     "parameters": "robosc.targets.ros.runtime",
-    "presence": "robosc.targets.ros1.runtime",
+    "presence": "robosc.targets.ros.runtime",
     "reports": "robosc.targets.ros.runtime",
     "scans": "robosc.targets.ros.runtime",
     "services": "robosc.targets.ros1.runtime",

@@ -43,6 +43,7 @@ _RUNTIME_MODULES = {
     "lifecycle": "robosc.targets.ros2.runtime",
     "messages": "robosc.targets.ros.runtime",
     "parameters": "robosc.targets.ros.runtime",
+    "presence": "robosc.targets.ros.runtime",
     "reports": "robosc.targets.ros.runtime",
     "scans": "robosc.targets.ros.runtime",
 }

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robosc.targets.ros.runtime.messages import Sender, SetupError, check_shape, fields_of, headers_of, message_name
+from robosc.targets.ros.runtime.presence import LOST_S
 from robosc.targets.ros.runtime.reports import Reports
 from robosc.targets.ros1.runtime.goals import (
     DONE,
@@ -21,7 +22,6 @@ from robosc.targets.ros1.runtime.goals import (
     ActionGoals,
 )
 from robosc.targets.ros1.runtime.inbox import Action, Inbox
-from robosc.targets.ros1.runtime.presence import LOST_S
 from robosc.targets.ros1.runtime.services import MAXIMUM_PENDING, MAXIMUM_THREADS, ServiceCalls
 from robosc.targets.ros1.runtime.timers import Timers
 

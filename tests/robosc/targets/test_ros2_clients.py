@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 
+from robosc.targets.ros.runtime.presence import LOST_S
 from robosc.targets.ros.runtime.reports import Reports
-from robosc.targets.ros2.runtime.clients import LOST_S, MAXIMUM_PENDING, REFUSAL_S, ActionGoals, ServiceCalls
+from robosc.targets.ros2.runtime.clients import MAXIMUM_PENDING, REFUSAL_S, ActionGoals, ServiceCalls
 
 SUCCEEDED, CANCELED, ABORTED, UNKNOWN = 4, 5, 6, 0
 NONE, REJECTED, UNKNOWN_GOAL, TERMINATED = 0, 1, 2, 3

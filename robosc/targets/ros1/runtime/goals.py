@@ -12,9 +12,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from robosc.targets.ros.runtime.presence import Presence
 from robosc.targets.ros.runtime.reports import Reports
 from robosc.targets.ros1.runtime.inbox import Action
-from robosc.targets.ros1.runtime.presence import Presence
 
 REFUSAL_S = 1.0
 """A server that still reports a goal as running so long after its cancel does not mean to cancel it."""

@@ -12,10 +12,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from robosc.targets.ros.runtime.presence import Presence
 from robosc.targets.ros.runtime.reports import Reports
-
-LOST_S = 1.0
-"""A server that was not seen for so long is lost; discovery may lose sight of it for a moment."""
 
 REFUSAL_S = 0.25
 """How long after a refused cancel the goal's end may still be on its way."""
@@ -30,27 +28,6 @@ _OUTCOMES = {4: "succeeded", 5: "cancelled", 6: "aborted"}
 # own server answers instead.
 _UNKNOWN_GOAL = 2
 _GOAL_TERMINATED = 3
-
-
-class _Presence:
-    """Tells when a server is lost."""
-
-    def __init__(self, is_ready: Callable[[], bool]) -> None:
-        self._is_ready = is_ready
-        self._missed_since_s: float | None = None
-
-    def is_lost(self, now_s: float) -> bool:
-        """Whether it has not been seen for `LOST_S`, asked again and again."""
-        if self._is_ready():
-            self._missed_since_s = None
-            return False
-        if self._missed_since_s is None:
-            self._missed_since_s = now_s
-        return now_s >= self._missed_since_s + LOST_S
-
-    def forget(self) -> None:
-        """Nobody asks any more."""
-        self._missed_since_s = None
 
 
 class _Call:
@@ -82,7 +59,7 @@ class ServiceCalls:
         self._reports = reports
         self._monotonic = monotonic
         self._timeout_s = float("inf") if timeout_s is None else timeout_s
-        self._presence = _Presence(client.service_is_ready)
+        self._presence = Presence(client.service_is_ready)
         self._calls: dict[int, _Call] = {}
 
     def is_ready(self) -> bool:
@@ -173,7 +150,7 @@ class ActionGoals:
         self._client = client
         self._reports = reports
         self._monotonic = monotonic
-        self._presence = _Presence(client.server_is_ready)
+        self._presence = Presence(client.server_is_ready)
         self._goals: dict[int, _Goal] = {}
         self._abandoned: dict[int, _Abandoned] = {}
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 LOST_S = 1.0
-"""A server that was not seen for so long is lost; a connection may be lost and made anew in between."""
+"""A server that was not seen for so long is lost; discovery may lose sight of it for a moment, and a connection may be
+made anew."""
 
 
 class Presence:

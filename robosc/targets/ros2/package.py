@@ -71,6 +71,7 @@ _TEMPLATES = {
     "{package}/interfaces.py": "interfaces.py.j2",
     "{package}/life.py": "life.py.j2",
     "{package}/parameter_file.py": "parameter_file.py.j2",
+    "{package}/spinner.py": "spinner.py.j2",
     "{package}/state_topic.py": "state_topic.py.j2",
 }
 

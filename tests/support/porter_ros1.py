@@ -109,6 +109,7 @@ class Porter:
         """Start the layer anew, and perhaps the existing controller with it."""
         self.leave()
         self.run += 1
+        self.peer.do("clear")
         self.master.delete_parameters(f"/{PACKAGE}")
         for messages in self.peer.received.values():
             messages.clear()
@@ -119,17 +120,22 @@ class Porter:
 
     def meet(self) -> None:
         """Wait until the layer is connected both ways, and has begun."""
-        self.until(lambda: all(self.peer.ends(topic) for topic in (*RECEIVED, *SENT)), "the connections")
+        self.until(lambda: all(map(self._is_connected, (*RECEIVED, *SENT))), "the connections")
         self.until(lambda: self.state("Power") == "idle", "the layer to begin")
+
+    def _is_connected(self, topic: str) -> bool:
+        return f"/{PACKAGE}" in self.peer.ends(topic)
 
     def ensure(self, *parameters: str) -> None:
         """Have a layer with these parameters in its initial state, if possible the one that runs."""
-        is_usable = self._parameters == parameters and self.layer is not None and self.layer.is_running
-        if is_usable and self.state("Power") == self.state("Counter") == "idle":
+        if self._parameters == parameters and self.layer is not None and self.layer.is_running:
+            self._parameters = None
+            self.peer.do("clear")
+            self.until(lambda: self.state("Power") == self.state("Counter") == "idle", "the layer to be idle")
             self.allow(False)
         else:
             self.start(*parameters)
-            self._parameters = parameters
+        self._parameters = parameters
 
     def leave(self) -> None:
         """End what runs, as a crash would, and wait until nobody is connected with it."""
@@ -140,7 +146,7 @@ class Porter:
             wait_until(self._is_alone, "the connections to be gone")
 
     def _is_alone(self) -> bool:
-        if not any(self.peer.ends(topic) for topic in (*RECEIVED, *SENT)):
+        if not any(map(self._is_connected, (*RECEIVED, *SENT))):
             return True
         # Who is gone is only noticed when something is sent to him.
         for topic, type_name in SENT.items():

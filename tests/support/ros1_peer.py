@@ -21,6 +21,7 @@ Commands, by `do` (replies and reports are lines of JSON, too; `time` is seconds
                                   from then on {"sent": id, "state", "status", "result"} and {"sent": id, "feedback"}
     withdraw  id                  a goal that was sent is cancelled by its sender
     names                         {"names": {"publishers": {topic: [node]}, ...}} as the master knows them
+    clear                         all waiting calls are refused, all accepted goals aborted
     die                           the process ends at once
 """
 
@@ -201,6 +202,15 @@ def names() -> None:
     report(names={"publishers": dict(publishers), "subscribers": dict(subscribers), "services": dict(services)})
 
 
+def clear() -> None:
+    for waiting in _waiting_calls.values():
+        while waiting:
+            waiting.pop(0).end(None)
+    for server in _servers.values():
+        while server.running:
+            server.end("aborted", None)
+
+
 def do(command: Any) -> None:
     what, name = command["do"], command.get("name")
     if what == "subscribe":
@@ -241,6 +251,8 @@ def do(command: Any) -> None:
         send(command["id"], name, command["type"], command["message"])
     elif what == "withdraw":
         _sent[command["id"]].cancel()
+    elif what == "clear":
+        clear()
     elif what == "die":
         os._exit(9)
     else:

@@ -234,7 +234,7 @@ def test_messages_of_the_robot_come_through_as_they_are(porter: Porter) -> None:
         "angle_min": -0.125,
         "angle_increment": 0.125,
         "range_max": 9.0,
-        "ranges": [2.0, 0.75, 9.5],
+        "ranges": [0.25, 0.75, 9.5],
         "intensities": [1.0, 2.0, 3.0],
     }
     passed = porter.peer.received["/supervised/scan"]
@@ -422,7 +422,21 @@ def test_a_goal_without_a_server_ends_as_aborted_and_a_call_with_the_default(pac
 
 
 def test_at_the_end_the_robot_stands_still_and_nobody_waits(porter: Porter) -> None:
-    porter.start(*PATIENT, "_service_timeout:=0.0")
+    # An answer that takes a while to go out is awaited.
+    slow = f"""
+import time
+from {PACKAGE} import node
+from {PACKAGE}.runtime.servers import CalledService
+before = CalledService.handle
+def handle(self, request):
+    response = before(self, request)
+    time.sleep(1.0)
+    return response
+CalledService.handle = handle
+node.LEAVE_S = 10.0
+node.main()
+"""
+    porter.start(*PATIENT, "_service_timeout:=0.0", command=["-c", slow])
     porter.drive()
     calls, cancels = len(porter.peer.requests["/power"]), porter.peer.cancels["/count"]
     call, goal = porter.call(), porter.reached_goal()

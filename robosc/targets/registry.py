@@ -116,7 +116,7 @@ _BUILT_IN: dict[str, tuple[str, str]] = {
         "robosc.targets.python:TARGET",
     ),
     "ros1": (
-        "a complete ROS 1 package (catkin, rospy): controller node, launch file, parameters",
+        "a complete ROS 1 package (catkin, rospy): controller or layer node, launch file, parameters",
         "robosc.targets.ros1:TARGET",
     ),
     "ros1-cpp": (

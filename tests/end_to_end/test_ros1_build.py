@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from robosc.model.structure import Deployment
 from robosc.targets import generate, write_files
 from support.generated import example_supervisor
 from support.ros1 import PYTHON, Master, Peer, Process, clean_environment, missing, until, wait_until
@@ -19,6 +20,7 @@ pytestmark = [
 ]
 
 PACKAGE = "line_follower_controller"
+LAYER = "line_follower_layer_layer"
 BUILD_LIMIT_S = 240.0
 
 
@@ -33,9 +35,11 @@ def run(command: list[str], folder: Path) -> str:
 
 @pytest.fixture(scope="module")
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A built workspace."""
+    """A built workspace, with a controller and a supervision layer."""
     folder = tmp_path_factory.mktemp("workspace")
     write_files(generate(example_supervisor("line_follower/line_follower"), "ros1"), folder / "src" / PACKAGE)
+    layer = example_supervisor("line_follower/line_follower_layer", Deployment.LAYER)
+    write_files(generate(layer, "ros1"), folder / "src" / LAYER)
     run(["catkin_make", f"-DPYTHON_EXECUTABLE={PYTHON}", "install"], folder)
     return folder
 
@@ -63,7 +67,7 @@ def test_its_tests_run_and_can_fail(workspace: Path) -> None:
     file = workspace / "build/test_results" / PACKAGE / "supervisor.xml"
     suite = ElementTree.parse(file).getroot()
     assert (suite.get("tests"), suite.get("failures")) == ("3", "0")
-    assert "3 tests, 0 errors, 0 failures" in run(["catkin_test_results", "build/test_results"], workspace)
+    assert "8 tests, 0 errors, 0 failures" in run(["catkin_test_results", "build/test_results"], workspace)
 
     supervisor = workspace / "src" / PACKAGE / PACKAGE / "supervisor.py"
     text = supervisor.read_text()
@@ -122,6 +126,27 @@ def test_the_installed_programs_find_package_and_parameters(workspace: Path, mas
                     assert node.wait() == 0
     finally:
         parameters.write_text(text)
+
+
+def test_the_installed_layer_starts_a_controller_from_any_folder(
+    workspace: Path, master: Master, tmp_path: Path
+) -> None:
+    environment = sourced(workspace / "install", master.variables)
+    program = workspace / "install/lib" / LAYER / "start_line_follower_layer"
+    controller = tmp_path / "controller"
+    controller.write_text('#!/bin/sh\necho "$@"\nexec sleep 1000\n')
+    controller.chmod(0o755)
+    command = [str(program), "_server_wait:=0.0", "--controller", str(controller)]
+    with Peer(master, tmp_path) as peer, Process(command, environment, tmp_path / "layer") as layer:
+        until(lambda: "/supervised/cmd_vel" in peer.names()["subscribers"], "the layer", layer)
+        until(lambda: "/cmd_vel:=/supervised/cmd_vel" in layer.stdout.split(), "the controller", layer)
+        layer.signal(signal.SIGTERM)
+        assert layer.wait() == 0, layer.stderr
+    command = ["/usr/bin/roslaunch", "-p", str(master.port), LAYER, "layer.launch", "topic_prefix:=/r"]
+    with Peer(master, tmp_path) as peer, Process(command, environment, tmp_path / "launch") as launch:
+        until(lambda: "/r/supervised/cmd_vel" in peer.names()["subscribers"], "the layer", launch)
+        launch.signal(signal.SIGINT)
+        assert launch.wait(30.0) == 0
 
 
 def test_a_launch_file_ends_with_its_node(workspace: Path, master: Master, tmp_path: Path) -> None:

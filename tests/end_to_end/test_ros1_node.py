@@ -290,7 +290,7 @@ def test_a_fault_stops_the_robot_and_ends_the_node(robot: Robot) -> None:
 def test_an_exception_stops_the_robot_and_ends_the_node(robot: Robot, tmp_path: Path) -> None:
     copy = tmp_path / "broken"
     write_files(generate(example_supervisor(FOLLOWER), "ros1"), copy)
-    node = copy / PACKAGE / "node.py"
+    node = copy / PACKAGE / "host.py"
     start = "    def _receive(self, identifier, message):\n"
     broken = start + "        if identifier == '/line/lost': raise KeyError('x')\n"
     node.write_text(node.read_text().replace(start, broken))

@@ -72,7 +72,7 @@ def test_messages_of_the_robot_come_through_as_they_are(porter: Porter) -> None:
 
     passed = porter.peer.receive(LaserScan, "/supervised/scan")
     porter.start("server_wait:=0.0", "resample_scans:=true")
-    scan = LaserScan(angle_min=-0.125, angle_increment=0.125, range_max=9.0, ranges=array("f", [2.0, 0.75, math.inf]))
+    scan = LaserScan(angle_min=-0.125, angle_increment=0.125, range_max=9.0, ranges=array("f", [0.25, 0.75, math.inf]))
     scan.header.frame_id = "laser"
     scan.header.stamp.sec = 7
     scan.intensities = array("f", [1.0, 2.0, 3.0])

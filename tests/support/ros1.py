@@ -168,6 +168,11 @@ class Master:
             return False
         return True
 
+    def delete_parameters(self, name: str) -> None:
+        """Take what is below a name off the parameter server."""
+        with xmlrpc.client.ServerProxy(self.variables["ROS_MASTER_URI"]) as master:
+            master.deleteParam("/test", name)
+
     def set_parameter(self, name: str, value: Any) -> None:
         """Put a parameter on the parameter server."""
         with xmlrpc.client.ServerProxy(self.variables["ROS_MASTER_URI"]) as master:
@@ -199,6 +204,8 @@ class Peer:
         requests: What services were asked, by name.
         goals: What actions were asked, by name.
         cancels: How often an action was cancelled, by name.
+        replies: What became of calls that it made, by number.
+        sent: What was heard of goals that it sent, by number.
     """
 
     def __init__(self, master: Master, folder: Path, name: str = "test_peer") -> None:
@@ -217,6 +224,9 @@ class Peer:
         self.requests: dict[str, list[Any]] = {}
         self.goals: dict[str, list[Any]] = {}
         self.cancels: dict[str, int] = {}
+        self.replies: dict[int, dict[str, Any]] = {}
+        self.sent: dict[int, list[dict[str, Any]]] = {}
+        self._count = 0
         self._replies: queue.Queue[dict[str, Any]] = queue.Queue()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -234,6 +244,10 @@ class Peer:
                 self.goals[item["action"]].append(item["goal"])
             elif "cancel" in item:
                 self.cancels[item["action"]] += 1
+            elif "call" in item:
+                self.replies[item["call"]] = item
+            elif "sent" in item:
+                self.sent[item["sent"]].append(item)
             else:
                 self._replies.put(item)
 
@@ -271,6 +285,19 @@ class Peer:
         self.goals[name] = []
         self.cancels[name] = 0
         self.do("action", name=name, type=type_name, options=options)
+
+    def call(self, name: str, type_name: str, **fields: Any) -> int:
+        """Call a service: a number, under which the reply will be in `replies`."""
+        self._count += 1
+        self.do("call", id=self._count, name=name, type=type_name, message=fields)
+        return self._count
+
+    def send(self, name: str, type_name: str, **fields: Any) -> int:
+        """Send a goal: a number, under which what is heard of it will be in `sent`."""
+        self._count += 1
+        self.sent[self._count] = []
+        self.do("send", id=self._count, name=name, type=type_name, message=fields)
+        return self._count
 
     def ends(self, topic: str) -> list[str]:
         """The nodes that are connected with this one on a topic."""

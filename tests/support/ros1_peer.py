@@ -10,11 +10,18 @@ Commands, by `do` (replies and reports are lines of JSON, too; `time` is seconds
     refuse    name                the oldest waiting call is refused
     action    name, type, accepts, cancels, ends_on_cancel
                                   from then on {"action", "goal"} and {"action", "cancel"}
+    accepts   name, accepts       the same option from now on
     accept    name                the oldest goal that waits for it (accepts: "later") is accepted
     feedback  name, message
     end       name, how, message  the oldest accepted goal ends: succeeded, aborted, canceled, rejected
     cancel    name                all goals of a server, whoever sent them, are cancelled
+    call      id, name, type, message
+                                  {"call": id, "reply"} or {"call": id, "failed"}, later
+    send      id, name, type, message
+                                  from then on {"sent": id, "state", "status", "result"} and {"sent": id, "feedback"}
+    withdraw  id                  a goal that was sent is cancelled by its sender
     names                         {"names": {"publishers": {topic: [node]}, ...}} as the master knows them
+    clear                         all waiting calls are refused, all accepted goals aborted
     die                           the process ends at once
 """
 
@@ -28,7 +35,7 @@ from typing import Any
 import genpy
 import rosgraph
 import rospy
-from actionlib import ActionServer
+from actionlib import ActionClient, ActionServer, CommState
 from actionlib_msgs.msg import GoalID
 from genpy.message import fill_message_args
 from roslib.message import get_message_class, get_service_class
@@ -38,6 +45,10 @@ _publishers: dict[str, Any] = {}
 _subscribers: dict[str, Any] = {}
 _waiting_calls: dict[str, Any] = {}
 _servers: dict[str, Any] = {}
+_clients: dict[str, Any] = {}
+_sent: dict[int, Any] = {}
+
+WAIT_S = 10.0
 
 
 def report(**what: Any) -> None:
@@ -152,6 +163,34 @@ class Server(ActionServer):  # type: ignore[misc]
         self.running.append(handle)
 
 
+def call(number: int, name: str, type_name: str, message: Any) -> None:
+    service_class = get_service_class(type_name)
+    try:
+        rospy.wait_for_service(name, WAIT_S)
+        reply = rospy.ServiceProxy(name, service_class)(filled(service_class._request_class(), message))
+    except (rospy.ServiceException, rospy.ROSException) as error:
+        report(call=number, failed=str(error))
+    else:
+        report(call=number, reply=plain(reply))
+
+
+def send(number: int, name: str, type_name: str, message: Any) -> None:
+    action_class = get_message_class(type_name + "Action")
+    if name not in _clients:
+        _clients[name] = ActionClient(name, action_class)
+    _clients[name].wait_for_server(rospy.Duration(WAIT_S))
+
+    def changed(handle: Any) -> None:
+        state = handle.get_comm_state()
+        result = plain(handle.get_result()) if state == CommState.DONE else None
+        report(sent=number, state=state, status=handle.get_goal_status(), result=result)
+
+    goal = filled(type(action_class().action_goal.goal)(), message)
+    _sent[number] = _clients[name].send_goal(
+        goal, changed, lambda handle, feedback: report(sent=number, feedback=plain(feedback))
+    )
+
+
 def ends(topic: str) -> None:
     out = _publishers[topic].impl.connections if topic in _publishers else []
     into = _subscribers[topic].impl.connections if topic in _subscribers else []
@@ -161,6 +200,15 @@ def ends(topic: str) -> None:
 def names() -> None:
     publishers, subscribers, services = rosgraph.Master("/test_peer").getSystemState()
     report(names={"publishers": dict(publishers), "subscribers": dict(subscribers), "services": dict(services)})
+
+
+def clear() -> None:
+    for waiting in _waiting_calls.values():
+        while waiting:
+            waiting.pop(0).end(None)
+    for server in _servers.values():
+        while server.running:
+            server.end("aborted", None)
 
 
 def do(command: Any) -> None:
@@ -186,6 +234,8 @@ def do(command: Any) -> None:
         _waiting_calls[name].pop(0).end(command.get("message"))
     elif what == "action":
         _servers[name] = Server(name, command["type"], **command["options"])
+    elif what == "accepts":
+        _servers[name].accepts = command["accepts"]
     elif what == "accept":
         _servers[name].accept()
     elif what == "feedback":
@@ -194,6 +244,15 @@ def do(command: Any) -> None:
         _servers[name].end(command["how"], command.get("message"))
     elif what == "cancel":
         publisher(name + "/cancel", "actionlib_msgs/GoalID").publish(GoalID())
+    elif what == "call":
+        arguments = (command["id"], name, command["type"], command["message"])
+        threading.Thread(target=call, args=arguments, daemon=True).start()
+    elif what == "send":
+        send(command["id"], name, command["type"], command["message"])
+    elif what == "withdraw":
+        _sent[command["id"]].cancel()
+    elif what == "clear":
+        clear()
     elif what == "die":
         os._exit(9)
     else:

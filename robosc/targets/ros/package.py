@@ -30,6 +30,7 @@ EVENT_LOG_FOLDER = "event_log"
 
 _DIAGNOSTICS = Interface("DiagnosticArray", "diagnostic_msgs")
 _RELEASED_TYPES = frozenset({"Twist", "TwistStamped"})
+_TITLES = {Deployment.CONTROLLER: "Supervisory controller", Deployment.LAYER: "Supervision layer"}
 
 
 @contextmanager
@@ -89,6 +90,7 @@ def context(
         "version": __version__,
         "model": model.name,
         "package": package,
+        "title": _TITLES[supervisor.deployment],
         "digest": supervisor.certificate.bundle_sha256,
         "header": header(supervisor),
         "certificate": {

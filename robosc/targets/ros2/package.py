@@ -7,6 +7,7 @@ from robosc.supervisor.structure import Supervisor
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.python.package import package_name
 from robosc.targets.registry import GenerateOptions
+from robosc.targets.ros.layer import remapped_names, require_names_of_a_layer
 from robosc.targets.ros.package import (
     chosen,
     context,
@@ -18,10 +19,10 @@ from robosc.targets.ros.package import (
     told_by,
 )
 from robosc.targets.ros.runtime.parameters import declarations
+from robosc.targets.ros.runtime.supervised import callers_name, robots_name
 from robosc.targets.ros.topics import servers, topics
-from robosc.targets.ros2.layer import remapped_names, require_names_of_a_layer
 from robosc.targets.ros2.runtime.lifecycle import AUTOSTART
-from robosc.targets.ros2.runtime.supervised import callers_name, robots_name
+from robosc.targets.ros2.runtime.remapping import remapped
 
 _OWN_DEPENDENCIES = (
     "ament_index_python",
@@ -32,8 +33,6 @@ _OWN_DEPENDENCIES = (
     "rclpy",
     "std_msgs",
 )
-
-_TITLES = {Deployment.CONTROLLER: "Supervisory controller", Deployment.LAYER: "Supervision layer"}
 
 # Where each module of a package's runtime comes from.
 _RUNTIME_MODULES = {
@@ -53,8 +52,9 @@ _RUNTIME_MODULES_OF = {
     Deployment.LAYER: {
         "defaults": "robosc.targets.ros2.runtime",
         "late_layer": "robosc.targets.ros.runtime",
+        "remapping": "robosc.targets.ros2.runtime",
         "servers": "robosc.targets.ros2.runtime",
-        "supervised": "robosc.targets.ros2.runtime",
+        "supervised": "robosc.targets.ros.runtime",
     },
 }
 
@@ -109,11 +109,10 @@ def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles
         if deployment is Deployment.LAYER:
             require_names_of_a_layer(found, asked)
         values = context(supervisor, name, found, asked)
-    values["title"] = _TITLES[deployment]
     values["dependencies"] = sorted({*_OWN_DEPENDENCIES, *packages(found, asked)})
     values["parameters"] = chosen((*declarations(release_identifiers(found), str(deployment)), AUTOSTART), options)
     values["supervised"] = options.supervised
-    values["remapped"] = remapped_names(found, asked)
+    values["remapped"] = remapped_names(found, asked, remapped)
     files = python_files(supervisor, name, _RUNTIME_MODULES | _RUNTIME_MODULES_OF[deployment])
     templates = environment("robosc.targets.ros2")
     templates.filters["robots"] = partial(robots_name, "")

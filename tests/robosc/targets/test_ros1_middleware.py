@@ -1,4 +1,4 @@
-"""The generated middleware of ROS 1 without ROS 1: names on the wire, and when a last message has arrived."""
+"""The generated connections of ROS 1 without ROS 1: names on the wire, and when a last message has arrived."""
 
 import socket
 import sys
@@ -17,7 +17,7 @@ PACKAGE = "line_follower_controller"
 
 
 @pytest.fixture(scope="module")
-def middleware(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+def connections(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     """The generated module, with stand-ins for what it imports of ROS."""
     folder = tmp_path_factory.mktemp("package")
     write_files(generate(example_supervisor("line_follower/line_follower"), "ros1"), folder)
@@ -27,8 +27,8 @@ def middleware(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
             vars(stub).update(members)
             patch.setitem(sys.modules, name, stub)
         patch.syspath_prepend(str(folder))
-        __import__(f"{PACKAGE}.middleware")
-        yield sys.modules[f"{PACKAGE}.middleware"]
+        __import__(f"{PACKAGE}.connections")
+        yield sys.modules[f"{PACKAGE}.connections"]
         for name in [name for name in sys.modules if name.split(".")[0] == PACKAGE]:
             del sys.modules[name]
 
@@ -41,20 +41,20 @@ def publisher(*connections: Any) -> Any:
     ("prefix", "identifier", "name"),
     [("", "/a", "/a"), ("", "a/b", "a/b"), ("/p", "a", "/p/a"), ("/p", "/a", "/p/a"), ("/p", "~/a/b", "~a/b")],
 )
-def test_names_on_the_wire(middleware: Any, prefix: str, identifier: str, name: str) -> None:
-    assert middleware.wire_name(prefix, identifier) == name
+def test_names_on_the_wire(connections: Any, prefix: str, identifier: str, name: str) -> None:
+    assert connections.wire_name(prefix, identifier) == name
 
 
-def test_what_waits_in_a_queue_is_awaited(middleware: Any) -> None:
+def test_what_waits_in_a_queue_is_awaited(connections: Any) -> None:
     connection = SimpleNamespace(_queue=[b"zero"], socket=None)
     threading.Timer(0.2, connection._queue.clear).start()
     began_s = time.monotonic()
-    middleware.wait_until_delivered([publisher(SimpleNamespace(_queue=[], socket=None)), publisher(connection)])
+    connections.wait_until_delivered([publisher(SimpleNamespace(_queue=[], socket=None)), publisher(connection)])
     assert not connection._queue
     assert time.monotonic() - began_s >= 0.2
 
 
-def test_what_the_other_computer_has_not_confirmed_is_awaited_but_not_for_long(middleware: Any) -> None:
+def test_what_the_other_computer_has_not_confirmed_is_awaited_but_not_for_long(connections: Any) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server, socket.create_connection(server.getsockname()) as sender:
         receiver, _ = server.accept()
         with receiver:
@@ -63,10 +63,10 @@ def test_what_the_other_computer_has_not_confirmed_is_awaited_but_not_for_long(m
                 while True:
                     sender.send(bytes(65536))
             connection = SimpleNamespace(_queue=[], socket=sender)
-            assert middleware._unsent(connection)
+            assert connections._unsent(connection)
             began_s = time.monotonic()
-            middleware.wait_until_delivered([publisher(connection)])
-            assert time.monotonic() - began_s >= middleware.DELIVERY_S
+            connections.wait_until_delivered([publisher(connection)])
+            assert time.monotonic() - began_s >= connections.DELIVERY_S
 
-    assert not middleware._unsent(SimpleNamespace(_queue=[], socket=sender))
-    assert not middleware._unsent(SimpleNamespace(_queue=[], socket=None))
+    assert not connections._unsent(SimpleNamespace(_queue=[], socket=sender))
+    assert not connections._unsent(SimpleNamespace(_queue=[], socket=None))

@@ -285,8 +285,9 @@ def test_a_goal_is_accepted_once_and_succeeds(goals: Goals) -> None:
 @pytest.mark.parametrize(
     ("status", "outcome"), [(2, "cancelled"), (4, "aborted"), (5, "rejected"), (8, "cancelled"), (9, "lost")]
 )
-def test_every_other_end_has_no_result(goals: Goals, status: int, outcome: str) -> None:
-    assert goals.changes(DONE, status, "nothing") == [("on_goal_ended", 1, outcome, None)]
+def test_every_other_end_has_a_result_if_its_server_told_it(goals: Goals, status: int, outcome: str) -> None:
+    result = None if outcome == "lost" else "partly"
+    assert goals.changes(DONE, status, "partly") == [("on_goal_ended", 1, outcome, result)]
 
 
 def test_a_rejected_goal_is_never_accepted(goals: Goals) -> None:

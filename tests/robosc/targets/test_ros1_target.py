@@ -168,11 +168,6 @@ def test_what_it_cannot_do_is_refused_with_its_name(body: str, problem: str) -> 
     assert message.startswith("target ros1: ") and problem in message and "\n" not in message
 
 
-def test_a_layer_is_refused() -> None:
-    with pytest.raises(UnsupportedModelError, match="was made for the deployment 'layer'"):
-        generate(example_supervisor("line_follower/line_follower_layer", Deployment.LAYER), "ros1")
-
-
 HOSTILE = r"""
 datatype object class { x: double }
 datatype enum continue from string to { value = "{{ 1 }} --> `|` \" ' \\ </name>" -> break default -> global }

@@ -17,8 +17,9 @@ from robosc.supervisor.structure import Supervisor
 from robosc.targets import GeneratedFiles, GenerateOptions, generate, write_files
 from robosc.targets.registry import SupervisedController
 from robosc.targets.ros.runtime.parameters import ParameterError, declarations, validate
+from robosc.targets.ros.runtime.supervised import callers_name, robots_name
 from robosc.targets.ros2.runtime.lifecycle import AUTOSTART
-from robosc.targets.ros2.runtime.supervised import callers_name, remapped, remapping_arguments, robots_name
+from robosc.targets.ros2.runtime.remapping import remapped, remapping_arguments
 from support.generated import example_supervisor
 from support.launch_stub import evaluated, launch_actions
 from support.models import model_of

@@ -221,7 +221,7 @@ class ActionGoals:
         if state == DONE:
             # Any other status means that the server does not know the goal: it was started anew.
             outcome = _OUTCOMES.get(status, "lost")
-            self._end(goal_id, outcome, result if outcome == "succeeded" else None)
+            self._end(goal_id, outcome, None if outcome == "lost" else result)
         elif not goal.is_accepted and state != WAITING_FOR_CANCEL_ACK and status not in (REJECTED, RECALLED):
             goal.is_accepted = True
             self._reports.add(lambda executor: executor.on_goal_accepted(goal_id))

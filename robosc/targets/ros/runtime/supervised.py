@@ -14,8 +14,6 @@ BLOCKED = "/blocked"
 
 SUPERVISED = "/supervised"
 
-_OF_AN_ACTION = ("send_goal", "cancel_goal", "get_result", "feedback", "status")
-
 
 def robots_name(prefix: str, identifier: str) -> str:
     """A name on the robot's side.
@@ -32,20 +30,7 @@ def callers_name(prefix: str, identifier: str) -> str:
     return robots_name(prefix + SUPERVISED, identifier)
 
 
-def remapped(messages_and_services: Iterable[str], actions: Iterable[str]) -> tuple[tuple[str, str], ...]:
-    """Old and new name, without a prefix, of everything that the existing controller has to call otherwise.
-
-    ROS remaps the services and topics that an action is made of, and not the action, so each of them is named.
-    """
-    identifiers = [
-        *messages_and_services,
-        *(f"{action}/_action/{part}" for action in actions for part in _OF_AN_ACTION),
-    ]
+def old_and_new(identifiers: Iterable[str]) -> tuple[tuple[str, str], ...]:
+    """Old and new name, without a prefix, of what the existing controller has to call otherwise."""
     # A service may be called like a topic: one rule is for both.
     return tuple(dict.fromkeys((robots_name("", item), callers_name("", item)) for item in identifiers))
-
-
-def remapping_arguments(names: Iterable[tuple[str, str]], prefix: str) -> list[str]:
-    """The arguments that make a program on ROS 2 use the new names."""
-    rules = [f"{prefix}{old}:={prefix}{new}" for old, new in names]
-    return ["--ros-args", *(argument for rule in rules for argument in ("-r", rule))]

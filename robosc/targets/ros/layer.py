@@ -1,15 +1,28 @@
-"""What a supervision layer means on ROS 2, and which names of a model have no meaning there."""
+"""What a supervision layer means on ROS, and which names of a model have no meaning there."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Communication, CommunicationKind
+from robosc.targets.ros.runtime.supervised import BLOCKED, SUPERVISED, robots_name
 from robosc.targets.ros.topics import Topic
-from robosc.targets.ros2.runtime.supervised import BLOCKED, SUPERVISED, remapped, robots_name
+
+Renamed = tuple[tuple[str, str], ...]
+"""Old and new names."""
 
 
-def remapped_names(found: tuple[Topic, ...], asked: tuple[Communication, ...]) -> tuple[tuple[str, str], ...]:
-    """Old and new name of everything that an existing controller has to call otherwise."""
+def remapped_names(
+    found: tuple[Topic, ...],
+    asked: tuple[Communication, ...],
+    remapped: Callable[[Iterable[str], Iterable[str]], Renamed],
+) -> Renamed:
+    """Old and new name of everything that an existing controller has to call otherwise.
+
+    Args:
+        found: The topics.
+        asked: The services and actions.
+        remapped: Names everything, given topics and services, and actions: the two ROS make actions of other parts.
+    """
     services = [item.identifier for item in asked if item.kind is CommunicationKind.SERVICE]
     actions = [item.identifier for item in asked if item.kind is CommunicationKind.ACTION]
     return remapped([*(topic.identifier for topic in found), *services], actions)

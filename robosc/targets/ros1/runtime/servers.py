@@ -1,0 +1,206 @@
+"""Services and actions that the existing controller asks a supervision layer for: answers and ends come later.
+
+The servers are rospy's and actionlib's, which call in threads of their own; every call and goal goes through the inbox
+to the executor's thread. A call of ROS 1 is a handler that returns its reply: it waits there, in its own thread, until
+the executor's thread has the answer. That one waits for nothing.
+
+Once the layer takes its leave, nobody takes anything out of the inbox any more: what comes then is answered at once.
+
+A copy of this module stands in generated packages, which run on Python 3.8 and later.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from robosc.targets.ros1.runtime.inbox import Action
+
+
+class _Call:
+    """A call that waits in its thread."""
+
+    __slots__ = ("is_answered", "response")
+
+    def __init__(self) -> None:
+        self.is_answered = threading.Event()
+        self.response: Any = None
+
+
+class CalledService:
+    """The calls of one service.
+
+    Args:
+        make_default: Makes the default response.
+        put: Hands something to the executor's thread.
+        tell: Called there with the number and the message of each call; it, or something later, has it answered.
+    """
+
+    def __init__(
+        self, make_default: Callable[[], Any], put: Callable[[Action], None], tell: Callable[[int, Any], None]
+    ) -> None:
+        self._make_default = make_default
+        self._put = put
+        self._tell = tell
+        self._lock = threading.Lock()
+        self._waiting: dict[int, _Call] = {}
+        self._count = 0
+        self._handled = 0
+        self._is_closed = False
+
+    # In the threads of rospy.
+
+    @contextmanager
+    def handling(self) -> Iterator[None]:
+        """While a call is handled, until its answer was sent."""
+        with self._lock:
+            self._handled += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._handled -= 1
+
+    def handle(self, request: Any) -> Any:
+        """A call came: its answer. Waits for it."""
+        call = _Call()
+        with self._lock:
+            if self._is_closed:
+                return self._make_default()
+            self._count += 1
+            number = self._count
+            self._waiting[number] = call
+            self._put(lambda: self._tell(number, request))
+        call.is_answered.wait()
+        return call.response
+
+    # In the executor's thread.
+
+    def answer(self, number: int, response: Any) -> None:
+        """Answer a call."""
+        with self._lock:
+            call = self._waiting.pop(number)
+        call.response = response
+        call.is_answered.set()
+
+    def answer_default(self, number: int) -> None:
+        """Answer a call with the default response."""
+        self.answer(number, self._make_default())
+
+    def close(self) -> None:
+        """From now on answer every new call with the default response, without anybody's being told."""
+        with self._lock:
+            self._is_closed = True
+
+    def take_leave(self) -> None:
+        """Answer every call that waits with the default response: nobody else would."""
+        for number in list(self._waiting):
+            self.answer_default(number)
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether an answer has still to be sent."""
+        with self._lock:
+            return self._handled > 0
+
+
+class ServedAction:
+    """The goals of one action.
+
+    Args:
+        name: The action's name on ROS, for warnings.
+        put: Hands something to the executor's thread.
+        tell_goal: Called there with the number and the message of each goal; it calls `accept` or `reject`.
+        tell_cancel: Called there with the number of a goal whose cancel was asked for.
+        warn: Called with a text.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        put: Callable[[Action], None],
+        tell_goal: Callable[[int, Any], None],
+        tell_cancel: Callable[[int], None],
+        warn: Callable[[str], None],
+    ) -> None:
+        self._name = name
+        self._put = put
+        self._tell_goal = tell_goal
+        self._tell_cancel = tell_cancel
+        self._warn = warn
+        self._lock = threading.Lock()
+        self._goals: dict[int, Any] = {}
+        self._numbers: dict[str, int] = {}
+        self._count = 0
+        self._is_closed = False
+
+    # In the threads of rospy, while actionlib holds the lock of its server: the executor's thread may wait for that.
+
+    def goal_came(self, handle: Any) -> None:
+        """A goal came, with its handle as of actionlib's `ServerGoalHandle`."""
+        with self._lock:
+            if not self._is_closed:
+                self._put(lambda: self._judge(handle))
+                return
+        handle.set_rejected()
+
+    def cancel_came(self, handle: Any) -> None:
+        """A caller wants to cancel a goal."""
+        self._put(lambda: self._cancel(handle))
+
+    # In the executor's thread.
+
+    def _judge(self, handle: Any) -> None:
+        self._count += 1
+        self._goals[self._count] = handle
+        self._numbers[handle.get_goal_id().id] = self._count
+        self._tell_goal(self._count, handle.get_goal())
+
+    def _cancel(self, handle: Any) -> None:
+        number = self._numbers.get(handle.get_goal_id().id)
+        if number is not None:  # Otherwise its end is on the way.
+            self._tell_cancel(number)
+
+    def accept(self, number: int) -> None:
+        """The goal is let through."""
+        self._try_to("acceptance", self._goals[number].set_accepted)
+
+    def reject(self, number: int) -> None:
+        """The goal is held back."""
+        self._try_to("rejection", self._forgotten(number).set_rejected)
+
+    def feedback(self, number: int, data: Any) -> None:
+        """Tell how far a goal is."""
+        handle = self._goals[number]
+        self._try_to("feedback", lambda: handle.publish_feedback(data))
+
+    def end(self, number: int, outcome: str, result: Any) -> None:
+        """A goal has ended: `succeeded`, `aborted` or `cancelled`, with its result, or None for the default one."""
+        handle = self._forgotten(number)
+        ends = {"succeeded": handle.set_succeeded, "cancelled": handle.set_canceled}
+        end = ends.get(outcome, handle.set_aborted)
+        self._try_to("end", lambda: end(result))
+
+    def close(self) -> None:
+        """From now on reject every new goal, without anybody's being told."""
+        with self._lock:
+            self._is_closed = True
+
+    def take_leave(self) -> None:
+        """Abort every goal: nobody else would end it."""
+        for number in list(self._goals):
+            self.end(number, "aborted", None)
+
+    def _forgotten(self, number: int) -> Any:
+        handle = self._goals.pop(number)
+        self._numbers.pop(handle.get_goal_id().id, None)
+        return handle
+
+    def _try_to(self, what: str, tell: Callable[[], None]) -> None:
+        """A caller that cannot be told something is worth a warning and no fault: the robot is not to stop for it."""
+        try:
+            tell()
+        except Exception as error:
+            self._warn(f"no {what} of a goal of {self._name}: {error}")

@@ -1,0 +1,27 @@
+"""How ROS 2 is told that a program has to call things otherwise.
+
+A copy of this module stands in generated packages, which run on Python 3.8 and later.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from robosc.targets.ros.runtime.supervised import old_and_new
+
+_OF_AN_ACTION = ("send_goal", "cancel_goal", "get_result", "feedback", "status")
+
+
+def remapped(messages_and_services: Iterable[str], actions: Iterable[str]) -> tuple[tuple[str, str], ...]:
+    """Old and new name, without a prefix, of everything that the existing controller has to call otherwise.
+
+    ROS remaps the services and topics that an action is made of, and not the action, so each of them is named.
+    """
+    parts = (f"{action}/_action/{part}" for action in actions for part in _OF_AN_ACTION)
+    return old_and_new([*messages_and_services, *parts])
+
+
+def remapping_arguments(names: Iterable[tuple[str, str]], prefix: str) -> list[str]:
+    """The arguments that make a program on ROS 2 use the new names."""
+    rules = [f"{prefix}{old}:={prefix}{new}" for old, new in names]
+    return ["--ros-args", *(argument for rule in rules for argument in ("-r", rule))]

@@ -1,0 +1,59 @@
+"""An existing controller that knows of no supervision layer and cares for nothing: it drives, whatever happens.
+
+Run by Debian's Python. It says on standard output what it was told, one JSON document a line.
+"""
+
+import json
+import threading
+from typing import Any
+
+import rospy
+from actionlib import ActionClient, CommState
+from actionlib.msg import TestAction, TestGoal
+from geometry_msgs.msg import Twist
+from sensor_msgs.msg import LaserScan
+from std_srvs.srv import SetBool
+
+PERIOD_S = 0.02
+SPEED = 0.3
+
+_writing = threading.Lock()
+
+
+def tell(what: str, data: Any) -> None:
+    with _writing:
+        print(json.dumps([what, data]), flush=True)
+
+
+def ask() -> None:
+    rospy.wait_for_service("/power")
+    tell("reply", rospy.ServiceProxy("/power", SetBool)(True).success)
+    client = ActionClient("/count", TestAction)
+    client.wait_for_server()
+    ended = threading.Event()
+
+    def changed(handle: Any) -> None:
+        if handle.get_comm_state() == CommState.DONE:
+            tell("goal", handle.get_goal_status())
+            ended.set()
+
+    handle = client.send_goal(TestGoal(goal=3), changed)
+    ended.wait()
+    del handle
+
+
+def main() -> None:
+    rospy.init_node("careless")
+    velocities = rospy.Publisher("cmd_vel", Twist, queue_size=10)
+    rospy.Subscriber("/scan", LaserScan, lambda scan: tell("scan", list(scan.ranges)))
+    threading.Thread(target=ask, daemon=True).start()
+    velocity = Twist()
+    velocity.linear.x = SPEED
+    rate = rospy.Rate(1.0 / PERIOD_S)
+    while not rospy.is_shutdown():
+        velocities.publish(velocity)
+        rate.sleep()
+
+
+if __name__ == "__main__":
+    main()

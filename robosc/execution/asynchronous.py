@@ -7,7 +7,8 @@ a cancel ends it as asyncio ends tasks.
 from __future__ import annotations
 
 import asyncio
-from typing import Any, Awaitable, Callable, Dict, Optional, Protocol, Set
+from collections import deque
+from typing import Any, Awaitable, Callable, Deque, Dict, Optional, Protocol, Set, Tuple
 
 from robosc.execution.clock import Clock, SystemClock
 from robosc.execution.event_log import EventLog
@@ -19,6 +20,9 @@ from robosc.execution.settings import Settings
 
 WATCH_S = 0.05
 """How often, at least, it is noticed that time has passed."""
+
+EARLY_MESSAGES = 1000
+"""Messages that are kept until the controller runs."""
 
 Feedback = Callable[[Any], None]
 """To be called with a goal's feedback."""
@@ -97,9 +101,14 @@ class AsyncController:
         self.executor = Executor(system, self._work, settings, self._clock, log)
         self._news: Optional[asyncio.Event] = None
         self._is_ended = False
+        # What comes before the start; None afterwards.
+        self._early: Optional[Deque[Tuple[str, Any]]] = deque(maxlen=EARLY_MESSAGES)
 
     def receive(self, identifier: str, data: Any) -> None:
-        """A message of the robot came; what comes before `run` begins is ignored."""
+        """A message of the robot came; of what comes before `run` begins, the last ones are taken in then."""
+        if self._early is not None:
+            self._early.append((identifier, data))
+            return
         self.executor.receive(identifier, data)
         self._tell()
 
@@ -120,7 +129,7 @@ class AsyncController:
         news = self._news = asyncio.Event()
         reason = "cancelled"
         try:
-            self.executor.start()
+            self._start()
             await self._decide(news)
             reason = "stop"
         except asyncio.CancelledError:
@@ -133,6 +142,15 @@ class AsyncController:
             await self._come_to_rest(news)
         if self.executor.is_faulty:
             raise RuntimeError("; ".join(self.executor.reasons))
+
+    def _start(self) -> None:
+        """Begin in the initial state, and take in what came before."""
+        early, self._early = self._early, None
+        if self._is_ended:
+            return
+        self.executor.start()
+        for identifier, data in early or ():
+            self.executor.receive(identifier, data)
 
     async def _decide(self, news: asyncio.Event) -> None:
         period_s = self.executor.settings.period_s

@@ -147,7 +147,10 @@ class Porter:
     def state(self, component: str) -> str | None:
         return json.loads(self._states[-1].data)["current"][component]["state"] if self._states else None
 
-    def variable(self, component: str, name: str) -> str:
+    def variable(self, component: str, name: str) -> str | None:
+        """Its value, as the layer told it last; None if it has told nothing."""
+        if not self._states:
+            return None
         return str(json.loads(self._states[-1].data)["current"][component]["variables"][name])
 
     def allow(self, is_allowed: bool) -> None:

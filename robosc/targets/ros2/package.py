@@ -50,6 +50,7 @@ _RUNTIME_MODULES = {
 _RUNTIME_MODULES_OF = {
     Deployment.CONTROLLER: {"late_controller": "robosc.targets.ros.runtime"},
     Deployment.LAYER: {
+        "children": "robosc.targets.ros.runtime",
         "defaults": "robosc.targets.ros2.runtime",
         "late_layer": "robosc.targets.ros.runtime",
         "remapping": "robosc.targets.ros2.runtime",

@@ -332,3 +332,30 @@ def test_a_controller_runs_once() -> None:
             await stage.controller.run()
 
     played(scene)
+
+
+def test_what_comes_before_the_start_is_known_at_the_first_decision() -> None:
+    async def play() -> Stage:
+        stage = Stage()
+        running = asyncio.create_task(stage.controller.run())
+        # The task has not begun yet.
+        stage.controller.receive("/bump", None)
+        await stage.turns()
+        assert stage.state("Base") == "stuck"
+        running.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await running
+        return stage
+
+    stage = asyncio.run(play())
+    assert next(entry["event"] for entry in stage.log.entries if entry["kind"] == "event") == "bump.response"
+
+
+def test_a_stop_before_the_start_is_the_end() -> None:
+    async def play() -> Stage:
+        stage = Stage()
+        stage.controller.stop("never mind")
+        await stage.controller.run()
+        return stage
+
+    assert asyncio.run(play()).sent == ["/cmd_vel"]

@@ -26,9 +26,10 @@ from robosc.model.structure import Behaviour, EventKind, Transition, Update, Var
 from robosc.targets.events import Branch, branches_of, has_plant_location, is_controllable, plant_step, split
 from robosc.targets.paths import path_text, path_type
 from robosc.targets.python.allow import accepted
+from robosc.targets.python.changes import noted_change, noted_write
 from robosc.targets.python.expressions import TRUE_CODE, Code, Scope, Sort, Unknown, code_for, negated, value
 from robosc.targets.python.naming import Namer
-from robosc.targets.python.received import Reader, received_unknown
+from robosc.targets.python.received import Reader, reader_namer, received_unknown
 from robosc.targets.python.text import comment, docstring, indent
 from robosc.targets.python.writer import Writer
 
@@ -48,6 +49,40 @@ def read_method(writer: Writer, event: str) -> list[str]:
         f"    {docstring(f'Convert the data of {event}.')}",
         *indent(reader.take_lines()),
         f"    return Reading(({values}), {{{entries}}}, {reader.all_words}, {reader.all_flags})",
+    ]
+
+
+def receive_method(writer: Writer, identifier: str, batch: tuple[str, ...]) -> list[str]:
+    """The method that takes all events of a message that came, if nothing of its data is unknown.
+
+    Args:
+        writer: The writer.
+        identifier: Where it comes.
+        batch: The events, in source order.
+    """
+    namer = reader_namer()
+    statements: list[str] = []
+    words: list[str] = []
+    steps: list[str] = []
+    for event in batch:
+        paths = converted_paths(writer.model, event)
+        values = ""
+        if paths:
+            reader = Reader(writer.layout, _event_type(writer, event), writer.used, namer=namer)
+            values = "".join(f"{reader.read(path).text}, " for path in paths).strip()
+            statements += reader.take_lines()
+            words += reader.words
+        steps += [
+            f"found = self.{writer.layout.methods['step', event]}(({values}))",
+            "if found:",
+            f"    skipped += (({event!r}, found),)",
+        ]
+    title = f"Convert what came on {identifier}, and take {', '.join(batch)}."
+    refusal = [f"if {' or '.join(words)}:", "    return None"] if words else []
+    return [
+        f"def {writer.layout.methods['receive', identifier]}(self, data):",
+        f"    {docstring(title)}",
+        *indent([*statements, *refusal, "skipped = ()", *steps, "return skipped"]),
     ]
 
 
@@ -130,8 +165,10 @@ class _StepWriter:
         """Move the plant of a service or action."""
         if self._protocol is None or self._protocol[2] is None:
             return []
-        location, _, target = self._protocol
-        return [f"{location} = {target!r}"]
+        location, sources, target = self._protocol
+        if target in sources:
+            return noted_write(location, repr(target), self.writer.stale)
+        return [f"{location} = {target!r}", *noted_change(location, self.writer.stale)]
 
     def _copy_what_is_overwritten(self, blocks: list[tuple[str, Behaviour, list[Branch]]]) -> None:
         """Find attributes that are read after a place that may write them; a superset is fine."""
@@ -207,17 +244,23 @@ class _StepWriter:
         for update in transition.updates:
             lines += self._update(component, variables[update.variable], update)
         if transition.target is not None and states != (transition.target,):
-            lines.append(f"{self.writer.scope.location(component)} = {transition.target!r}")
+            location = self.writer.scope.location(component)
+            if transition.target in states:
+                lines += noted_write(location, repr(transition.target), self.writer.stale)
+            else:
+                lines += [f"{location} = {transition.target!r}", *noted_change(location, self.writer.stale)]
         return lines
 
     def _update(self, component: str, variable: Variable, update: Update) -> list[str]:
         place, _ = self.writer.scope.variable(component, variable.name)
         code, may_skip = self._assigned(variable.type, value(update.expression, self.scope))
         words = comment(f"{component}: do {variable.name} := {expression_text(update.expression)}")
-        if not may_skip:
-            return [*words, f"{place} = {code}"]
-        self.may_skip = True
+        if not may_skip and code.isidentifier():
+            return [*words, *noted_write(place, code, self.writer.stale)]
         new = self.namer.name(f"new_{variable.name}")
+        if not may_skip:
+            return [*words, f"{new} = {code}", *noted_write(place, new, self.writer.stale)]
+        self.may_skip = True
         skipped = f"{component}.{variable.name}"
         return [
             *words,
@@ -225,7 +268,7 @@ class _StepWriter:
             f"if {new} is None:",
             f"    skipped += ({skipped!r},)",
             "else:",
-            f"    {place} = {new}",
+            *indent(noted_write(place, new, self.writer.stale)),
         ]
 
     def _assigned(self, type_: Type, code: Code) -> tuple[str, bool]:

@@ -1,0 +1,121 @@
+"""Generated code that follows what changes, so that nothing is asked twice whose answer cannot have changed.
+
+Every request and every silent step has a bit, requests first. A bit of `_stale` is set when a step writes another value
+to an attribute that decides whether that event is allowed. Only such events are asked again: a request by
+`enabled_requests`, which then remembers the answer; a silent step by `enabled_silent`, which clears the bit when
+it is not allowed.
+"""
+
+import re
+from collections.abc import Iterable, Sequence
+
+from robosc.targets.python.text import indent
+
+_ATTRIBUTE = re.compile(r"\bself\.(\w+)")
+
+
+def stale_bits(allows: Sequence[str], methods: Iterable[Sequence[str]]) -> dict[str, int]:
+    """For each attribute the bits of the events whose permission reads it, itself or through another method.
+
+    The text of the methods tells; what stands in their comments too can only make it a superset.
+
+    Args:
+        allows: The methods that tell whether an event is allowed; the first one's bit is the lowest.
+        methods: The lines of these, and of those that they call.
+    """
+    named = {_name(lines): set(_ATTRIBUTE.findall("\n".join(lines[1:]))) for lines in methods}
+    bits: dict[str, int] = {}
+    for place, allow in enumerate(allows):
+        for attribute in sorted(_read(allow, named)):
+            bits[attribute] = bits.get(attribute, 0) | 1 << place
+    return bits
+
+
+def _name(lines: Sequence[str]) -> str:
+    return lines[0].removeprefix("def ").partition("(")[0]
+
+
+def _read(method: str, named: dict[str, set[str]]) -> set[str]:
+    """What a method reads, and all that it calls."""
+    seen: set[str] = set()
+    to_do = [method]
+    while to_do:
+        name = to_do.pop()
+        if name not in seen:
+            seen.add(name)
+            to_do += named.get(name, ())
+    return seen - named.keys()
+
+
+def noted_change(place: str, bits: dict[str, int]) -> list[str]:
+    """Statements that follow from another value of an attribute, given as `self.attribute`."""
+    stale = bits.get(place.removeprefix("self."), 0)
+    return ["self.changes += 1", *([f"self._stale |= {stale:#x}"] if stale else [])]
+
+
+def noted_write(place: str, code: str, bits: dict[str, int]) -> list[str]:
+    """Statements that write an attribute; `code` is a name or a literal.
+
+    It is written also if nothing changes: of equal numbers, too, the new one counts, such as -0.0 after 0.0.
+    """
+    return [f"if {place} != {code}:", *indent(noted_change(place, bits)), f"{place} = {code}"]
+
+
+def restart_lines(requests: int, silent: int) -> list[str]:
+    """Statements that forget what was remembered, for so many requests and silent steps."""
+    return [
+        "self.changes += 1",
+        f"self._stale = {(1 << requests + silent) - 1:#x}",
+        f"self._allowed = [False] * {requests}",
+        "self._enabled = ()",
+    ]
+
+
+def enabled_requests_method(count: int) -> list[str]:
+    """The method that gives the enabled requests, `count` of which the model has."""
+    if not count:
+        return [
+            "def enabled_requests(self):",
+            '    """Numbers of the requests that are allowed now: there are none."""',
+            "    return ()",
+        ]
+    return f'''\
+def enabled_requests(self):
+    """Numbers of the requests that are allowed now; asks only those that may have changed."""
+    stale = self._stale & {(1 << count) - 1:#x}
+    if stale:
+        self._stale ^= stale
+        allowed = self._allowed
+        has_changed = False
+        while stale:
+            number = stale.bit_length() - 1
+            stale ^= 1 << number
+            now = self._allow_request[number]()
+            if now is not allowed[number]:
+                allowed[number] = now
+                has_changed = True
+        if has_changed:
+            self._enabled = numbers_of(allowed)
+    return self._enabled'''.splitlines()
+
+
+def enabled_silent_method(requests: int, count: int) -> list[str]:
+    """The method that gives the first enabled silent step, `count` of which the model has."""
+    if not count:
+        return [
+            "def enabled_silent(self):",
+            '    """The first silent step that is allowed now: there are none."""',
+            "    return None",
+        ]
+    return f'''\
+def enabled_silent(self):
+    """The first silent step that is allowed now, or None; asks only those that may have become so."""
+    stale = self._stale >> {requests}
+    while stale:
+        bit = stale & -stale
+        event, allow = self._allow_silent[bit.bit_length() - 1]
+        if allow():
+            return event
+        stale ^= bit
+        self._stale ^= bit << {requests}
+    return None'''.splitlines()

@@ -111,6 +111,7 @@ class Runner:
             [(info.name, info.identifier, info.max_age_s) for info in infos if info.kind == OUTGOING],
             self.settings.max_age_s,
         )
+        self._has_watched_sensors = bool(self._sensors)
         self._rest = Rest(robot, self._releases, self._goals)
         self._steps = Steps(system, robot, self._recorder, self._releases, self._goals, self.settings.on_unknown)
         self._replies = Replies(self._steps, robot, self._recorder, self._calls, self._goals)
@@ -188,7 +189,7 @@ class Runner:
                 self._recorder.unexpected({"what": "a message on {}".format(identifier)})
                 return
             if self._steps.happen_at_once(identifier, data):
-                if self._sensors:
+                if self._has_watched_sensors:
                     for name, _ in batch:
                         self._see(name)
             else:

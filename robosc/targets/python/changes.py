@@ -11,6 +11,9 @@ from collections.abc import Iterable, Sequence
 
 from robosc.targets.python.text import indent
 
+ASKED_TOGETHER = 8
+"""Up to so many requests it takes less time to ask all of them than to find out which may have changed."""
+
 _ATTRIBUTE = re.compile(r"\bself\.(\w+)")
 
 
@@ -61,24 +64,59 @@ def noted_write(place: str, code: str, bits: dict[str, int]) -> list[str]:
     return [f"if {place} != {code}:", *indent(noted_change(place, bits)), f"{place} = {code}"]
 
 
+def asked_lines(requests: Sequence[str], silent: Sequence[str], allows: Sequence[str]) -> list[str]:
+    """Statements of the constructor: what the two methods below ask, by bit.
+
+    Args:
+        requests: The methods that tell whether each request is allowed.
+        silent: The silent steps.
+        allows: The methods that tell whether each of those is allowed.
+    """
+    lines = []
+    if len(requests) > ASKED_TOGETHER:
+        lines += ["self._allow_request = (", *(f"    self.{allow}," for allow in requests), ")"]
+    if silent:
+        pairs = zip(silent, allows, strict=True)
+        lines += ["self._allow_silent = (", *(f"    ({event!r}, self.{allow})," for event, allow in pairs), ")"]
+    return lines
+
+
 def restart_lines(requests: int, silent: int) -> list[str]:
     """Statements that forget what was remembered, for so many requests and silent steps."""
+    allowed = "()" if requests <= ASKED_TOGETHER else f"[False] * {requests}"
     return [
         "self.changes += 1",
         f"self._stale = {(1 << requests + silent) - 1:#x}",
-        f"self._allowed = [False] * {requests}",
+        f"self._allowed = {allowed}",
         "self._enabled = ()",
     ]
 
 
-def enabled_requests_method(count: int) -> list[str]:
-    """The method that gives the enabled requests, `count` of which the model has."""
+def enabled_requests_method(allows: Sequence[str]) -> list[str]:
+    """The method that gives the enabled requests.
+
+    Args:
+        allows: The methods that tell whether each request is allowed.
+    """
+    count = len(allows)
     if not count:
         return [
             "def enabled_requests(self):",
             '    """Numbers of the requests that are allowed now: there are none."""',
             "    return ()",
         ]
+    if count <= ASKED_TOGETHER:
+        answers = "".join(f"self.{allow}(), " for allow in allows).strip()
+        return f'''\
+def enabled_requests(self):
+    """Numbers of the requests that are allowed now; asks only if one of them may have changed."""
+    if self._stale & {(1 << count) - 1:#x}:
+        allowed = ({answers})
+        self._stale &= ~{(1 << count) - 1:#x}
+        if allowed != self._allowed:
+            self._allowed = allowed
+            self._enabled = numbers_of(allowed)
+    return self._enabled'''.splitlines()
     return f'''\
 def enabled_requests(self):
     """Numbers of the requests that are allowed now; asks only those that may have changed."""

@@ -12,6 +12,7 @@ from robosc.targets.events import has_plant_location
 from robosc.targets.python.allow import allow_method, conjuncts_method, requirements_method
 from robosc.targets.python.bundle import bundle, section_title
 from robosc.targets.python.changes import (
+    asked_lines,
     enabled_requests_method,
     enabled_silent_method,
     restart_lines,
@@ -139,7 +140,7 @@ def _class(writer: Writer) -> list[str]:
         _constructor(writer, description),
         _restart(writer, len(requests), len(silent)),
         *_PROTOCOL_METHODS,
-        enabled_requests_method(len(requests)),
+        enabled_requests_method(requests),
         enabled_silent_method(len(requests), len(silent)),
         _location(writer),
         _state(writer),
@@ -196,15 +197,8 @@ def _constructor(writer: Writer, description: Description) -> list[str]:
             [f"    self._{purpose} = {{", *indent(entries, 2), "    }"] if entries else [f"    self._{purpose} = {{}}"]
         )
     requests, silent = _allow_names(writer, description)
-    events = (*description.resets, *description.taus)
-    pairs = [f"({event!r}, self.{allow})," for event, allow in zip(events, silent, strict=True)]
-    lines += _tuple_of("_allow_request", [f"self.{allow}," for allow in requests])
-    lines += _tuple_of("_allow_silent", pairs)
+    lines += indent(asked_lines(requests, (*description.resets, *description.taus), silent))
     return [*lines, "    self.changes = 0", "    self.restart()"]
-
-
-def _tuple_of(attribute: str, entries: list[str]) -> list[str]:
-    return [f"    self.{attribute} = (", *indent(entries, 2), "    )"] if entries else []
 
 
 def _restart(writer: Writer, requests: int, silent: int) -> list[str]:

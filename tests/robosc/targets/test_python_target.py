@@ -37,6 +37,7 @@ from robosc.supervisor import decode, encode, make_supervisor
 from robosc.supervisor.structure import Supervisor
 from robosc.targets import GenerateOptions, generate, write_files
 from robosc.targets.events import events, is_controllable
+from robosc.targets.python import changes
 from support.generated import example_supervisor, imported, load_system, python_text, same
 from support.layers import BothSides
 from support.models import EXAMPLE_DEPLOYMENTS, EXAMPLE_NAMES, model_of
@@ -165,6 +166,16 @@ def test_the_supervisor_of_a_random_text_behaves_as_interpreted(seed: int) -> No
     if made is not None:
         assert decode(encode(made)) == made
         Twins(made).run(Random(seed), 10)
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.integers(0, 2**32))
+def test_a_random_supervisor_that_asks_one_by_one_behaves_as_interpreted(seed: int) -> None:
+    """As a model with many requests does."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(changes, "ASKED_TOGETHER", 0)
+        twins = Twins(random_supervisor(seed))
+    twins.run(Random(seed), STEPS)
 
 
 def test_the_random_supervisors_show_everything() -> None:

@@ -9,7 +9,7 @@ it is not allowed.
 import re
 from collections.abc import Iterable, Sequence
 
-from robosc.targets.python.text import indent
+from robosc.targets.python.text import comment, indent
 
 ASKED_TOGETHER = 8
 """Up to so many requests it takes less time to ask all of them than to find out which may have changed."""
@@ -72,7 +72,10 @@ def asked_lines(requests: Sequence[str], silent: Sequence[str], allows: Sequence
         silent: The silent steps.
         allows: The methods that tell whether each of those is allowed.
     """
-    lines = []
+    bits = [*requests, *allows]
+    lines = (
+        comment(f"Bits of _stale, from the lowest: who may now answer otherwise: {', '.join(bits)}.") if bits else []
+    )
     if len(requests) > ASKED_TOGETHER:
         lines += ["self._allow_request = (", *(f"    self.{allow}," for allow in requests), ")"]
     if silent:

@@ -114,7 +114,8 @@ def _supervisor_title(writer: Writer) -> list[str]:
         f"The supervisor of the robot {model.name}",
         "",
         "Attributes: `<Component>__state`, `<Component>__<variable>`, `<service or action>__location`.",
-        "Methods: `allow_<event>` (is it allowed now?), `read_<event>` (convert its data), `step_<event>` (take it).",
+        "Methods: `allow_<event>` (is it allowed now?), `read_<event>` (convert its data), `step_<event>` (take it),",
+        "`receive_<identifier>` (convert a whole message and take its events).",
         "",
         f"Checked: safe {certificate.safe}, controllable {certificate.controllable}, nonblocking"
         f" {certificate.nonblocking}, maximally permissive {certificate.maximally_permissive}.",

@@ -61,7 +61,8 @@ def noted_write(place: str, code: str, bits: dict[str, int]) -> list[str]:
 
     It is written also if nothing changes: of equal numbers, too, the new one counts, such as -0.0 after 0.0.
     """
-    return [f"if {place} != {code}:", *indent(noted_change(place, bits)), f"{place} = {code}"]
+    differs = {"True": f"not {place}", "False": place}.get(code, f"{place} != {code}")
+    return [f"if {differs}:", *indent(noted_change(place, bits)), f"{place} = {code}"]
 
 
 def asked_lines(requests: Sequence[str], silent: Sequence[str], allows: Sequence[str]) -> list[str]:

@@ -5,7 +5,6 @@ A copy of this module stands in generated packages, which run on Python 3.8 and 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import compress
 from typing import Any
 
@@ -117,7 +116,7 @@ def known(value: Any) -> Any:
     return None if value != value else value
 
 
-def numbers_of(flags: Sequence[bool]) -> tuple[int, ...]:
+def numbers_of(flags: Any) -> Any:
     """The places of the flags that are set, from 0."""
     return tuple(compress(range(len(flags)), flags))
 

@@ -269,7 +269,7 @@ def step(self, event, reading=None):
         return self._step[event]()
     if reading is None:
         reading = self.read(event, None)
-    return self._step[event](reading.values)''',
+    return self._step[event](*reading.values)''',
         '''\
 def receive(self, identifier, data):
     """Take all events of what came: where updates were skipped; None if anything is unknown."""

@@ -56,7 +56,7 @@ def receive_method(writer: Writer, identifier: str, batch: tuple[str, ...]) -> l
     """The method that takes all events of a message that came, if nothing of its data is unknown.
 
     Args:
-        writer: The writer.
+        writer: The writer, after the step methods of these events.
         identifier: Where it comes.
         batch: The events, in source order.
     """
@@ -69,20 +69,24 @@ def receive_method(writer: Writer, identifier: str, batch: tuple[str, ...]) -> l
         values = ""
         if paths:
             reader = Reader(writer.layout, _event_type(writer, event), writer.used, namer=namer)
-            values = "".join(f"{reader.read(path).text}, " for path in paths).strip()
+            values = ", ".join(reader.read(path).text for path in paths)
             statements += reader.take_lines()
             words += reader.words
-        steps += [
-            f"found = self.{writer.layout.methods['step', event]}(({values}))",
-            "if found:",
-            f"    skipped += (({event!r}, found),)",
-        ]
+        step = f"self.{writer.layout.methods['step', event]}({values})"
+        if event in writer.skipping:
+            steps += [f"found = {step}", "if found:", f"    skipped += (({event!r}, found),)"]
+        else:
+            steps.append(step)
+    if writer.skipping.isdisjoint(batch):
+        steps.append("return ()")
+    else:
+        steps = ["skipped = ()", *steps, "return skipped"]
     title = f"Convert what came on {identifier}, and take {', '.join(batch)}."
     refusal = [f"if {' or '.join(words)}:", "    return None"] if words else []
     return [
         f"def {writer.layout.methods['receive', identifier]}(self, data):",
         f"    {docstring(title)}",
-        *indent([*statements, *refusal, "skipped = ()", *steps, "return skipped"]),
+        *indent([*statements, *refusal, *steps]),
     ]
 
 
@@ -100,7 +104,11 @@ def _event_type(writer: Writer, event: str) -> Type:
 
 def step_method(writer: Writer, event: str) -> list[str]:
     """The method that takes an event; it returns the skipped updates, or None if it cannot happen now."""
-    return _StepWriter(writer, event).method()
+    step = _StepWriter(writer, event)
+    lines = step.method()
+    if step.may_skip:
+        writer.skipping.add(event)
+    return lines
 
 
 class _StepWriter:
@@ -109,7 +117,7 @@ class _StepWriter:
     def __init__(self, writer: Writer, event: str) -> None:
         self.writer = writer
         self.event = event
-        self.namer = Namer(("self", "values", "skipped", "reading"))
+        self.namer = Namer(("self", "skipped"))
         self.paths = converted_paths(writer.model, event)
         self.received: dict[Path, Code] = {}
         self.copies: dict[str, str] = {}
@@ -127,10 +135,10 @@ class _StepWriter:
         body = [
             line for component, behaviour, branches in blocks for line in self._block(component, behaviour, branches)
         ]
-        parameter = "" if is_controllable(self.event) else ", values"
-        lines = [f"def {self.writer.layout.methods['step', self.event]}(self{parameter}):"]
+        parameters = "".join(f", {code.text}" for code in self.received.values())
+        lines = [f"def {self.writer.layout.methods['step', self.event]}(self{parameters}):"]
         lines.append(f"    {docstring(f'Take {self.event}.')}")
-        lines += indent([*self._refusals(), *self._plant(), *self._unpacked(), *self._copied()])
+        lines += indent([*self._refusals(), *self._plant(), *self._copied()])
         if self.may_skip:
             lines.append("    skipped = ()")
         return [*lines, *indent(body), f"    return {'skipped' if self.may_skip else '()'}"]
@@ -143,10 +151,6 @@ class _StepWriter:
             name = self.namer.name("_".join(["value", *map(str, path)]))
             type_ = path_type(self.writer.model, root, path)
             self.received[path] = code_for(name, type_, received_unknown(type_, path))
-
-    def _unpacked(self) -> list[str]:
-        names = [code.text for code in self.received.values()]
-        return [f"{', '.join(names)}{',' if len(names) == 1 else ''} = values"] if names else []
 
     def _refusals(self) -> list[str]:
         """Return None where the event is not accepted, before anything changes."""

@@ -32,6 +32,7 @@ class Writer:
         scope: How expressions over the state are written.
         diagrams: Writes the supervisor's added conditions.
         stale: For each attribute the bits of the events whose permission reads it, once that is known.
+        skipping: Events whose step may skip an update, so far.
     """
 
     layout: Layout
@@ -40,6 +41,7 @@ class Writer:
     scope: Scope = field(init=False)
     diagrams: Diagrams = field(init=False)
     stale: dict[str, int] = field(default_factory=dict)
+    skipping: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self.scope = Scope(self._variable, self._location, _no_received, self.used.add, _no_type, _no_type)

@@ -1,7 +1,8 @@
 """Events of the environment, and the silent steps that follow them (semantics 3.1 and 3.3).
 
 A state is *stable* when no silent step is enabled in it. What must be judged there, releases and the
-requirements of running goals, is judged once for each stable state that is new.
+requirements of running goals, is judged once for each stable state that is new. One that was left and reached again
+within a batch counts as new: judging a state a second time finds what the first time found.
 """
 
 from __future__ import annotations

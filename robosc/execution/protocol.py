@@ -12,7 +12,10 @@ Python 3.8 and later: generated packages carry copies of them.
 
 from __future__ import annotations
 
-from typing import Any, Dict, NamedTuple, Optional, Protocol, Tuple
+from typing import Any, Dict, NamedTuple, Optional, Protocol, Sequence, Tuple
+
+OUTGOING = "outgoing message"
+"""The only kind of communication that has no request."""
 
 
 class CommunicationInfo(NamedTuple):
@@ -65,6 +68,20 @@ class Description(NamedTuple):
     silent_bound: int
 
 
+def requesting(infos: Sequence[CommunicationInfo]) -> Tuple[CommunicationInfo, ...]:
+    """The communications that are requested, in source order: a request's number is its place among them."""
+    return tuple(info for info in infos if info.kind != OUTGOING)
+
+
+def batches(infos: Sequence[CommunicationInfo]) -> Dict[str, Tuple[Tuple[str, str], ...]]:
+    """For each identifier that is received, the messages of the model that it stands for, with their events."""
+    found: Dict[str, Tuple[Tuple[str, str], ...]] = {}
+    for info in infos:
+        if info.kind == OUTGOING:
+            found[info.identifier] = (*found.get(info.identifier, ()), (info.name, info.name + ".response"))
+    return found
+
+
 class Reading(NamedTuple):
     """Received data after conversion (enum rules, ranges), before anything changes.
 
@@ -101,9 +118,15 @@ MATCHES = Match(True, (), False)
 
 
 class ControlledSystem(Protocol):
-    """Plants, requirements and supervisor of one robot, with their current state."""
+    """Plants, requirements and supervisor of one robot, with their current state.
+
+    Attributes:
+        description: Its static part.
+        changes: Grows whenever the state may have become another: while it stays the same, so does the state.
+    """
 
     description: Description
+    changes: int
 
     def restart(self) -> None:
         """Back to the initial state."""
@@ -112,6 +135,22 @@ class ControlledSystem(Protocol):
         """Whether a controllable event is allowed now: by plants, ranges, requirements and supervisor.
 
         A tau that would change nothing in the current state is not enabled.
+        """
+
+    def enabled_requests(self) -> Tuple[int, ...]:
+        """Which requests are allowed now: their numbers, from 0, among all requests in source order."""
+
+    def enabled_silent(self) -> Optional[str]:
+        """The first of the description's resets, then its taus, that is allowed now; None if none is."""
+
+    def receive(self, identifier: str, data: Any) -> Optional[Tuple[Tuple[str, Tuple[str, ...]], ...]]:
+        """Convert what came on an identifier, and take the events of all its outgoing messages, in source order.
+
+        For the common case, in which no `Reading` need be looked at. The state accepts these events whatever it is.
+
+        Returns:
+            The events at which updates were skipped, with these (mostly empty), or None if something of the data
+            is unknown; then nothing has changed, and each event is to be read and taken by itself.
         """
 
     def read(self, event: str, data: Any) -> Reading:
@@ -147,7 +186,7 @@ class ControlledSystem(Protocol):
         """{component: {"state": s, "variables": {v: value}}} for every component with a behaviour."""
 
     def signature(self) -> Any:
-        """A hashable value that tells states apart, as cheaply as possible."""
+        """A hashable value that tells states apart."""
 
 
 class RobotSide(Protocol):

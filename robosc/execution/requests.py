@@ -6,7 +6,7 @@ from typing import Dict, NamedTuple, Optional, Sequence, Tuple
 
 from robosc.execution.calls import Calls, Goals
 from robosc.execution.decision import Policy
-from robosc.execution.protocol import CommunicationInfo, ControlledSystem, DataDoesNotFit, Middleware
+from robosc.execution.protocol import CommunicationInfo, ControlledSystem, DataDoesNotFit, Middleware, requesting
 from robosc.execution.recorder import Recorder
 from robosc.execution.release import Releases
 from robosc.execution.steps import Steps
@@ -47,8 +47,7 @@ def requests_of(infos: Sequence[CommunicationInfo], released: Sequence[str]) -> 
             kind=info.kind,
             keeps_acting=info.kind == _MESSAGE and info.identifier in released,
         )
-        for info in infos
-        if info.kind != "outgoing message"
+        for info in requesting(infos)
     )
 
 
@@ -131,14 +130,10 @@ class Decisions:
 
     def _find_enabled(self) -> Tuple[int, ...]:
         """Numbers of the requests that may be issued; not of an action whose old goal may still be under way."""
-        enabled, goals = self._system.enabled, self._goals
-        return tuple(
-            [
-                number
-                for number, request in enumerate(self._requests)
-                if enabled(request.event) and not (goals and goals.is_open(request.name))
-            ]
-        )
+        enabled, goals = self._system.enabled_requests(), self._goals
+        if not goals:
+            return enabled
+        return tuple([number for number in enabled if not goals.is_open(self._requests[number].name)])
 
     def _split(self, enabled: Tuple[int, ...]) -> Tuple[Tuple[int, ...], Tuple[int, ...]]:
         """The requests whose message would end a release that waits, and the others."""

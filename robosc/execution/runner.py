@@ -12,12 +12,12 @@ from __future__ import annotations
 
 from enum import Enum
 from functools import wraps
-from typing import Any, Callable, Dict, Optional, Tuple, TypeVar, cast
+from typing import Any, Callable, Optional, Tuple, TypeVar, cast
 
 from robosc.execution.calls import Calls, Goals
 from robosc.execution.clock import Clock, SystemClock
 from robosc.execution.event_log import EventLog, NullLog
-from robosc.execution.protocol import CommunicationInfo, ControlledSystem, Description, RobotSide
+from robosc.execution.protocol import OUTGOING, ControlledSystem, Description, RobotSide, batches
 from robosc.execution.recorder import Counters, Recorder
 from robosc.execution.release import Releases
 from robosc.execution.replies import Replies
@@ -108,13 +108,14 @@ class Runner:
         actions = [info.name for info in infos if info.kind == "action"]
         self._goals = Goals(system, actions, self.settings.action_timeout_s)
         self._sensors = Sensors(
-            [(info.name, info.identifier, info.max_age_s) for info in infos if info.kind == "outgoing message"],
+            [(info.name, info.identifier, info.max_age_s) for info in infos if info.kind == OUTGOING],
             self.settings.max_age_s,
         )
+        self._has_watched_sensors = bool(self._sensors)
         self._rest = Rest(robot, self._releases, self._goals)
         self._steps = Steps(system, robot, self._recorder, self._releases, self._goals, self.settings.on_unknown)
         self._replies = Replies(self._steps, robot, self._recorder, self._calls, self._goals)
-        self._batches = _batches(infos)
+        self._batches = batches(infos)
         self._is_started = False
         self._may_request = False
         self._now_s = 0.0
@@ -180,14 +181,21 @@ class Runner:
         if not self._is_started:
             return
         try:
-            self._look_at_clock()
+            now = self._now_s = self._recorder.began_s = self._clock.monotonic()
+            if now >= self._deadline_s:
+                self._check_time(now)
             batch = self._batches.get(identifier)
             if batch is None:
                 self._recorder.unexpected({"what": "a message on {}".format(identifier)})
                 return
-            for name, event in batch:
-                if self._steps.happen_with_data(event, data, may_keep=True):
-                    self._see(name)
+            if self._steps.happen_at_once(identifier, data):
+                if self._has_watched_sensors:
+                    for name, _ in batch:
+                        self._see(name)
+            else:
+                for name, event in batch:
+                    if self._steps.happen_with_data(event, data, may_keep=True):
+                        self._see(name)
             self._end_batch()
         except Exception as error:
             self._fail(describe_error(error))
@@ -363,15 +371,6 @@ def _require_deployment(description: Description, deployment: str) -> None:
             "this supervisor was made for the deployment '{}', and its model has actions; "
             "make one for the deployment '{}'".format(description.deployment, deployment)
         )
-
-
-def _batches(infos: Tuple[CommunicationInfo, ...]) -> Dict[str, Tuple[Tuple[str, str], ...]]:
-    """For each identifier that is received, the messages of the model that it stands for, with their events."""
-    batches: Dict[str, Tuple[Tuple[str, str], ...]] = {}
-    for info in infos:
-        if info.kind == "outgoing message":
-            batches[info.identifier] = (*batches.get(info.identifier, ()), (info.name, info.name + ".response"))
-    return batches
 
 
 def _stale_key(name: str) -> str:

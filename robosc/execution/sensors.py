@@ -44,6 +44,9 @@ class Sensors:
             name: _Sensor(name, identifier, age) for name, identifier, age in ages if age is not None
         }
 
+    def __bool__(self) -> bool:
+        return bool(self._sensors)
+
     def start(self, now_s: float) -> None:
         """Nothing was seen so far."""
         for sensor in self._sensors.values():

@@ -7,7 +7,7 @@ factorization algorithm", BIT 20, 1980, pp. 176-184, section 7).
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Callable
 
 PATIENCE = 8
 """Steps that are not watched: almost every run is shorter."""
@@ -33,8 +33,12 @@ class RunWatch:
         self._distance = 0
         self._remembered: Any = None
 
-    def check(self, signature: Any, event: str) -> None:
+    def check(self, signature: Callable[[], Any], event: str) -> None:
         """Look at the state after one more step, taken by `event`.
+
+        Args:
+            signature: Gives a value that tells the state from others; a short run needs none.
+            event: The step's event.
 
         Raises:
             EndlessRun: The state is one that the run was in before, or the bound is passed.
@@ -44,10 +48,11 @@ class RunWatch:
             raise EndlessRun("silent steps do not end: more than {} in a row, the last {}".format(self._bound, event))
         if self._steps <= PATIENCE:
             return
-        if signature == self._remembered:
+        now = signature()
+        if now == self._remembered:
             raise EndlessRun("silent steps do not end: a state came twice, the last step was {}".format(event))
         self._distance += 1
         if self._distance == self._power:
-            self._remembered = signature
+            self._remembered = now
             self._power *= 2
             self._distance = 0

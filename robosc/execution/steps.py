@@ -1,7 +1,8 @@
 """Events of the environment, and the silent steps that follow them (semantics 3.1 and 3.3).
 
 A state is *stable* when no silent step is enabled in it. What must be judged there, releases and the
-requirements of running goals, is judged once for each stable state that is new.
+requirements of running goals, is judged once for each stable state that is new. One that was left and reached again
+within a batch counts as new: judging a state a second time finds what the first time found.
 """
 
 from __future__ import annotations
@@ -44,7 +45,6 @@ class Steps:
         "_pending",
         "_recorder",
         "_releases",
-        "_silent_events",
         "_stable",
         "_system",
         "enabled",
@@ -66,11 +66,10 @@ class Steps:
         self._releases = releases
         self._goals = goals
         self._on_unknown = on_unknown
-        self._silent_events = system.description.resets + system.description.taus
         self.enabled: Optional[Tuple[int, ...]] = None
         self.unchanging: Dict[str, Tuple[Any, bool]] = {}
-        # Signature of the last stable state, or None if the state may not be stable.
-        self._stable: Any = None
+        # What the system's `changes` were in the last stable state, or None if the state may not be stable.
+        self._stable: Optional[int] = None
         # A fault that waits for the end of its batch, because on_unknown is `fault`.
         self._pending: Optional[str] = None
 
@@ -103,6 +102,19 @@ class Steps:
                     return False
                 self._judge_unknown(event, unknown)
         self.happen(event, reading, reading.data)
+        return True
+
+    def happen_at_once(self, identifier: str, data: Any) -> bool:
+        """Take all events of a message that came, if nothing is unknown and no log wants to know about each of them.
+
+        Returns:
+            Whether they were taken; if not, nothing has happened.
+        """
+        skipped = None if self._recorder.is_active else self._system.receive(identifier, data)
+        if skipped is None:
+            return False
+        for event, variables in skipped:
+            self._skip(event, variables)
         return True
 
     def happen(self, event: str, reading: Optional[Reading], data: Any) -> None:
@@ -143,14 +155,13 @@ class Steps:
             issuing: Communication whose request was just taken and whose message is about to go out, if any.
 
         Returns:
-            Whether the stable state is another one.
+            Whether the stable state may be another one.
 
         Raises:
             EndlessRun: They do not end.
             ExecutionError: Something was unknown, and that is a fault.
         """
-        signature = self._system.signature()
-        has_changed: bool = signature != self._stable
+        has_changed = self._system.changes != self._stable
         if has_changed:
             # Should anything raise on the way, the state does not count as stable.
             self._stable = None
@@ -158,8 +169,8 @@ class Steps:
             self.unchanging.clear()
             event = self._silent_step()
             if event is not None:
-                signature = self._run_on(event)
-            self._stable = signature
+                self._run_on(event)
+            self._stable = self._system.changes
             if self._goals:
                 self._goals.observe_stable_state()
             for identifier in self._releases.judge(issuing):
@@ -175,15 +186,12 @@ class Steps:
         self._releases.released(identifier)
         self._recorder.release(identifier)
 
-    def _run_on(self, event: Optional[str]) -> Any:
-        """Silent steps after the first one, `event`: the signature of the state where none is enabled."""
+    def _run_on(self, event: Optional[str]) -> None:
+        """Silent steps after the first one, `event`, until none is enabled."""
         watch = RunWatch(self._system.description.silent_bound)
-        signature = self._system.signature()
         while event is not None:
-            watch.check(signature, event)
+            watch.check(self._system.signature, event)
             event = self._silent_step()
-            signature = self._system.signature()
-        return signature
 
     def _silent_step(self) -> Optional[str]:
         """Take one silent step, cancels first, then resets, then taus: its event, or None if there is none."""
@@ -195,12 +203,10 @@ class Steps:
                 goal.is_running = False
                 request_cancel(self._middleware, goal)
                 return event
-        enabled = self._system.enabled
-        for event in self._silent_events:
-            if enabled(event):
-                self.take(event, None)
-                return event
-        return None
+        silent = self._system.enabled_silent()
+        if silent is not None:
+            self.take(silent, None)
+        return silent
 
     def _skip(self, event: str, skipped: Tuple[str, ...]) -> None:
         """Updates were skipped."""

@@ -15,7 +15,7 @@ from robosc.supervisor.structure import Supervisor
 from robosc.targets import generate
 from support.c99 import GCC
 from support.equivalence.c99_target import C99Target
-from support.equivalence.python_targets import PythonTarget, generated_python, observe
+from support.equivalence.python_targets import PythonTarget, generated_python, observe, reference
 from support.equivalence.random_scenarios import random_scenario
 from support.equivalence.recorded import FOLDER, read_recorded, recorded_text
 from support.equivalence.scenario import Action, Scenario
@@ -30,8 +30,8 @@ ROBOTS = sorted(WORLDS)
 needs_gcc = pytest.mark.skipif(GCC is None, reason="gcc is not installed")
 
 
-def python_target(supervisor: Supervisor) -> PythonTarget:
-    return generated_python(supervisor, loaded_file(generate(supervisor, "python")))
+def python_target(supervisor: Supervisor, *, has_log: bool = True) -> PythonTarget:
+    return generated_python(supervisor, loaded_file(generate(supervisor, "python")), has_log=has_log)
 
 
 def _some_supervisor(seed: int) -> Supervisor:
@@ -91,6 +91,23 @@ def test_random_robots_in_python(seed: int) -> None:
     supervisor = _some_supervisor(seed)
     scenario = random_scenario(supervisor, seed, 60)
     compare(python_target(supervisor), scenario, observe(supervisor, scenario))
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.integers(0, 2**32 - 1))
+def test_without_a_log_whole_messages_are_taken_with_the_same_effect(seed: int) -> None:
+    supervisor = _some_supervisor(seed)
+    scenario = random_scenario(supervisor, seed, 60)
+    expected = observe(supervisor, scenario)
+    compare(reference(supervisor, has_log=False), scenario, expected)
+    compare(python_target(supervisor, has_log=False), scenario, expected)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_a_recorded_run_without_a_log(robot: str) -> None:
+    supervisor = example_supervisor(f"{robot}/{robot}")
+    scenario = read_recorded(robot)
+    compare(python_target(supervisor, has_log=False), scenario, observe(supervisor, scenario))
 
 
 @needs_gcc

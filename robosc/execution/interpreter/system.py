@@ -16,7 +16,7 @@ from robosc.execution.interpreter.rules import (
     initial_state,
     provided_function,
 )
-from robosc.execution.protocol import MATCHES, Match, Reading
+from robosc.execution.protocol import MATCHES, Match, Reading, batches, requesting
 from robosc.expressions import Value, conjuncts
 from robosc.model.structure import is_tau
 from robosc.supervisor.structure import Supervisor
@@ -45,6 +45,7 @@ class InterpretedSystem:
 
     Attributes:
         description: Its static part.
+        changes: How often the state became another.
     """
 
     def __init__(self, supervisor: Supervisor) -> None:
@@ -78,9 +79,13 @@ class InterpretedSystem:
         self._when = {item.name: WhenRule.of(item) for item in model.communications if item.when is not None}
         self._initial = initial_state(model)
         self._state = self._initial
+        self.changes = 0
+        self._request_events = tuple(info.name + ".request" for info in requesting(self.description.communications))
+        self._batches = batches(self.description.communications)
 
     def restart(self) -> None:
         """Back to the initial state."""
+        self.changes += 1
         self._state = self._initial
 
     def enabled(self, event: str) -> bool:
@@ -96,6 +101,23 @@ class InterpretedSystem:
             return False
         return not is_tau(event) or successor.state != state
 
+    def enabled_requests(self) -> tuple[int, ...]:
+        """Numbers of the requests that are allowed now, among all of them in source order."""
+        return tuple(number for number, event in enumerate(self._request_events) if self.enabled(event))
+
+    def enabled_silent(self) -> str | None:
+        """The first reset, then the first tau, that is allowed now; None if none is."""
+        silent = (*self.description.resets, *self.description.taus)
+        return next((event for event in silent if self.enabled(event)), None)
+
+    def receive(self, identifier: str, data: Any) -> tuple[tuple[str, tuple[str, ...]], ...] | None:
+        """Take all events of what came on an identifier: where updates were skipped; None if anything is unknown."""
+        readings = [(event, self.read(event, data)) for _, event in self._batches[identifier]]
+        if any(reading.unknown for _, reading in readings):
+            return None
+        taken = [(event, self.step(event, reading)) for event, reading in readings]
+        return tuple((event, skipped) for event, skipped in taken if skipped)
+
     def read(self, event: str, data: Any) -> Reading:
         """Convert what came with an uncontrollable event."""
         rule = self._events[event]
@@ -109,6 +131,8 @@ class InterpretedSystem:
         successor = self._successor(rule, no_data if reading is None else reading.values.get)
         if successor is None or (rule.is_controllable and successor.leaves_range):
             return None
+        if successor.state != self._state:
+            self.changes += 1
         self._state = successor.state
         return successor.skipped
 

@@ -4,16 +4,23 @@ from robosc._version import __version__
 from robosc.automata.plants import communication_plant_name
 from robosc.errors import InternalError, UnsupportedModelError
 from robosc.execution.interpreter import describe
-from robosc.execution.protocol import Description
+from robosc.execution.protocol import Description, batches, requesting
 from robosc.expressions import DoubleType
 from robosc.model.structure import Deployment
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.events import has_plant_location
 from robosc.targets.python.allow import allow_method, conjuncts_method, requirements_method
 from robosc.targets.python.bundle import bundle, section_title
+from robosc.targets.python.changes import (
+    asked_lines,
+    enabled_requests_method,
+    enabled_silent_method,
+    restart_lines,
+    stale_bits,
+)
 from robosc.targets.python.provide import provide_method
 from robosc.targets.python.received import converter
-from robosc.targets.python.step import read_method, step_method
+from robosc.targets.python.step import read_method, receive_method, step_method
 from robosc.targets.python.text import indent, printable
 from robosc.targets.python.when import matches_method
 from robosc.targets.python.writer import Writer, make_writer
@@ -88,6 +95,7 @@ def model_part(supervisor: Supervisor) -> str:
 
 
 def _model_part(writer: Writer) -> str:
+    writer.used.add("numbers_of")
     functions = [converter(writer.layout, enum, writer.used) for enum in writer.model.enums]
     members = _class(writer)
     missing = writer.used - bundle(RUNTIME[writer.layout.supervisor.deployment]).names
@@ -106,7 +114,8 @@ def _supervisor_title(writer: Writer) -> list[str]:
         f"The supervisor of the robot {model.name}",
         "",
         "Attributes: `<Component>__state`, `<Component>__<variable>`, `<service or action>__location`.",
-        "Methods: `allow_<event>` (is it allowed now?), `read_<event>` (convert its data), `step_<event>` (take it).",
+        "Methods: `allow_<event>` (is it allowed now?), `read_<event>` (convert its data), `step_<event>` (take it),",
+        "`receive_<identifier>` (convert a whole message and take its events).",
         "",
         f"Checked: safe {certificate.safe}, controllable {certificate.controllable}, nonblocking"
         f" {certificate.nonblocking}, maximally permissive {certificate.maximally_permissive}.",
@@ -124,17 +133,25 @@ def _supervisor_title(writer: Writer) -> list[str]:
 def _class(writer: Writer) -> list[str]:
     model = writer.model
     requested = [item.name for item in model.communications if ("provide", item.name) in writer.layout.methods]
+    allows = [allow_method(writer, event) for event in writer.layout.controllable]
+    description = describe(writer.layout.supervisor)
+    requests, silent = _allow_names(writer, description)
+    writer.stale = stale_bits([*requests, *silent], [*allows, *(lines for _, lines in writer.diagrams.methods)])
     methods = [
-        _constructor(writer),
-        _restart(writer),
+        _constructor(writer, description),
+        _restart(writer, len(requests), len(silent)),
         *_PROTOCOL_METHODS,
+        enabled_requests_method(requests),
+        enabled_silent_method(len(requests), len(silent)),
         _location(writer),
         _state(writer),
         _signature(writer),
     ]
-    methods += [allow_method(writer, event) for event in writer.layout.controllable]
+    methods += allows
     methods += [read_method(writer, event) for event in writer.layout.uncontrollable]
     methods += [step_method(writer, event) for event in (*writer.layout.controllable, *writer.layout.uncontrollable)]
+    for identifier, batch in batches(description.communications).items():
+        methods.append(receive_method(writer, identifier, tuple(event for _, event in batch)))
     for make in (provide_method, requirements_method, conjuncts_method):
         methods += [make(writer, name) for name in requested]
     methods += [matches_method(writer, item) for item in model.communications if item.when is not None]
@@ -143,7 +160,7 @@ def _class(writer: Writer) -> list[str]:
         "class Supervisor:",
         f'    """Plants, requirements and supervisor of {model.name}, with their current state."""',
         "",
-        *indent(_description(describe(writer.layout.supervisor))),
+        *indent(_description(description)),
     ]
     for method in methods:
         lines += ["", *indent(method)]
@@ -160,22 +177,33 @@ def _description(description: Description) -> list[str]:
     return [*lines, ")"]
 
 
-def _constructor(writer: Writer) -> list[str]:
+def _allow_names(writer: Writer, description: Description) -> tuple[list[str], list[str]]:
+    """The methods that tell whether each request, and each silent step, is allowed."""
+    methods = writer.layout.methods
+    return (
+        [methods["allow", f"{info.name}.request"] for info in requesting(description.communications)],
+        [methods["allow", event] for event in (*description.resets, *description.taus)],
+    )
+
+
+def _constructor(writer: Writer, description: Description) -> list[str]:
     methods = writer.layout.methods
     tables: dict[str, list[str]] = {}
     for (purpose, subject), method in methods.items():
         tables.setdefault(purpose, []).append(f"{subject!r}: self.{method},")
     lines = ["def __init__(self):"]
-    for purpose in ("allow", "read", "step", "provide", "requirements", "conjuncts", "matches"):
+    for purpose in ("allow", "read", "step", "provide", "requirements", "conjuncts", "matches", "receive"):
         entries = tables.get(purpose, [])
         lines += (
             [f"    self._{purpose} = {{", *indent(entries, 2), "    }"] if entries else [f"    self._{purpose} = {{}}"]
         )
-    return [*lines, "    self.restart()"]
+    requests, silent = _allow_names(writer, description)
+    lines += indent(asked_lines(requests, (*description.resets, *description.taus), silent))
+    return [*lines, "    self.changes = 0", "    self.restart()"]
 
 
-def _restart(writer: Writer) -> list[str]:
-    lines = ["def restart(self):", '    """Back to the initial state."""']
+def _restart(writer: Writer, requests: int, silent: int) -> list[str]:
+    lines = ["def restart(self):", '    """Back to the initial state."""', *indent(restart_lines(requests, silent))]
     for component, behaviour in writer.layout.behaviours:
         lines.append(f"    self.{writer.layout.locations[component]} = {behaviour.initial!r}")
         for variable in behaviour.variables:
@@ -241,7 +269,11 @@ def step(self, event, reading=None):
         return self._step[event]()
     if reading is None:
         reading = self.read(event, None)
-    return self._step[event](reading.values)''',
+    return self._step[event](*reading.values)''',
+        '''\
+def receive(self, identifier, data):
+    """Take all events of what came: where updates were skipped; None if anything is unknown."""
+    return self._receive[identifier](data)''',
         '''\
 def provide(self, communication):
     """Data for a request in the current state: (is known, data)."""

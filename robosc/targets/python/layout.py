@@ -7,6 +7,7 @@ from robosc.expressions import Type
 from robosc.model.structure import (
     EVENT_KINDS,
     Behaviour,
+    CommunicationKind,
     EventKind,
     Model,
 )
@@ -15,20 +16,24 @@ from robosc.targets.events import events, has_plant_location, is_controllable
 from robosc.targets.python.naming import Namer
 
 PROTOCOL_NAMES = (
+    "changes",
     "conjuncts",
     "description",
     "enabled",
+    "enabled_requests",
+    "enabled_silent",
     "location",
     "matches",
     "provide",
     "read",
+    "receive",
     "requirements",
     "restart",
     "signature",
     "state",
     "step",
 )
-"""The methods of `ControlledSystem`."""
+"""The members of `ControlledSystem`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +45,7 @@ class Layout:
         locations: Attribute of each automaton's location: components by name, `service s`, `action a`.
         variables: Attribute and type of each variable, by component and variable.
         methods: Method by (purpose, event or communication); purposes are `allow`, `read`, `step`,
-            `provide`, `requirements`, `conjuncts`, `matches`.
+            `provide`, `requirements`, `conjuncts`, `matches`; and `receive` with an identifier.
         converters: Function that makes each enum out of received data.
     """
 
@@ -101,6 +106,9 @@ def _method_names(model: Model, members: Namer) -> dict[tuple[str, str], str]:
                 methods[purpose, item.name] = members.name(f"{purpose}_{item.name}")
         if item.when is not None:
             methods["matches", item.name] = members.name(f"matches_{item.name}")
+    for item in model.communications:
+        if item.kind is CommunicationKind.OUTGOING_MESSAGE and ("receive", item.identifier) not in methods:
+            methods["receive", item.identifier] = members.name(f"receive_{item.identifier.strip('/')}")
     return methods
 
 

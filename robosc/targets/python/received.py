@@ -56,6 +56,11 @@ def received_unknown(type_: Type, path: Path) -> Unknown:
             return Unknown.NONE
 
 
+def reader_namer() -> Namer:
+    """Names for a method's locals."""
+    return Namer(("data", "path", "self", "skipped", "found"))
+
+
 @dataclass(slots=True)
 class Reader:
     """Writes statements that read paths of one received datum into local variables.
@@ -66,6 +71,7 @@ class Reader:
         used: Functions of the runtime modules that the statements call.
         words: Texts of tuples that say what was unknown, so far.
         enum_flags: Locals that tell whether an enum fell to its default past an unknown rule, so far.
+        namer: Names the locals; readers whose statements stand in one method share it.
     """
 
     layout: Layout
@@ -73,8 +79,8 @@ class Reader:
     used: set[str]
     words: list[str] = field(default_factory=list)
     enum_flags: list[str] = field(default_factory=list)
+    namer: Namer = field(default_factory=reader_namer)
     _lines: list[str] = field(default_factory=list)
-    _namer: Namer = field(default_factory=lambda: Namer(("data", "path", "self")))
     _sources: dict[Path, str] = field(default_factory=dict)
     _codes: dict[Path, Code] = field(default_factory=dict)
 
@@ -118,7 +124,7 @@ class Reader:
         return " or ".join(self.enum_flags) or "False"
 
     def _local(self, path: Path, suffix: str = "") -> str:
-        return self._namer.name("_".join(["value", *map(str, path)]) + suffix)
+        return self.namer.name("_".join(["value", *map(str, path)]) + suffix)
 
     def _call(self, function: str, *arguments: str) -> str:
         self.used.add(function)
@@ -276,4 +282,4 @@ def no_location(automaton: str) -> str:
     raise InternalError(f"a condition on received data reads the state of {automaton}")
 
 
-__all__ = ["Reader", "converter", "no_location", "no_variable", "received_unknown"]
+__all__ = ["Reader", "converter", "no_location", "no_variable", "reader_namer", "received_unknown"]

@@ -26,9 +26,10 @@ from robosc.model.structure import Behaviour, EventKind, Transition, Update, Var
 from robosc.targets.events import Branch, branches_of, has_plant_location, is_controllable, plant_step, split
 from robosc.targets.paths import path_text, path_type
 from robosc.targets.python.allow import accepted
+from robosc.targets.python.changes import noted_change, noted_write
 from robosc.targets.python.expressions import TRUE_CODE, Code, Scope, Sort, Unknown, code_for, negated, value
 from robosc.targets.python.naming import Namer
-from robosc.targets.python.received import Reader, received_unknown
+from robosc.targets.python.received import Reader, reader_namer, received_unknown
 from robosc.targets.python.text import comment, docstring, indent
 from robosc.targets.python.writer import Writer
 
@@ -51,6 +52,44 @@ def read_method(writer: Writer, event: str) -> list[str]:
     ]
 
 
+def receive_method(writer: Writer, identifier: str, batch: tuple[str, ...]) -> list[str]:
+    """The method that takes all events of a message that came, if nothing of its data is unknown.
+
+    Args:
+        writer: The writer, after the step methods of these events.
+        identifier: Where it comes.
+        batch: The events, in source order.
+    """
+    namer = reader_namer()
+    statements: list[str] = []
+    words: list[str] = []
+    steps: list[str] = []
+    for event in batch:
+        paths = converted_paths(writer.model, event)
+        values = ""
+        if paths:
+            reader = Reader(writer.layout, _event_type(writer, event), writer.used, namer=namer)
+            values = ", ".join(reader.read(path).text for path in paths)
+            statements += reader.take_lines()
+            words += reader.words
+        step = f"self.{writer.layout.methods['step', event]}({values})"
+        if event in writer.skipping:
+            steps += [f"found = {step}", "if found:", f"    skipped += (({event!r}, found),)"]
+        else:
+            steps.append(step)
+    if writer.skipping.isdisjoint(batch):
+        steps.append("return ()")
+    else:
+        steps = ["skipped = ()", *steps, "return skipped"]
+    title = f"Convert what came on {identifier}, and take {', '.join(batch)}."
+    refusal = [f"if {' or '.join(words)}:", "    return None"] if words else []
+    return [
+        f"def {writer.layout.methods['receive', identifier]}(self, data):",
+        f"    {docstring(title)}",
+        *indent([*statements, *refusal, *steps]),
+    ]
+
+
 def _is_array(reader: Reader, path: Path) -> bool:
     """Whether a path leads to an array: those can be long, so they are not logged."""
     return isinstance(reader.type_at(path), ArrayType)
@@ -65,7 +104,11 @@ def _event_type(writer: Writer, event: str) -> Type:
 
 def step_method(writer: Writer, event: str) -> list[str]:
     """The method that takes an event; it returns the skipped updates, or None if it cannot happen now."""
-    return _StepWriter(writer, event).method()
+    step = _StepWriter(writer, event)
+    lines = step.method()
+    if step.may_skip:
+        writer.skipping.add(event)
+    return lines
 
 
 class _StepWriter:
@@ -74,7 +117,7 @@ class _StepWriter:
     def __init__(self, writer: Writer, event: str) -> None:
         self.writer = writer
         self.event = event
-        self.namer = Namer(("self", "values", "skipped", "reading"))
+        self.namer = Namer(("self", "skipped"))
         self.paths = converted_paths(writer.model, event)
         self.received: dict[Path, Code] = {}
         self.copies: dict[str, str] = {}
@@ -92,10 +135,10 @@ class _StepWriter:
         body = [
             line for component, behaviour, branches in blocks for line in self._block(component, behaviour, branches)
         ]
-        parameter = "" if is_controllable(self.event) else ", values"
-        lines = [f"def {self.writer.layout.methods['step', self.event]}(self{parameter}):"]
+        parameters = "".join(f", {code.text}" for code in self.received.values())
+        lines = [f"def {self.writer.layout.methods['step', self.event]}(self{parameters}):"]
         lines.append(f"    {docstring(f'Take {self.event}.')}")
-        lines += indent([*self._refusals(), *self._plant(), *self._unpacked(), *self._copied()])
+        lines += indent([*self._refusals(), *self._plant(), *self._copied()])
         if self.may_skip:
             lines.append("    skipped = ()")
         return [*lines, *indent(body), f"    return {'skipped' if self.may_skip else '()'}"]
@@ -108,10 +151,6 @@ class _StepWriter:
             name = self.namer.name("_".join(["value", *map(str, path)]))
             type_ = path_type(self.writer.model, root, path)
             self.received[path] = code_for(name, type_, received_unknown(type_, path))
-
-    def _unpacked(self) -> list[str]:
-        names = [code.text for code in self.received.values()]
-        return [f"{', '.join(names)}{',' if len(names) == 1 else ''} = values"] if names else []
 
     def _refusals(self) -> list[str]:
         """Return None where the event is not accepted, before anything changes."""
@@ -130,8 +169,10 @@ class _StepWriter:
         """Move the plant of a service or action."""
         if self._protocol is None or self._protocol[2] is None:
             return []
-        location, _, target = self._protocol
-        return [f"{location} = {target!r}"]
+        location, sources, target = self._protocol
+        if target in sources:
+            return noted_write(location, repr(target), self.writer.stale)
+        return [f"{location} = {target!r}", *noted_change(location, self.writer.stale)]
 
     def _copy_what_is_overwritten(self, blocks: list[tuple[str, Behaviour, list[Branch]]]) -> None:
         """Find attributes that are read after a place that may write them; a superset is fine."""
@@ -207,17 +248,23 @@ class _StepWriter:
         for update in transition.updates:
             lines += self._update(component, variables[update.variable], update)
         if transition.target is not None and states != (transition.target,):
-            lines.append(f"{self.writer.scope.location(component)} = {transition.target!r}")
+            location = self.writer.scope.location(component)
+            if transition.target in states:
+                lines += noted_write(location, repr(transition.target), self.writer.stale)
+            else:
+                lines += [f"{location} = {transition.target!r}", *noted_change(location, self.writer.stale)]
         return lines
 
     def _update(self, component: str, variable: Variable, update: Update) -> list[str]:
         place, _ = self.writer.scope.variable(component, variable.name)
         code, may_skip = self._assigned(variable.type, value(update.expression, self.scope))
         words = comment(f"{component}: do {variable.name} := {expression_text(update.expression)}")
-        if not may_skip:
-            return [*words, f"{place} = {code}"]
-        self.may_skip = True
+        if not may_skip and code.isidentifier():
+            return [*words, *noted_write(place, code, self.writer.stale)]
         new = self.namer.name(f"new_{variable.name}")
+        if not may_skip:
+            return [*words, f"{new} = {code}", *noted_write(place, new, self.writer.stale)]
+        self.may_skip = True
         skipped = f"{component}.{variable.name}"
         return [
             *words,
@@ -225,7 +272,7 @@ class _StepWriter:
             f"if {new} is None:",
             f"    skipped += ({skipped!r},)",
             "else:",
-            f"    {place} = {new}",
+            *indent(noted_write(place, new, self.writer.stale)),
         ]
 
     def _assigned(self, type_: Type, code: Code) -> tuple[str, bool]:

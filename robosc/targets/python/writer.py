@@ -31,6 +31,8 @@ class Writer:
         used: Functions of the runtime modules that the generated code calls.
         scope: How expressions over the state are written.
         diagrams: Writes the supervisor's added conditions.
+        stale: For each attribute the bits of the events whose permission reads it, once that is known.
+        skipping: Events whose step may skip an update, so far.
     """
 
     layout: Layout
@@ -38,6 +40,8 @@ class Writer:
     used: set[str] = field(default_factory=set)
     scope: Scope = field(init=False)
     diagrams: Diagrams = field(init=False)
+    stale: dict[str, int] = field(default_factory=dict)
+    skipping: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self.scope = Scope(self._variable, self._location, _no_received, self.used.add, _no_type, _no_type)

@@ -130,7 +130,7 @@ def test_an_exception_of_either_side_stops_the_robot(method: str) -> None:
     assert b.request("/cmd_vel", ON) == [MOVE]
 
 
-@pytest.mark.parametrize("method", ["enabled", "matches", "step", "signature", "conjuncts", "read"])
+@pytest.mark.parametrize("method", ["enabled", "matches", "step", "enabled_silent", "conjuncts", "read"])
 def test_an_exception_of_the_system_stops_the_robot_and_holds_back_what_came(method: str) -> None:
     system = Broken(system_of(ROBOT, Deployment.LAYER), method)
     b = LayerBench(system)

@@ -117,7 +117,7 @@ def test_a_call_that_cannot_be_made_stops_the_robot(request_: str, method: str) 
     assert b.tick()[0][:2] == ("goal" if request_ == "go" else "call", request_)
 
 
-@pytest.mark.parametrize("method", ["enabled", "read", "step", "provide", "signature", "conjuncts", "state"])
+@pytest.mark.parametrize("method", ["enabled", "enabled_silent", "read", "step", "provide", "conjuncts", "state"])
 def test_an_exception_of_the_system_stops_the_robot(method: str) -> None:
     system = Broken(system_of(ROBOT), method)
     b = Bench(system)

@@ -19,6 +19,7 @@ from robosc.errors import UnsupportedModelError
 from robosc.execution.clock import ManualClock
 from robosc.execution.event_log import MemoryLog
 from robosc.execution.interpreter import InterpretedSystem
+from robosc.execution.protocol import batches
 from robosc.expressions import Binary, BooleanType, Constant, DoubleType, Received
 from robosc.model.structure import (
     Behaviour,
@@ -36,6 +37,7 @@ from robosc.supervisor import decode, encode, make_supervisor
 from robosc.supervisor.structure import Supervisor
 from robosc.targets import GenerateOptions, generate, write_files
 from robosc.targets.events import events, is_controllable
+from robosc.targets.python import changes
 from support.generated import example_supervisor, imported, load_system, python_text, same
 from support.layers import BothSides
 from support.models import EXAMPLE_DEPLOYMENTS, EXAMPLE_NAMES, model_of
@@ -63,6 +65,9 @@ class Twins:
             allowed = self.interpreted.enabled(event)
             assert self.generated.enabled(event) is allowed, event
             self.seen["enabled" if allowed else "disabled"] += 1
+        # What the generated class remembers is what it would find if it asked for each event.
+        assert self.generated.enabled_requests() == self.interpreted.enabled_requests()
+        assert self.generated.enabled_silent() == self.interpreted.enabled_silent()
         for item in self.model.communications:
             if item.kind is not CommunicationKind.OUTGOING_MESSAGE:
                 for question in ("provide", "requirements", "conjuncts"):
@@ -92,6 +97,7 @@ class Twins:
             self.seen["unknown"] += bool(left.unknown)
             self.seen["unknown enum"] += left.enum_unknown
         before = self.generated.signature()
+        changes = self.generated.changes, self.interpreted.changes
         results = [
             system.step(event, reading)
             for system, reading in zip((self.generated, self.interpreted), readings, strict=True)
@@ -99,12 +105,33 @@ class Twins:
         assert results[0] == results[1], (event, data)
         if results[0] is None:
             assert self.generated.signature() == before
+        self.note_changes(changes, self.generated.signature() != before)
         self.seen["skipped"] += bool(results[0])
         self.seen["refused" if results[0] is None else "taken"] += 1
         return results[0]  # type: ignore[no-any-return]
 
+    def note_changes(self, before: tuple[int, int], is_another: bool) -> None:
+        """Both count changes where the state has become another, and only there."""
+        assert (self.generated.changes != before[0]) is is_another
+        assert (self.interpreted.changes != before[1]) is is_another
+        self.seen["another state" if is_another else "the same state"] += 1
+
+    def receive(self, identifier: str, data: Any) -> None:
+        """Take a whole message at once; where that is refused, event by event."""
+        changes = self.generated.changes, self.interpreted.changes
+        before = self.generated.signature()
+        results = [system.receive(identifier, data) for system in (self.generated, self.interpreted)]
+        assert results[0] == results[1], (identifier, data)
+        if results[0] is None:
+            assert (self.generated.changes, self.interpreted.changes) == changes
+            assert self.generated.signature() == before
+            for _, event in batches(self.generated.description.communications)[identifier]:
+                self.step(event, data)
+        self.seen["taken apart" if results[0] is None else "skipped at once" if results[0] else "taken at once"] += 1
+
     def run(self, dice: Random, steps: int) -> None:
         """A random walk that takes what is enabled more often than not."""
+        identifiers = list(batches(self.generated.description.communications))
         names = events(self.model)
         telling = [item.events[0] for item in self.model.communications if item.request is None] * 3
         for _ in range(steps if names else 0):
@@ -115,6 +142,10 @@ class Twins:
                 event = dice.choice(enabled) if enabled else event
             self.step(event, random_data(dice))
             self.match(random_data(dice))
+            if identifiers:
+                # Between the questions, so that several changes are remembered at once.
+                for _ in range(dice.randrange(3)):
+                    self.receive(dice.choice(identifiers), random_data(dice))
         self.compare()
         self.generated.restart()
         self.interpreted.restart()
@@ -137,6 +168,16 @@ def test_the_supervisor_of_a_random_text_behaves_as_interpreted(seed: int) -> No
         Twins(made).run(Random(seed), 10)
 
 
+@settings(deadline=None, max_examples=50)
+@given(st.integers(0, 2**32))
+def test_a_random_supervisor_that_asks_one_by_one_behaves_as_interpreted(seed: int) -> None:
+    """As a model with many requests does."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(changes, "ASKED_TOGETHER", 0)
+        twins = Twins(random_supervisor(seed))
+    twins.run(Random(seed), STEPS)
+
+
 def test_the_random_supervisors_show_everything() -> None:
     """The fixed seeds below are checked as above; what they meet shows that the check is worth something."""
     total: Counter[str] = Counter()
@@ -149,6 +190,8 @@ def test_the_random_supervisors_show_everything() -> None:
         total[what] > least
         for what, least in {"enabled": 500, "disabled": 500, "unknown": 10, "unknown enum": 10, "skipped": 30}.items()
     )
+    assert all(total[what] > 30 for what in ("taken at once", "taken apart", "skipped at once"))
+    assert all(total[what] > 200 for what in ("another state", "the same state"))
     assert total["match"] > 100 and total["no match"] > 100 and total["unknown in a condition"] > 10
 
 

@@ -30,6 +30,7 @@ class Observation:
         enabled: Every controllable event that is allowed.
         locations: Where each service and action is.
         status: What the executor is doing, and whether it is faulty.
+        counters: How much was unknown, how much unexpected, and how many faults there were.
     """
 
     issued: tuple[Issued, ...] = ()
@@ -38,6 +39,7 @@ class Observation:
     enabled: frozenset[str] | None = None
     locations: Mapping[str, str] | None = None
     status: tuple[str, bool] | None = None
+    counters: tuple[int, int, int] | None = None
 
 
 @dataclass(frozen=True)
@@ -48,13 +50,16 @@ class Sight:
         topics: For a target seen over a middleware, the topic of each message: which of those on a topic was sent is
             not to be seen, nor which properties were given; a field may have less precision than the model's number.
         log_keys: Which parts of an entry of the log it tells; None: all.
+        has_log: Whether it writes a log.
     """
 
     topics: Mapping[str, str] | None = None
     log_keys: frozenset[str] | None = None
+    has_log: bool = True
 
 
 FULL = Sight()
+NO_LOG = Sight(has_log=False)
 
 
 def flat(data: Any, path: str = "") -> dict[str, Any]:
@@ -88,9 +93,10 @@ def difference(target: str, number: int, what: str, expected: Observation, found
     """
     pairs: list[tuple[str, Any, Any]] = [
         ("what it asks for", _seen(expected.issued, sight), _seen(found.issued, sight)),
-        ("the event log", _told(expected.log, sight), _told(found.log, sight)),
     ]
-    for name in ("state", "locations", "enabled", "status"):
+    if sight.has_log:
+        pairs.append(("the event log", _told(expected.log, sight), _told(found.log, sight)))
+    for name in ("state", "locations", "enabled", "status", "counters"):
         if getattr(found, name) is not None:
             pairs.append((name, getattr(expected, name), getattr(found, name)))
     for name, left, right in pairs:

@@ -8,7 +8,7 @@ from robosc.execution.interpreter import InterpretedSystem
 from robosc.model.structure import Communication, CommunicationKind, Model
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.events import events, is_controllable
-from support.equivalence.observation import FULL, Issued, Observation, entry, flat
+from support.equivalence.observation import FULL, NO_LOG, Entry, Issued, Observation, entry, flat
 from support.equivalence.scenario import PERIOD_S, Action, Scenario
 
 
@@ -73,13 +73,13 @@ class PythonTarget:
         name: For messages.
         model: What it was made from.
         system: The controlled system.
-        runtime: Holds `Executor`, `Settings`, `ManualClock` and `MemoryLog`, as a generated module does.
+        runtime: Holds `Executor`, `Settings`, `ManualClock`, `MemoryLog` and `NullLog`, as a generated module does.
+        has_log: Whether it writes a log: without one it takes shorter ways.
     """
 
-    sight = FULL
-
-    def __init__(self, name: str, model: Model, system: Any, runtime: Any) -> None:
+    def __init__(self, name: str, model: Model, system: Any, runtime: Any, *, has_log: bool = True) -> None:
         self.name = name
+        self.sight = FULL if has_log else NO_LOG
         self.ids = Ids()
         self._model = model
         self._system = system
@@ -87,7 +87,7 @@ class PythonTarget:
         self._events = tuple(event for event in events(model) if is_controllable(event))
         self._servers = [item.name for item in model.communications if _is_server(item)]
         self._clock = runtime.ManualClock()
-        self._log = runtime.MemoryLog()
+        self._log = runtime.MemoryLog() if has_log else runtime.NullLog()
         self._world = _World(self.ids)
         self._executor: Any = None
 
@@ -130,8 +130,11 @@ class PythonTarget:
 
     def _observation(self) -> Observation:
         issued, self._world.issued = tuple(self._world.issued), []
-        log = tuple(entry(item) for item in self._log.entries)
-        self._log.entries.clear()
+        log: tuple[Entry, ...] = ()
+        if self.sight.has_log:
+            log = tuple(entry(item) for item in self._log.entries)
+            self._log.entries.clear()
+        counters = self._executor.counters
         return Observation(
             issued=issued,
             log=log,
@@ -139,6 +142,7 @@ class PythonTarget:
             enabled=frozenset(event for event in self._events if self._system.enabled(event)),
             locations={name: self._system.location(name) for name in self._servers},
             status=(self._executor.status.value, self._executor.is_faulty),
+            counters=(counters.unknown, counters.unexpected, counters.faults),
         )
 
     def close(self) -> Observation:
@@ -150,15 +154,16 @@ def _is_server(item: Communication) -> bool:
     return item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
 
 
-def reference(supervisor: Supervisor) -> PythonTarget:
+def reference(supervisor: Supervisor, *, has_log: bool = True) -> PythonTarget:
     """The yardstick: the executor of RoboSC on the interpreted system."""
     runtime = SimpleNamespace(
         Executor=executor.Executor,
         Settings=settings.Settings,
         ManualClock=clock.ManualClock,
         MemoryLog=event_log.MemoryLog,
+        NullLog=event_log.NullLog,
     )
-    return PythonTarget("reference", supervisor.model, InterpretedSystem(supervisor), runtime)
+    return PythonTarget("reference", supervisor.model, InterpretedSystem(supervisor), runtime, has_log=has_log)
 
 
 def observe(supervisor: Supervisor, scenario: Scenario) -> list[Observation]:
@@ -167,11 +172,12 @@ def observe(supervisor: Supervisor, scenario: Scenario) -> list[Observation]:
     return [target.start(scenario), *(target.do(action) for action in scenario.actions)]
 
 
-def generated_python(supervisor: Supervisor, module: Any) -> PythonTarget:
+def generated_python(supervisor: Supervisor, module: Any, *, has_log: bool = True) -> PythonTarget:
     """A generated module.
 
     Args:
         supervisor: What it was generated from.
         module: The module.
+        has_log: Whether its executor writes a log.
     """
-    return PythonTarget("python", supervisor.model, module.Supervisor(), module)
+    return PythonTarget("python", supervisor.model, module.Supervisor(), module, has_log=has_log)

@@ -5,6 +5,7 @@ A copy of this module stands in generated packages, which run on Python 3.8 and 
 
 from __future__ import annotations
 
+from itertools import compress
 from typing import Any
 
 from robosc.expressions.values import array_part, read_double, read_integer, read_whole
@@ -113,6 +114,11 @@ def moved(path: str, value: Any, low: int, high: int) -> Any:
 def known(value: Any) -> Any:
     """A received integer as the rest of the world sees it: None where it is unknown."""
     return None if value != value else value
+
+
+def numbers_of(flags: Any) -> Any:
+    """The places of the flags that are set, from 0."""
+    return tuple(compress(range(len(flags)), flags))
 
 
 def stays_in_range(value: Any, low: int, high: int) -> bool:

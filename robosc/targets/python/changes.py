@@ -1,0 +1,163 @@
+"""Generated code that follows what changes, so that nothing is asked twice whose answer cannot have changed.
+
+Every request and every silent step has a bit, requests first. A bit of `_stale` is set when a step writes another value
+to an attribute that decides whether that event is allowed. Only such events are asked again: a request by
+`enabled_requests`, which then remembers the answer; a silent step by `enabled_silent`, which clears the bit when
+it is not allowed.
+"""
+
+import re
+from collections.abc import Iterable, Sequence
+
+from robosc.targets.python.text import comment, indent
+
+ASKED_TOGETHER = 8
+"""Up to so many requests it takes less time to ask all of them than to find out which may have changed."""
+
+_ATTRIBUTE = re.compile(r"\bself\.(\w+)")
+
+
+def stale_bits(allows: Sequence[str], methods: Iterable[Sequence[str]]) -> dict[str, int]:
+    """For each attribute the bits of the events whose permission reads it, itself or through another method.
+
+    The text of the methods tells; what stands in their comments too can only make it a superset.
+
+    Args:
+        allows: The methods that tell whether an event is allowed; the first one's bit is the lowest.
+        methods: The lines of these, and of those that they call.
+    """
+    named = {_name(lines): set(_ATTRIBUTE.findall("\n".join(lines[1:]))) for lines in methods}
+    bits: dict[str, int] = {}
+    for place, allow in enumerate(allows):
+        for attribute in sorted(_read(allow, named)):
+            bits[attribute] = bits.get(attribute, 0) | 1 << place
+    return bits
+
+
+def _name(lines: Sequence[str]) -> str:
+    return lines[0].removeprefix("def ").partition("(")[0]
+
+
+def _read(method: str, named: dict[str, set[str]]) -> set[str]:
+    """What a method reads, and all that it calls."""
+    seen: set[str] = set()
+    to_do = [method]
+    while to_do:
+        name = to_do.pop()
+        if name not in seen:
+            seen.add(name)
+            to_do += named.get(name, ())
+    return seen - named.keys()
+
+
+def noted_change(place: str, bits: dict[str, int]) -> list[str]:
+    """Statements that follow from another value of an attribute, given as `self.attribute`."""
+    stale = bits.get(place.removeprefix("self."), 0)
+    return ["self.changes += 1", *([f"self._stale |= {stale:#x}"] if stale else [])]
+
+
+def noted_write(place: str, code: str, bits: dict[str, int]) -> list[str]:
+    """Statements that write an attribute; `code` is a name or a literal.
+
+    It is written also if nothing changes: of equal numbers, too, the new one counts, such as -0.0 after 0.0.
+    """
+    differs = {"True": f"not {place}", "False": place}.get(code, f"{place} != {code}")
+    return [f"if {differs}:", *indent(noted_change(place, bits)), f"{place} = {code}"]
+
+
+def asked_lines(requests: Sequence[str], silent: Sequence[str], allows: Sequence[str]) -> list[str]:
+    """Statements of the constructor: what the two methods below ask, by bit.
+
+    Args:
+        requests: The methods that tell whether each request is allowed.
+        silent: The silent steps.
+        allows: The methods that tell whether each of those is allowed.
+    """
+    bits = [*requests, *allows]
+    lines = (
+        comment(f"Bits of _stale, from the lowest: who may now answer otherwise: {', '.join(bits)}.") if bits else []
+    )
+    if len(requests) > ASKED_TOGETHER:
+        lines += ["self._allow_request = (", *(f"    self.{allow}," for allow in requests), ")"]
+    if silent:
+        pairs = zip(silent, allows, strict=True)
+        lines += ["self._allow_silent = (", *(f"    ({event!r}, self.{allow})," for event, allow in pairs), ")"]
+    return lines
+
+
+def restart_lines(requests: int, silent: int) -> list[str]:
+    """Statements that forget what was remembered, for so many requests and silent steps."""
+    allowed = "()" if requests <= ASKED_TOGETHER else f"[False] * {requests}"
+    return [
+        "self.changes += 1",
+        f"self._stale = {(1 << requests + silent) - 1:#x}",
+        f"self._allowed = {allowed}",
+        "self._enabled = ()",
+    ]
+
+
+def enabled_requests_method(allows: Sequence[str]) -> list[str]:
+    """The method that gives the enabled requests.
+
+    Args:
+        allows: The methods that tell whether each request is allowed.
+    """
+    count = len(allows)
+    if not count:
+        return [
+            "def enabled_requests(self):",
+            '    """Numbers of the requests that are allowed now: there are none."""',
+            "    return ()",
+        ]
+    if count <= ASKED_TOGETHER:
+        answers = "".join(f"self.{allow}(), " for allow in allows).strip()
+        return f'''\
+def enabled_requests(self):
+    """Numbers of the requests that are allowed now; asks only if one of them may have changed."""
+    if self._stale & {(1 << count) - 1:#x}:
+        allowed = ({answers})
+        self._stale &= ~{(1 << count) - 1:#x}
+        if allowed != self._allowed:
+            self._allowed = allowed
+            self._enabled = numbers_of(allowed)
+    return self._enabled'''.splitlines()
+    return f'''\
+def enabled_requests(self):
+    """Numbers of the requests that are allowed now; asks only those that may have changed."""
+    stale = self._stale & {(1 << count) - 1:#x}
+    if stale:
+        self._stale ^= stale
+        allowed = self._allowed
+        has_changed = False
+        while stale:
+            number = stale.bit_length() - 1
+            stale ^= 1 << number
+            now = self._allow_request[number]()
+            if now is not allowed[number]:
+                allowed[number] = now
+                has_changed = True
+        if has_changed:
+            self._enabled = numbers_of(allowed)
+    return self._enabled'''.splitlines()
+
+
+def enabled_silent_method(requests: int, count: int) -> list[str]:
+    """The method that gives the first enabled silent step, `count` of which the model has."""
+    if not count:
+        return [
+            "def enabled_silent(self):",
+            '    """The first silent step that is allowed now: there are none."""',
+            "    return None",
+        ]
+    return f'''\
+def enabled_silent(self):
+    """The first silent step that is allowed now, or None; asks only those that may have become so."""
+    stale = self._stale >> {requests}
+    while stale:
+        bit = stale & -stale
+        event, allow = self._allow_silent[bit.bit_length() - 1]
+        if allow():
+            return event
+        stale ^= bit
+        self._stale ^= bit << {requests}
+    return None'''.splitlines()

@@ -14,6 +14,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+import pytest
+
 from robosc.language import load_bundle
 from robosc.supervisor import make_supervisor
 from robosc.supervisor.structure import Supervisor
@@ -70,6 +72,17 @@ def built(supervisor: Supervisor, folder: Path, *options: str) -> Path:
         if command[0] == "make":
             assert "warning" not in done.stderr, done.stderr[-6000:]
     return folder
+
+
+_BUILT: dict[str, Path] = {}
+
+
+def built_once(supervisor: Supervisor, factory: pytest.TempPathFactory) -> Path:
+    """The same for all tests of this process, whatever file they stand in; they are of one `xdist_group`."""
+    name = supervisor.model.name
+    if name not in _BUILT:
+        _BUILT[name] = built(supervisor, factory.mktemp(name))
+    return _BUILT[name]
 
 
 class Process:

@@ -10,11 +10,12 @@ import json
 import time
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
 from robosc.model.structure import CommunicationKind, Model
-from support.equivalence.observation import Entry, Issued, Observation, Sight, entry
+from support.equivalence.observation import FULL, Entry, Issued, Observation, Sight, entry
 from support.equivalence.scenario import Action, Scenario
 
 LIMIT_S = 15.0
@@ -92,12 +93,13 @@ class NodeTarget:
         model: What it was made from.
         surroundings: Where it runs.
         folder: For its event log.
+        sight: What it tells in its log.
     """
 
-    def __init__(self, name: str, model: Model, surroundings: Surroundings, folder: Path) -> None:
+    def __init__(self, name: str, model: Model, surroundings: Surroundings, folder: Path, sight: Sight = FULL) -> None:
         self.name = name
         topics = {i.name: i.identifier for i in model.communications if i.kind is CommunicationKind.INCOMING_MESSAGE}
-        self.sight = Sight(topics=topics)
+        self.sight = replace(sight, topics=topics)
         self._surroundings = surroundings
         self._folder = folder
         self._read = 0

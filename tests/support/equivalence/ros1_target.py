@@ -15,7 +15,7 @@ from robosc.supervisor.structure import Supervisor
 from robosc.targets import generate, write_files
 from robosc.targets.ros.topics import Topic, servers, topics
 from support.equivalence.node_target import LIMIT_S, NodeTarget
-from support.equivalence.observation import Issued, flat
+from support.equivalence.observation import Issued, Sight, flat
 from support.equivalence.scenario import Action, Scenario
 from support.ros1 import PYTHON, Master, Peer, Process, until, wait_until
 from support.ros1_cpp import node_command
@@ -23,6 +23,9 @@ from support.ros1_cpp import node_command
 _RUNNING = ("running", "waiting for the first message")
 _SPIN_S = 0.002
 _DIAGNOSTICS = "/diagnostics"
+
+IN_CPP = Sight(log_keys=frozenset({"kind", "event", "controllable", "data", "state", "identifier"}), has_readings=False)
+"""What nodes in C++ tell in their logs: not in the same words what was unknown."""
 
 
 class Ros1Surroundings:
@@ -224,4 +227,4 @@ def ros1_cpp_target(supervisor: Supervisor, workspace: Path, folder: Path) -> No
     command = node_command(workspace)
     name = Path(command[0]).parent.name
     surroundings = Ros1Surroundings(supervisor, name, command, folder)
-    return NodeTarget("ros1-cpp", supervisor.model, surroundings, folder / "events")
+    return NodeTarget("ros1-cpp", supervisor.model, surroundings, folder / "events", IN_CPP)

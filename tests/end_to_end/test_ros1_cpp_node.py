@@ -26,8 +26,6 @@ from support.ros1_cpp import (
 
 pytestmark = [
     pytest.mark.skipif(missing() is not None, reason=str(missing())),
-    # One worker builds the package once.
-    pytest.mark.xdist_group("ros1_cpp_node"),
 ]
 
 PACKAGE = "line_follower_controller"

@@ -12,8 +12,6 @@ from support.ros1_cpp import Master, Peer, Process, built_once, missing, node_co
 
 pytestmark = [
     pytest.mark.skipif(missing() is not None, reason=str(missing())),
-    # One worker builds the package once.
-    pytest.mark.xdist_group("ros1_cpp_servers"),
 ]
 
 MODEL = Path(__file__).parents[1] / "models" / "carrier" / "carrier.rscd"

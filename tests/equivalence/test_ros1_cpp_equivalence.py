@@ -21,8 +21,6 @@ pytestmark = [
 CARRIER = Path(__file__).parents[1] / "models" / "carrier" / "carrier.rscd"
 
 
-# The worker that builds the line follower for other tests.
-@pytest.mark.xdist_group("ros1_cpp_node")
 def test_a_recorded_run(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
     supervisor = example_supervisor("line_follower/line_follower")
     scenario = for_node(supervisor, read_recorded("line_follower"))
@@ -31,8 +29,6 @@ def test_a_recorded_run(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
     compare(ros1_cpp_target(supervisor, workspace, tmp_path), scenario, observe(supervisor, scenario))
 
 
-# The worker that builds the carrier for other tests.
-@pytest.mark.xdist_group("ros1_cpp_servers")
 def test_services_and_actions(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
     supervisor = supervisor_of(CARRIER)
     scenario = node_scenario(supervisor, 1, 200)

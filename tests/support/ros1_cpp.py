@@ -20,6 +20,7 @@ from robosc.language import load_bundle
 from robosc.supervisor import make_supervisor
 from robosc.supervisor.structure import Supervisor
 from robosc.targets import generate, write_files
+from support.shared import shared
 
 LIMIT_S = 20.0
 PYTHON = "/usr/bin/python3"
@@ -74,15 +75,9 @@ def built(supervisor: Supervisor, folder: Path, *options: str) -> Path:
     return folder
 
 
-_BUILT: dict[str, Path] = {}
-
-
 def built_once(supervisor: Supervisor, factory: pytest.TempPathFactory) -> Path:
-    """The same for all tests of this process, whatever file they stand in; they are of one `xdist_group`."""
-    name = supervisor.model.name
-    if name not in _BUILT:
-        _BUILT[name] = built(supervisor, factory.mktemp(name))
-    return _BUILT[name]
+    """The same for all tests of a run."""
+    return shared(factory, f"ros1_cpp_{supervisor.model.name}", lambda folder: built(supervisor, folder))
 
 
 class Process:

@@ -14,8 +14,8 @@ from robosc.model.structure import CommunicationKind
 from robosc.supervisor.structure import Supervisor
 from robosc.targets import generate, write_files
 from robosc.targets.ros.topics import Topic, servers, topics
-from support.equivalence.node_target import LIMIT_S, NodeTarget
-from support.equivalence.observation import Issued, Sight, flat
+from support.equivalence.node_target import IN_CPP, LIMIT_S, NodeTarget, given, node_parameters, set_parts
+from support.equivalence.observation import Issued
 from support.equivalence.scenario import Action, Scenario
 from support.ros1 import PYTHON, Master, Peer, Process, until, wait_until
 from support.ros1_cpp import node_command
@@ -23,9 +23,6 @@ from support.ros1_cpp import node_command
 _RUNNING = ("running", "waiting for the first message")
 _SPIN_S = 0.002
 _DIAGNOSTICS = "/diagnostics"
-
-IN_CPP = Sight(log_keys=frozenset({"kind", "event", "controllable", "data", "state", "identifier"}), has_readings=False)
-"""What nodes in C++ tell in their logs: not in the same words what was unknown."""
 
 
 class Ros1Surroundings:
@@ -56,7 +53,7 @@ class Ros1Surroundings:
     def start(self, scenario: Scenario, folder: Path) -> None:
         """Start node and surroundings."""
         self._master = self._stack.enter_context(Master(self._folder))
-        for name, value in _parameters(scenario, folder).items():
+        for name, value in node_parameters(scenario, folder).items():
             self._master.set_parameter(f"/{self._name}/{name}", value)
         self._peer = self._stack.enter_context(Peer(self._master, self._folder))
         for topic in self._topics:
@@ -132,10 +129,12 @@ class Ros1Surroundings:
         for topic in self._topics:
             if topic.published:
                 values = self._new("publish", topic.identifier, peer.values(topic.identifier))
-                found += [("publish", topic.identifier, _given(topic, value)) for value in values]
+                found += [("publish", topic.identifier, given(topic.interface, value)) for value in values]
         for name, on_ros in self._servers.items():
-            found += [("call", name, _set(item)) for item in self._new("call", name, peer.requests.get(on_ros, []))]
-            found += [("goal", name, _set(item)) for item in self._new("goal", name, peer.goals.get(on_ros, []))]
+            found += [
+                ("call", name, set_parts(item)) for item in self._new("call", name, peer.requests.get(on_ros, []))
+            ]
+            found += [("goal", name, set_parts(item)) for item in self._new("goal", name, peer.goals.get(on_ros, []))]
             cancels = [None] * peer.cancels.get(on_ros, 0)
             found += [("cancel", name, {}) for _ in self._new("cancel", name, cancels)]
         return found
@@ -176,40 +175,11 @@ def _type(topic: Topic) -> str:
     return f"{topic.interface.package}/{topic.interface.type}"
 
 
-def _parameters(scenario: Scenario, folder: Path) -> dict[str, Any]:
-    """The settings as the node's parameters."""
-    settings = scenario.all_settings()
-    return {
-        "period": settings.period_s,
-        "policy": settings.policy,
-        "every": settings.every,
-        "on_unknown": settings.on_unknown,
-        "max_age": [f"{topic}={age}" for topic, age in (settings.max_age_s or {}).items()] or [""],
-        "log_folder": str(folder),
-        "server_wait": LIMIT_S,
-    }
-
-
 def _fields(data: Any) -> dict[str, Any]:
     """Plain data as fields of a message: a value of a basic type is that of the one field of a message for it."""
     if data is None:
         return {}
     return data if isinstance(data, dict) else {"data": data}
-
-
-def _given(topic: Topic, message: Any) -> dict[str, Any]:
-    """What a message holds, by path; what has its default is left out."""
-    return _set(message.get("data") if topic.interface.package == "std_msgs" else message)
-
-
-def _set(value: Any) -> dict[str, Any]:
-    return {path: part for path, part in flat(_plain(value)).items() if part}
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {name: _plain(part) for name, part in value.items() if name != "header"}
-    return value if isinstance(value, bool | int | float | str) else None
 
 
 def ros1_target(supervisor: Supervisor, folder: Path) -> NodeTarget:

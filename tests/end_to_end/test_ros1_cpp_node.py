@@ -16,7 +16,7 @@ from support.ros1_cpp import (
     Master,
     Peer,
     Process,
-    built,
+    built_once,
     missing,
     node_command,
     plain_environment,
@@ -35,7 +35,7 @@ STOPPED = dict.fromkeys("xyz", 0.0)
 @pytest.fixture(scope="module")
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     supervisor = supervisor_of(EXAMPLES / "line_follower" / "line_follower.rscd")
-    return built(supervisor, tmp_path_factory.mktemp("line_follower"))
+    return built_once(supervisor, tmp_path_factory)
 
 
 @pytest.fixture

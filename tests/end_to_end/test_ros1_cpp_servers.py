@@ -3,13 +3,12 @@
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from robosc.supervisor.structure import Supervisor
-from support.node_logs import Entry, comparable, entries_of, replayed
-from support.ros1_cpp import Master, Peer, Process, built, missing, node_command, supervisor_of, until
+from support.node_logs import Entry, entries_of
+from support.ros1_cpp import Master, Peer, Process, built_once, missing, node_command, supervisor_of, until
 
 pytestmark = [
     pytest.mark.skipif(missing() is not None, reason=str(missing())),
@@ -25,7 +24,7 @@ def supervisor() -> Supervisor:
 
 @pytest.fixture(scope="module")
 def workspace(supervisor: Supervisor, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return built(supervisor, tmp_path_factory.mktemp("carrier"))
+    return built_once(supervisor, tmp_path_factory)
 
 
 class Carrier:
@@ -227,30 +226,3 @@ def test_a_server_that_vanishes_is_an_error(workspace: Path, tmp_path: Path) -> 
             carrier.until("carry.error")
             carrier.node.signal(signal.SIGTERM)
             assert carrier.node.wait() == 0
-
-
-def test_by_events_it_is_the_reference_executor(carrier: Carrier, supervisor: Supervisor) -> None:
-    peer = carrier.peer
-    peer.tell("service", "/calibrate", "std_srvs/Trigger")
-    peer.tell("action", "/move_base", "move_base_msgs/MoveBase")
-    carrier.start("every:=event", "period:=3600", "server_wait:=0")
-    until(lambda: carrier.node.is_running, "the node")
-
-    def step(event: str, action: Callable[[], Any]) -> None:
-        carrier.until(event, len(carrier.events(event)) + 1, action)
-
-    # Deciding only after what comes, each message brings one request.
-    for _ in range(3):
-        step("word.response", lambda: carrier.say("stay"))
-    until(lambda: bool(peer.of("called", "/calibrate")), "a call", lambda: carrier.say("stay"))
-    step("calibrate.response", lambda: peer.tell("answer", "/calibrate", data={"success": True, "message": "fine"}))
-    for word, distance in (("go", 5.0), ("stay", 0.3), ("stay", 4.0), ("go", 5.0)):
-        step("scan.response", lambda distance=distance: carrier.scan(distance))  # type: ignore[misc]
-        step("word.response", lambda word=word: carrier.say(word))  # type: ignore[misc]
-        step("level.response", lambda: peer.publish("/level", "std_msgs/Float32", data=0.5))
-    carrier.node.signal(signal.SIGTERM)
-    assert carrier.node.wait() == 0
-    entries = [entry for entry in carrier.entries if entry["kind"] != "release"]
-    reference = [entry for entry in replayed(supervisor, entries).entries if entry["kind"] != "release"]
-    assert comparable(entries) == comparable(reference)
-    assert len(carrier.events("creep.request")) >= 1

@@ -9,11 +9,6 @@ from typing import Any
 
 import pytest
 
-from robosc.execution.clock import ManualClock
-from robosc.execution.event_log import open_event_log
-from robosc.execution.executor import Executor
-from robosc.execution.interpreter import InterpretedSystem
-from robosc.execution.settings import Settings
 from robosc.targets import generate, write_files
 from support.generated import example_supervisor
 from support.ros1 import PYTHON, Master, Peer, Process, missing, start_node, until, wait_until
@@ -411,84 +406,6 @@ def test_a_wrong_parameter_is_one_line_and_exit_status_2(robot: Robot, parameter
     assert node.wait() == 2
     (line,) = node.stderr.splitlines()
     assert line.startswith(f"{PACKAGE}: {complaint}")
-
-
-def test_it_logs_what_the_reference_executor_logs(robot: Robot) -> None:
-    """The same messages, one after the other, for the node over TCP and for the reference executor."""
-    robot.start("_period:=3600.0", "_every:=event", f"_log_folder:={robot.folder / 'events'}")
-    near, far, nothing = [0.2] * 360, [2.0] * 360, [float("nan")] * 360
-    sequence: list[tuple[str, dict[str, Any]]] = [
-        ("/scan", {"ranges": far}),
-        ("/line/correction", {"data": 0.5}),
-        ("/scan", {"ranges": near}),
-        ("/line/correction", {"data": -0.25}),
-        ("/scan", {"ranges": far}),
-        ("/emergency_stop/stop", {}),
-        ("/emergency_stop/stop", {}),
-        ("/line/correction", {"data": float("nan")}),
-        ("/emergency_stop/resume", {}),
-        ("/scan", {"ranges": nothing}),
-        ("/line/lost", {}),
-        ("/scan", {"ranges": []}),
-        ("/scan", {"ranges": far}),
-        ("/line/correction", {"data": 0.125}),
-    ]
-    log = open_event_log(str(robot.folder / "reference"), "reference", 0.0)
-    middleware = Recorded()
-    reference = Executor(
-        InterpretedSystem(example_supervisor(FOLLOWER)),
-        middleware,
-        Settings(period_s=3600.0, every="event"),
-        ManualClock(),
-        log,
-    )
-    reference.start()
-    for topic, fields in sequence:
-        data = fields.get("data", fields or None)
-        reference.receive(topic, data)
-        robot.send(topic, **fields)
-        # The decisions after one message are over before the next one: every message brings a command here.
-        robot.until(lambda: len(robot.commands) >= len(middleware.commands), f"the answer to {topic}")
-        assert len(robot.commands) == len(middleware.commands)
-    robot.node.signal(signal.SIGTERM)
-    robot.stands_still(0)
-    log.close()
-    expected = [told(entry) for entry in entries(robot.folder / "reference")]
-    assert [told(entry) for entry in entries(robot.folder / "events") if entry["kind"] != "stop"] == expected
-    assert len(expected) > 2 * len(sequence)
-
-
-class Recorded:
-    """A middleware that keeps what it is given."""
-
-    def __init__(self) -> None:
-        self.commands: list[Any] = []
-
-    def prepare(self, communication: str, data: Any) -> Any:
-        return data
-
-    def is_default(self, communication: str, message: Any) -> bool:
-        return not message or message == {"linear": {"x": 0.0}}
-
-    def publish(self, communication: str, message: Any) -> None:
-        self.commands.append(message)
-
-    def publish_default(self, identifier: str) -> None:
-        self.commands.append(None)
-
-    def call(self, communication: str, request_id: int, message: Any) -> None:
-        raise AssertionError
-
-    def send_goal(self, communication: str, goal_id: int, message: Any) -> None:
-        raise AssertionError
-
-    def cancel_goal(self, communication: str, goal_id: int) -> None:
-        raise AssertionError
-
-
-def told(entry: dict[str, Any]) -> dict[str, Any]:
-    """An entry of a log without its times."""
-    return {name: value for name, value in entry.items() if name not in ("time", "decision_us")}
 
 
 def test_the_scripts_run_where_they_stand(robot: Robot) -> None:

@@ -8,13 +8,20 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+import pytest
+
+from robosc.supervisor import make_supervisor
 from robosc.supervisor.structure import Supervisor
 from robosc.targets import generate, write_files
+from support.models import bundle_of
+from support.shared import shared
 
+COURIER = Path(__file__).parents[1] / "models" / "courier" / "model.rscd"
 STAND_IN = Path(__file__).with_name("rclcpp_stand_in")
 WARNINGS = "-Wall -Wextra -Wpedantic -Werror".split()
 SANITIZERS = "-g1 -fsanitize=address,undefined -fno-sanitize-recover=all".split()
 LIMIT_S = 60.0
+PROGRAM = "controller"
 
 
 def missing(*packages: str) -> str | None:
@@ -36,7 +43,7 @@ def compiled(supervisor: Supervisor, folder: Path, *options: str) -> Path:
     (engine,) = source.glob("*_supervisor.c")
     packages = sorted((Path(sys.prefix) / "include").iterdir())
     includes = [word for path in packages if path.is_dir() for word in ("-isystem", str(path))]
-    program = folder / "controller"
+    program = folder / PROGRAM
     both = [*WARNINGS, *options, "-ffp-contract=off"]
     for command in (
         ["gcc", "-std=c99", *both, "-c", engine.name, "-o", "engine.o"],
@@ -45,6 +52,21 @@ def compiled(supervisor: Supervisor, folder: Path, *options: str) -> Path:
         done = subprocess.run(command, cwd=source, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr[:6000]
     return program
+
+
+def compiled_once(supervisor: Supervisor, factory: pytest.TempPathFactory, *options: str) -> Path:
+    """The same program for all tests of a run, which compile a robot with the same options."""
+    folder = shared(factory, f"ros2_cpp_{supervisor.model.name}", lambda folder: compiled(supervisor, folder, *options))
+    return folder / PROGRAM
+
+
+def courier() -> Supervisor:
+    """The courier, which has every kind of server, with no variable of type string: in C none takes a received text."""
+    text = COURIER.read_text(encoding="utf-8")
+    text = text.replace("variable text: string", "").replace("do text := value.^message ", "")
+    made = make_supervisor(bundle_of(text))
+    assert made.supervisor is not None, made.reason
+    return made.supervisor
 
 
 def run(program: Path, lines: Sequence[str], *parameters: str) -> subprocess.CompletedProcess[str]:

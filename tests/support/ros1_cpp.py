@@ -14,10 +14,13 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+import pytest
+
 from robosc.language import load_bundle
 from robosc.supervisor import make_supervisor
 from robosc.supervisor.structure import Supervisor
 from robosc.targets import generate, write_files
+from support.shared import shared
 
 LIMIT_S = 20.0
 PYTHON = "/usr/bin/python3"
@@ -70,6 +73,11 @@ def built(supervisor: Supervisor, folder: Path, *options: str) -> Path:
         if command[0] == "make":
             assert "warning" not in done.stderr, done.stderr[-6000:]
     return folder
+
+
+def built_once(supervisor: Supervisor, factory: pytest.TempPathFactory) -> Path:
+    """The same for all tests of a run."""
+    return shared(factory, f"ros1_cpp_{supervisor.model.name}", lambda folder: built(supervisor, folder))
 
 
 class Process:

@@ -10,15 +10,19 @@ import json
 import time
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from robosc.model.structure import CommunicationKind, Model
-from support.equivalence.observation import Entry, Issued, Observation, Sight, entry
+from robosc.model.structure import CommunicationKind, Interface, Model
+from support.equivalence.observation import FULL, Entry, Issued, Observation, Sight, entry, flat
 from support.equivalence.scenario import Action, Scenario
 
 LIMIT_S = 15.0
 RESEND_S = 3.0
+
+IN_CPP = Sight(log_keys=frozenset({"kind", "event", "controllable", "data", "state", "identifier"}), has_readings=False)
+"""What nodes in C++ tell in their logs: not in the same words what was unknown."""
 
 
 class Surroundings(Protocol):
@@ -92,12 +96,13 @@ class NodeTarget:
         model: What it was made from.
         surroundings: Where it runs.
         folder: For its event log.
+        sight: What it tells in its log.
     """
 
-    def __init__(self, name: str, model: Model, surroundings: Surroundings, folder: Path) -> None:
+    def __init__(self, name: str, model: Model, surroundings: Surroundings, folder: Path, sight: Sight = FULL) -> None:
         self.name = name
         topics = {i.name: i.identifier for i in model.communications if i.kind is CommunicationKind.INCOMING_MESSAGE}
-        self.sight = Sight(topics=topics)
+        self.sight = replace(sight, topics=topics)
         self._surroundings = surroundings
         self._folder = folder
         self._read = 0
@@ -163,3 +168,33 @@ class NodeTarget:
         # What brings the robot to rest: all-default messages, and cancels.
         self._issued = [item for item in self._issued if item[2] or item[0] in ("call", "goal")]
         return self._taken()
+
+
+def node_parameters(scenario: Scenario, folder: Path) -> dict[str, Any]:
+    """The settings as the node's parameters."""
+    settings = scenario.all_settings()
+    return {
+        "period": settings.period_s,
+        "policy": settings.policy,
+        "every": settings.every,
+        "on_unknown": settings.on_unknown,
+        "max_age": [f"{topic}={age}" for topic, age in (settings.max_age_s or {}).items()] or [""],
+        "log_folder": str(folder),
+        "server_wait": LIMIT_S,
+    }
+
+
+def given(interface: Interface, message: Any) -> dict[str, Any]:
+    """What a message holds, given as a dict, by path; what has its default is left out."""
+    return set_parts(message.get("data") if interface.package == "std_msgs" else message)
+
+
+def set_parts(value: Any) -> dict[str, Any]:
+    """The parts of a request or a goal that are not zero or empty, by path, without headers."""
+    return {path: part for path, part in flat(_plain(value)).items() if part}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _plain(part) for name, part in value.items() if name != "header"}
+    return value if isinstance(value, bool | int | float | str) else None

@@ -51,11 +51,14 @@ class Sight:
             not to be seen, nor which properties were given; a field may have less precision than the model's number.
         log_keys: Which parts of an entry of the log it tells; None: all.
         has_log: Whether it writes a log.
+        has_readings: Whether the log tells with an event of the environment what the model reads of the data that
+            came; else it tells the data as it came, which is not compared.
     """
 
     topics: Mapping[str, str] | None = None
     log_keys: frozenset[str] | None = None
     has_log: bool = True
+    has_readings: bool = True
 
 
 FULL = Sight()
@@ -127,6 +130,8 @@ def _on_wire(value: Any) -> Any:
 
 
 def _told(log: Sequence[Entry], sight: Sight) -> list[Entry]:
+    if not sight.has_readings:
+        log = [{**item, "data": None} if item.get("controllable") is False else item for item in log]
     if sight.log_keys is None:
         return list(log)
     return [{key: value for key, value in item.items() if key in sight.log_keys} for item in log]

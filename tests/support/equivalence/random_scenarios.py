@@ -235,6 +235,29 @@ def for_node(supervisor: Supervisor, scenario: Scenario) -> Scenario:
     return Scenario(tuple(actions), settings)
 
 
+_NAN = math.nan
+ODD_MESSAGES = tuple(
+    Action("message", topic, data)
+    for topic, data in (
+        ("/scan", {"ranges": [2.0] * 360}),
+        ("/line/correction", _NAN),
+        ("/line/correction", 0.5),
+        ("/scan", {"ranges": [_NAN] * 360}),
+        ("/line/correction", math.inf),
+        ("/emergency_stop/stop", None),
+        ("/emergency_stop/stop", None),
+        ("/line/correction", _NAN),
+        ("/emergency_stop/resume", None),
+        ("/scan", {"ranges": []}),
+        ("/line/lost", None),
+        ("/scan", {"ranges": [-1.0] * 20}),
+        ("/scan", {"ranges": [2.0] * 360}),
+        ("/line/correction", 0.125),
+    )
+)
+"""What may come to the line follower, too: numbers that are none, and too few."""
+
+
 def follow(seen: Observation, target: PythonTarget) -> list[Action]:
     """What servers do at once: accept goals, end those that are cancelled."""
     found = []

@@ -11,7 +11,8 @@
 //   signal NUMBER
 //   wait WORD NAME                go on when the node has done that once more
 //
-// DATA depends on the type: the value of `data`, the ranges of a scan, `success` and `message` of a reply, `sequence`.
+// DATA depends on the type: the value of `data`, the ranges of a scan, `success` and `message` of a reply, `sequence`,
+// x, y and z of a point, four parts of a test_msgs/NestedMessage.
 
 #pragma once
 
@@ -40,6 +41,8 @@ STAND_IN_HAS(HasData, data)
 STAND_IN_HAS(HasRanges, ranges)
 STAND_IN_HAS(HasSuccess, success)
 STAND_IN_HAS(HasSequence, sequence)
+STAND_IN_HAS(HasPoint, z)
+STAND_IN_HAS(HasNested, nested_different_pkg)
 
 template <class T>
 void read_list(std::istream& in, std::vector<T>& list)
@@ -71,6 +74,13 @@ M parsed(std::istream& in)
         std::getline(in >> std::ws, message.message);
     } else if constexpr (HasSequence<M>::value) {
         read_list(in, message.sequence);
+    } else if constexpr (HasPoint<M>::value) {
+        in >> message.x >> message.y >> message.z;
+    } else if constexpr (HasNested<M>::value) {
+        int number = 0;
+        in >> message.nested_field.bool_value >> number >> message.nested_field.float32_value
+            >> message.nested_different_pkg.sec;
+        message.nested_field.uint8_value = static_cast<uint8_t>(number);
     }
     return message;
 }

@@ -1,21 +1,18 @@
 """Generated rclcpp nodes, compiled against a stand-in for rclcpp with the real messages, and run event by event."""
 
 import json
-import math
 import re
 from pathlib import Path
-from random import Random
-from typing import Any
 
 import pytest
 
 from robosc.supervisor import make_supervisor
 from robosc.supervisor.structure import Supervisor
+from support import rclcpp_nodes
 from support.models import EXAMPLES, bundle_of
 from support.node_logs import comparable, entries_of, replayed
-from support.rclcpp_nodes import SANITIZERS, compiled, missing, run, sent
+from support.rclcpp_nodes import SANITIZERS, compiled_once, missing, run, sent
 
-MODELS = Path(__file__).parents[3] / "models"
 END = "signal 15"
 BY_EVENT = ("every:=event", "period:=3600")
 
@@ -40,54 +37,17 @@ def maze() -> Supervisor:
 
 @pytest.fixture(scope="module")
 def maze_node(maze: Supervisor, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return compiled(maze, tmp_path_factory.mktemp("maze"))
+    return compiled_once(maze, tmp_path_factory)
 
 
 @pytest.fixture(scope="module")
 def courier() -> Supervisor:
-    # A variable of type string cannot take a received text in C.
-    text = (MODELS / "courier" / "model.rscd").read_text()
-    return supervisor_of(text.replace("variable text: string", "").replace("do text := value.^message ", ""))
+    return rclcpp_nodes.courier()
 
 
 @pytest.fixture(scope="module")
 def courier_node(courier: Supervisor, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return compiled(courier, tmp_path_factory.mktemp("courier"), *SANITIZERS)
-
-
-def scan(dice: Random) -> str:
-    count = dice.choice([0, 1, 271, 360, 360, 360, 400])
-    distances = [dice.choice([0.2, 0.5, 0.7, 1.5, 3.0]) for _ in range(count)]
-    for _ in range(dice.choice([0, 0, 3])):
-        if distances:
-            distances[dice.randrange(count)] = dice.choice([math.nan, math.inf, -1.0])
-    return f"message /scan {' '.join(map(str, distances))}"
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_it_does_what_the_reference_executor_does(maze: Supervisor, maze_node: Path, seed: int, tmp_path: Path) -> None:
-    dice = Random(seed)
-    lines = [scan(dice) if dice.random() < 0.7 else "message /rotate_done" for _ in range(200)]
-    done = run(maze_node, [*lines, END], *BY_EVENT, f"log_folder:={tmp_path}")
-    assert (done.returncode, done.stderr) == (0, "")
-    entries = entries_of(tmp_path)
-    reference = replayed(maze, entries)
-    assert comparable(entries) == comparable(reference.entries)
-    assert len([entry for entry in entries if entry["kind"] == "event" and entry["controllable"]]) > 50
-    # What the log tells went out: the same messages with the same data.
-    topics = {"rotate_left": "/rotate_left", "rotate_right": "/rotate_right", "/cmd_vel": "/cmd_vel"}
-    told = [(topics.get(name, "/cmd_vel"), data) for name, data in reference.middleware.sent]
-    published = sent(done.stdout)
-    assert [name for _, name, _ in published] == [name for name, _ in told]
-    for (_, _, yaml), (_, data) in zip(published, told, strict=True):
-        assert numbers_of(yaml) == pytest.approx(sorted(leaves(data)))
-
-
-def leaves(data: Any) -> list[float]:
-    """The numbers of given data that are not zero."""
-    if isinstance(data, dict):
-        return [number for part in data.values() for number in leaves(part)]
-    return [float(data)] if data else []
+    return compiled_once(courier, tmp_path_factory, *SANITIZERS)
 
 
 def numbers_of(yaml: str) -> list[float]:

@@ -1,0 +1,58 @@
+"""The generated ROS 2 node in C++, on a stand-in for rclcpp, does what the reference executor does, step by step."""
+
+import math
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from support.equivalence.python_targets import observe
+from support.equivalence.random_scenarios import for_node, node_scenario
+from support.equivalence.rclcpp_target import rclcpp_target
+from support.equivalence.recorded import read_recorded
+from support.equivalence.scenario import Action, Scenario
+from support.equivalence.targets import compare
+from support.generated import example_supervisor
+from support.rclcpp_nodes import SANITIZERS, compiled_once, courier, missing
+
+PACKAGES = ("geometry_msgs", "sensor_msgs", "std_srvs", "test_msgs")
+pytestmark = pytest.mark.skipif(missing(*PACKAGES) is not None, reason=str(missing(*PACKAGES)))
+
+
+@pytest.mark.parametrize("robot", ["maze_solver", "object_finder"])
+def test_a_recorded_run(robot: str, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    supervisor = example_supervisor(f"{robot}/{robot}")
+    scenario = for_node(supervisor, read_recorded(robot))
+    program = compiled_once(supervisor, tmp_path_factory)
+    compare(rclcpp_target(supervisor, program, tmp_path), scenario, observe(supervisor, scenario))
+
+
+def test_scans_of_all_lengths_with_numbers_that_are_none(
+    tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    supervisor = example_supervisor("maze_solver/maze_solver")
+    dice = Random(1)
+    actions = [_scan(dice) if dice.random() < 0.7 else Action("message", "/rotate_done") for _ in range(400)]
+    scenario = Scenario(tuple(actions), for_node(supervisor, Scenario(())).settings)
+    program = compiled_once(supervisor, tmp_path_factory)
+    seen = observe(supervisor, scenario)
+    assert sum(bool(item.issued) for item in seen) > 100
+    compare(rclcpp_target(supervisor, program, tmp_path), scenario, seen)
+
+
+def _scan(dice: Random) -> Action:
+    distances = [dice.choice([0.25, 0.5, 0.75, 1.5, 3.0]) for _ in range(dice.choice([0, 1, 271, 360, 360, 360, 400]))]
+    for _ in range(dice.choice([0, 0, 3])):
+        if distances:
+            distances[dice.randrange(len(distances))] = dice.choice([math.nan, math.inf, -1.0])
+    return Action("message", "/scan", {"ranges": distances})
+
+
+def test_services_and_actions(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    supervisor = courier()
+    scenario = node_scenario(supervisor, 1, 200)
+    seen = observe(supervisor, scenario)
+    asked = {(kind, name) for item in seen for kind, name, _ in item.issued}
+    assert asked >= {("call", "power"), ("call", "wind"), ("goal", "count"), ("goal", "reach"), ("cancel", "count")}
+    program = compiled_once(supervisor, tmp_path_factory, *SANITIZERS)
+    compare(rclcpp_target(supervisor, program, tmp_path), scenario, seen)

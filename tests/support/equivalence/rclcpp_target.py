@@ -1,0 +1,143 @@
+"""Generated ROS 2 nodes in C++ on the stand-in for rclcpp, as processes that are told what happens line by line."""
+
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+from typing import IO, Any
+
+import pytest
+
+from robosc.supervisor.structure import Supervisor
+from robosc.targets.ros.topics import servers, topics
+from support.equivalence.node_target import IN_CPP, LIMIT_S, NodeTarget, given, node_parameters, set_parts
+from support.equivalence.observation import Issued
+from support.equivalence.scenario import Action, Scenario
+
+yaml: Any = pytest.importorskip("yaml", reason="PyYAML, which reads what the stand-in prints, is not installed")
+
+_SPIN_S = 0.002
+_KINDS = ("publish", "call", "goal", "cancel")
+# action_msgs/GoalStatus.
+_ENDS = {"succeeded": 4, "cancelled": 5, "aborted": 6}
+
+
+class StandInSurroundings:
+    """A node and the test, which is everything around it.
+
+    Args:
+        supervisor: What the node was generated from.
+        program: The node.
+        folder: For its output.
+    """
+
+    def __init__(self, supervisor: Supervisor, program: Path, folder: Path) -> None:
+        self._topics = {topic.identifier: topic for topic in topics(supervisor.model)}
+        self._servers = {item.identifier: item for item in servers(supervisor.model)}
+        self._program = program
+        self._output = folder / "output.txt"
+        self._errors = folder / "errors.txt"
+        self._read = 0
+
+    def start(self, scenario: Scenario, folder: Path) -> None:
+        """Start the node; every server is there."""
+        parameters = {name: value for name, value in node_parameters(scenario, folder).items() if value != [""]}
+        words = [word for name, value in parameters.items() for word in ("-p", f"{name}:={_parameter(value)}")]
+        with self._output.open("wb") as output, self._errors.open("wb") as errors:
+            self._process = subprocess.Popen(
+                [self._program, "--ros-args", *words],
+                stdin=subprocess.PIPE,
+                stdout=output,
+                stderr=errors,
+                text=True,
+                env={"PATH": os.environ["PATH"]},
+            )
+        for name in self._servers:
+            self._tell("server", name, "1")
+
+    def _tell(self, *words: str) -> None:
+        self._input.write(" ".join(words) + "\n")
+        self._input.flush()
+
+    @property
+    def _input(self) -> IO[str]:
+        assert self._process.stdin is not None
+        return self._process.stdin
+
+    def send(self, topic: str, data: Any) -> None:
+        """Publish."""
+        self._tell("message", topic, _line(data))
+
+    def answer(self, action: Action) -> None:
+        """Let a server do it."""
+        name = next(item.identifier for item in self._servers.values() if item.name == action.subject)
+        match action.do:
+            case "reply":
+                self._tell("answer", name, _line(action.data))
+            case "accept":
+                self._tell("accept", name)
+            case "feedback":
+                self._tell("feedback", name, _line(action.data))
+            case "end":
+                if action.how == "cancelled":
+                    self._tell("refuse", name, "0")  # The cancel is accepted.
+                self._tell("result", name, str(_ENDS[action.how]), _line(action.data))
+            case _:
+                raise ValueError(action.do)
+
+    def take_issued(self) -> list[Issued]:
+        """What it did since the last time."""
+        text = self._output.read_text(encoding="utf-8")
+        end = text.rfind("\n") + 1
+        lines = text[self._read : end].splitlines()
+        self._read = end
+        return [found for line in lines if (found := self._issued(line))]
+
+    def _issued(self, line: str) -> Issued | None:
+        kind, name, text = line.split(" ", 2)
+        assert kind in _KINDS, line
+        if kind == "publish":
+            topic = self._topics.get(name)
+            return (kind, name, given(topic.interface, yaml.safe_load(text))) if topic else None
+        return kind, self._servers[name].name, set_parts(yaml.safe_load(text)) if text else {}
+
+    def settle(self) -> None:
+        """Nothing: what comes next waits in line."""
+
+    def spin(self) -> None:
+        """For a moment."""
+        time.sleep(_SPIN_S)
+        assert self._process.poll() is None, self._errors.read_text(errors="replace")
+
+    def stop(self) -> None:
+        """By a signal; it does not wait long for the ends of goals."""
+        self._tell("signal", str(int(signal.SIGTERM)))
+        assert self._process.wait(LIMIT_S) == 0, self._errors.read_text(errors="replace")
+
+    def close(self) -> None:
+        """End it all."""
+        self._process.kill()
+        self._process.wait()
+        self._input.close()
+
+
+def _parameter(value: Any) -> str:
+    return f"[{','.join(value)}]" if isinstance(value, list) else str(value)
+
+
+def _line(data: Any) -> str:
+    """Data as the stand-in reads it: the values, one after the other, texts without ends of lines."""
+    if isinstance(data, dict):
+        return " ".join(map(_line, data.values()))
+    if isinstance(data, list):
+        return " ".join(map(_line, data))
+    if isinstance(data, str):
+        return " ".join(data.splitlines())
+    return "" if data is None else str(int(data) if isinstance(data, bool) else data)
+
+
+def rclcpp_target(supervisor: Supervisor, program: Path, folder: Path) -> NodeTarget:
+    """The target `ros2-cpp`, compiled with the stand-in."""
+    surroundings = StandInSurroundings(supervisor, program, folder)
+    return NodeTarget("ros2-cpp", supervisor.model, surroundings, folder / "events", IN_CPP)

@@ -1,0 +1,200 @@
+"""Generated ROS 1 nodes, rospy and roscpp, as processes of their own on a real rosmaster."""
+
+import re
+import signal
+import time
+import xmlrpc.client
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from robosc.execution.interpreter import describe
+from robosc.model.structure import CommunicationKind
+from robosc.supervisor.structure import Supervisor
+from robosc.targets import generate, write_files
+from robosc.targets.ros.topics import Topic, servers, topics
+from support.equivalence.node_target import IN_CPP, LIMIT_S, NodeTarget, given, node_parameters, set_parts
+from support.equivalence.observation import Issued
+from support.equivalence.scenario import Action, Scenario
+from support.ros1 import PYTHON, Master, Peer, Process, until, wait_until
+from support.ros1_cpp import node_command
+
+_RUNNING = ("running", "waiting for the first message")
+_SPIN_S = 0.002
+_DIAGNOSTICS = "/diagnostics"
+
+
+class Ros1Surroundings:
+    """A node on a master of its own, and a peer on rospy that has everything that it talks to.
+
+    Args:
+        supervisor: What the node was generated from.
+        node: Name of the node.
+        command: Starts it.
+        folder: For files and output.
+        python_path: Where its modules lie, if it is in Python.
+    """
+
+    def __init__(
+        self, supervisor: Supervisor, node: str, command: Sequence[str], folder: Path, python_path: str = ""
+    ) -> None:
+        self._supervisor = supervisor
+        self._topics = topics(supervisor.model)
+        self._name = node
+        self._command = command
+        self._folder = folder
+        self._python_path = python_path
+        self._stack = ExitStack()
+        self._servers: dict[str, str] = {}
+        # How much of what the peer was sent is taken, by kind and name.
+        self._taken: dict[tuple[str, str], int] = {}
+
+    def start(self, scenario: Scenario, folder: Path) -> None:
+        """Start node and surroundings."""
+        self._master = self._stack.enter_context(Master(self._folder))
+        for name, value in node_parameters(scenario, folder).items():
+            self._master.set_parameter(f"/{self._name}/{name}", value)
+        self._peer = self._stack.enter_context(Peer(self._master, self._folder))
+        for topic in self._topics:
+            if topic.received:
+                self._peer.advertise(topic.identifier, _type(topic))
+            if topic.published:
+                self._peer.subscribe(topic.identifier, _type(topic))
+        self._peer.subscribe(_DIAGNOSTICS, "diagnostic_msgs/DiagnosticArray")
+        self._serve()
+        variables = {**self._master.variables, "PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": self._python_path}
+        self._node = self._stack.enter_context(Process(self._command, variables, self._folder / "run"))
+        until(self._is_running, "the node to run", self._node)
+        until(self._is_connected, "the connections", self._node)
+
+    def _serve(self) -> None:
+        """Offer every service and action, as `ros1_peer` has them."""
+        linked = {item.name: item for item in describe(self._supervisor).communications}
+        for item in servers(self._supervisor.model):
+            name = re.sub("^~/", f"/{self._name}/", item.identifier)
+            self._servers[item.name] = name
+            type_name = f"{linked[item.name].package}/{linked[item.name].interface}"
+            if item.kind is CommunicationKind.SERVICE:
+                self._peer.serve(name, type_name)
+            else:
+                self._peer.act(name, type_name.removesuffix("Action"))
+
+    def _is_running(self) -> bool:
+        reports = self._peer.values(_DIAGNOSTICS)
+        return any(status["message"].startswith(_RUNNING) for report in reports for status in report["status"])
+
+    def _is_connected(self) -> bool:
+        """Each end says whom it sends to: what is sent now arrives."""
+        found = self._connections()
+        return all(
+            (not topic.received or f"/{self._name}" in self._peer.ends(topic.identifier))
+            and (not topic.published or topic.identifier in found)
+            for topic in self._topics
+        )
+
+    def _connections(self) -> set[str]:
+        """The topics on which the node has somebody to send to, as it says itself."""
+        with xmlrpc.client.ServerProxy(self._master.variables["ROS_MASTER_URI"]) as master:
+            uri: Any = _answer(master.lookupNode("/test", f"/{self._name}"))
+        with xmlrpc.client.ServerProxy(uri) as node:
+            # Of each: number, the other end, direction, transport, topic.
+            return {item[4] for item in _answer(node.getBusInfo("/test")) if item[2] == "o"}
+
+    def send(self, topic: str, data: Any) -> None:
+        """Publish."""
+        found = next(item for item in self._topics if item.identifier == topic)
+        self._peer.publish(topic, _type(found), **_fields(data))
+
+    def answer(self, action: Action) -> None:
+        """Let a server do it."""
+        name = self._servers[action.subject]
+        match action.do:
+            case "reply":
+                self._peer.do("answer", name=name, message=_fields(action.data))
+            case "feedback":
+                self._peer.do("feedback", name=name, message=_fields(action.data))
+            case "end" if action.how != "cancelled":
+                self._peer.do("end", name=name, how=action.how, message=_fields(action.data))
+            case "accept" | "end":
+                # What the peer does by itself, as soon as the goal or its cancel comes.
+                pass
+            case _:
+                raise ValueError(action.do)
+
+    def take_issued(self) -> list[Issued]:
+        """What came since the last time."""
+        peer = self._peer
+        found: list[Issued] = []
+        for topic in self._topics:
+            if topic.published:
+                values = self._new("publish", topic.identifier, peer.values(topic.identifier))
+                found += [("publish", topic.identifier, given(topic.interface, value)) for value in values]
+        for name, on_ros in self._servers.items():
+            found += [
+                ("call", name, set_parts(item)) for item in self._new("call", name, peer.requests.get(on_ros, []))
+            ]
+            found += [("goal", name, set_parts(item)) for item in self._new("goal", name, peer.goals.get(on_ros, []))]
+            cancels = [None] * peer.cancels.get(on_ros, 0)
+            found += [("cancel", name, {}) for _ in self._new("cancel", name, cancels)]
+        return found
+
+    def _new(self, kind: str, name: str, values: Sequence[Any]) -> Sequence[Any]:
+        before = self._taken.get((kind, name), 0)
+        self._taken[kind, name] = len(values)
+        return values[before:]
+
+    def settle(self) -> None:
+        """Nothing: what does not show is the acceptance of a goal, and actionlib takes what follows without it, too."""
+
+    def spin(self) -> None:
+        """For a moment: the peer is a process of its own."""
+        time.sleep(_SPIN_S)
+        assert self._node.is_running, self._node.stderr
+
+    def stop(self) -> None:
+        """By a signal."""
+        self._node.signal(signal.SIGTERM)
+        assert self._node.wait() == 0, self._node.stderr
+        published = [topic.identifier for topic in self._topics if topic.published]
+        wait_until(lambda: not any(map(self._peer.ends, published)), "the end of the connections", LIMIT_S)
+
+    def close(self) -> None:
+        """End it all."""
+        self._stack.close()
+
+
+def _answer(found: Any) -> Any:
+    """The value that a master or a node answers with."""
+    code, words, value = found
+    assert code == 1, words
+    return value
+
+
+def _type(topic: Topic) -> str:
+    return f"{topic.interface.package}/{topic.interface.type}"
+
+
+def _fields(data: Any) -> dict[str, Any]:
+    """Plain data as fields of a message: a value of a basic type is that of the one field of a message for it."""
+    if data is None:
+        return {}
+    return data if isinstance(data, dict) else {"data": data}
+
+
+def ros1_target(supervisor: Supervisor, folder: Path) -> NodeTarget:
+    """The target `ros1`: the node run from the generated package as it is."""
+    files = generate(supervisor, "ros1")
+    package = folder / "package"
+    write_files(files, package)
+    name = next(path.partition("/")[0] for path in files if path.endswith("/node.py"))
+    surroundings = Ros1Surroundings(supervisor, name, [PYTHON, "-m", f"{name}.node"], folder, str(package))
+    return NodeTarget("ros1", supervisor.model, surroundings, folder / "events")
+
+
+def ros1_cpp_target(supervisor: Supervisor, workspace: Path, folder: Path) -> NodeTarget:
+    """The target `ros1-cpp`: the node of a workspace in which its package was built."""
+    command = node_command(workspace)
+    name = Path(command[0]).parent.name
+    surroundings = Ros1Surroundings(supervisor, name, command, folder)
+    return NodeTarget("ros1-cpp", supervisor.model, surroundings, folder / "events", IN_CPP)

@@ -5,6 +5,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from robosc.targets import available_targets
+
 SOURCE = Path(__file__).parents[2] / "robosc"
 
 _LOOKS_LIKE_A_CODE = re.compile(r"[a-z0-9]+(-[a-z0-9]+)+")
@@ -12,9 +14,12 @@ _LOOKS_LIKE_A_CODE = re.compile(r"[a-z0-9]+(-[a-z0-9]+)+")
 _IS_ONE_WORD = re.compile(r"[a-z0-9]+")
 
 NO_CODES = frozenset(
-    {"utf-8", "utf-8-sig", "robosc-supervisor", "explain-synthesis", "only-uncontrollable", "unreachable-state"}
+    {
+        *("utf-8", "utf-8-sig", "robosc-supervisor", "explain-synthesis", "only-uncontrollable", "unreachable-state"),
+        *(info.name for info in available_targets()),
+    }
 )
-"""Texts of the source that look like codes and are none, a command and its remarks about a supervisor among them."""
+"""Texts of the source that look like codes and are none: a command, its remarks about supervisors, names of targets."""
 
 # The pages themselves, and the models that a new robot begins with.
 _ELSEWHERE = ("explain", "starter")

@@ -260,7 +260,7 @@ def test_what_ros_cannot_name_others_can(tmp_path: Path) -> None:
         (2, ["generate", LINE_FOLLOWER, "--target", "ros", "-o", "x"], "unknown target 'ros'"),
         (
             1,
-            ["generate", NAVIGATION, "--target", "ros2", "--deployment", "layer", "-o", "x"],
+            ["generate", NAVIGATION, "--target", "ros2-cpp", "--deployment", "layer", "-o", "x"],
             "was made for the deployment 'layer'",
         ),
     ],

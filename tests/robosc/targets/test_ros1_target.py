@@ -110,7 +110,7 @@ def test_the_readme_names_every_topic_server_and_parameter(files: GeneratedFiles
         assert (f"| `{parameter.name}` |" in readme) == (parameter.name != USE_SIM_TIME)
     readme = generate(example_supervisor(NAVIGATION), "ros1")["README.md"]
     assert "| `/calibrate` | `std_srvs/Trigger` | service | calibrate |" in readme
-    assert "| `/navigate_to_pose` | `nav2_msgs/NavigateToPose` | action | navigate |" in readme
+    assert "| `/navigate_to_pose` | `robosc_example_interfaces/NavigateToPose` | action | navigate |" in readme
     for word in ("rclpy", "colcon", "ros2", "/msg/", "ROS 2"):
         assert word not in readme
 

@@ -101,7 +101,7 @@ def test_the_readme_names_every_topic_and_says_how_far_it_was_tested(target: str
     assert "needs" in text
     services = generate(example_supervisor(NAVIGATION), target)["README.md"]
     assert "| `/calibrate` | `std_srvs/" in services
-    assert "| `/navigate_to_pose` | `nav2_msgs/" in services
+    assert "| `/navigate_to_pose` | `robosc_example_interfaces/" in services
 
 
 def test_the_launch_files_start_the_node_with_its_parameters(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import copy
 import math
 from array import array
+from collections.abc import Iterable
 from typing import Any
 
 BIN_COUNT = 360
@@ -73,3 +74,30 @@ class Resampler:
             # A shallow one: whatever is resampled is replaced, not changed.
             self._seen, self._copy = scan, self.resample(copy.copy(scan))
         return self._copy
+
+
+def resampling(system: Any, topics: Iterable[Any]) -> Any:
+    """A controlled system that sees every laser scan with 360 ranges; the scans themselves stay as they are.
+
+    Args:
+        system: It is changed.
+        topics: The topics of the node.
+    """
+    resamplers = {
+        topic.identifier: (Resampler(), topic.received)
+        for topic in topics
+        if topic.received and (topic.package, topic.type) == ("sensor_msgs", "LaserScan")
+    }
+    by_event = {f"{name}.response": resampler for resampler, names in resamplers.values() for name in names}
+    read, receive = system.read, system.receive
+
+    def read_resampled(event: str, data: Any) -> Any:
+        resampler = by_event.get(event)
+        return read(event, data if resampler is None or data is None else resampler.resampled(data))
+
+    def receive_resampled(identifier: str, data: Any) -> Any:
+        resampler, _ = resamplers.get(identifier, (None, ()))
+        return receive(identifier, data if resampler is None or data is None else resampler.resampled(data))
+
+    system.read, system.receive = read_resampled, receive_resampled
+    return system

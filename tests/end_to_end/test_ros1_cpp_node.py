@@ -1,5 +1,6 @@
 """The generated ROS 1 node in C++ as a process of its own on a real master, with peers on rospy."""
 
+import contextlib
 import json
 import os
 import signal
@@ -162,6 +163,28 @@ def test_rosnode_kill_stops_the_robot_first(start: Start, peer: Peer, master: Ma
     assert done.returncode == 0, done.stderr
     assert node.wait() == 0
     until(lambda: robot.speed == 0.0, "a zero")
+
+
+def test_without_its_master_the_robot_is_stopped(workspace: Path, tmp_path: Path) -> None:
+    # It has ended, it hangs, or another has taken its place: side by side, for it takes seconds to notice.
+    lost: list[tuple[Process, Robot]] = []
+    with contextlib.ExitStack() as stack:
+        for what in ("dead", "hung", "new"):
+            folder = tmp_path / what
+            master = stack.enter_context(Master(folder))
+            robot = Robot(stack.enter_context(Peer(master, folder)))
+            command = node_command(workspace, "period:=0.5")
+            node = stack.enter_context(Process(command, master.variables, folder / "node"))
+            robot.drive()
+            master.signal(signal.SIGSTOP if what == "hung" else signal.SIGKILL)
+            if what == "new":
+                master.wait()
+                stack.enter_context(master.another(folder / "another"))
+            lost.append((node, robot))
+        for node, robot in lost:
+            assert node.wait() == 1
+            until(lambda robot=robot: robot.speed == 0.0, "a zero")  # type: ignore[misc]
+            assert node.stderr == f"{PACKAGE}: the ROS master is lost\n"
 
 
 def test_a_fault_stops_the_robot_and_is_told_at_the_end(start: Start, peer: Peer) -> None:

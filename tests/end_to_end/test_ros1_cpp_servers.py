@@ -226,3 +226,38 @@ def test_a_server_that_vanishes_is_an_error(workspace: Path, tmp_path: Path) -> 
             carrier.until("carry.error")
             carrier.node.signal(signal.SIGTERM)
             assert carrier.node.wait() == 0
+
+
+def test_a_cancel_that_is_ignored_is_a_fault(carrier: Carrier) -> None:
+    carrier.peer.tell("service", "/calibrate", "std_srvs/Trigger")
+    carrier.peer.tell("action", "/move_base", "move_base_msgs/MoveBase", data="cancel")
+    carrier.start()
+    carrier.calibrate()
+    carrier.drive()
+    carrier.peer.tell("accept", "/move_base")
+    carrier.peer.tell("feedback", "/move_base", data={})
+    carrier.until("carry.feedback")
+    carrier.until("carry.cancel", repeat=lambda: carrier.scan(0.2))
+    assert carrier.node.wait() == 1
+    assert carrier.node.stderr.splitlines()[-1] == "carrier_controller: the cancel of a running goal was refused"
+    assert carrier.peer.of("cancel", "/move_base")
+
+
+def test_a_goal_that_nothing_is_heard_of_is_an_error(carrier: Carrier) -> None:
+    carrier.peer.tell("service", "/calibrate", "std_srvs/Trigger")
+    carrier.peer.tell("action", "/move_base", "move_base_msgs/MoveBase", data="goal")
+    carrier.start()
+    carrier.calibrate()
+    carrier.until("carry.request", repeat=lambda: carrier.say("go"))
+    until(lambda: bool(carrier.peer.of("goal", "/move_base")), "a goal")
+    carrier.until("carry.error")
+
+
+def test_calls_that_never_end_do_not_keep_others_from_being_made(carrier: Carrier) -> None:
+    carrier.peer.tell("service", "/calibrate", "std_srvs/Trigger")
+    carrier.peer.tell("action", "/move_base", "move_base_msgs/MoveBase")
+    carrier.start("service_timeout:=0.01")
+    # More than may wait, and more than threads of one service may be.
+    until(lambda: len(carrier.peer.of("called", "/calibrate")) > 40, "another call")
+    carrier.node.signal(signal.SIGTERM)
+    assert carrier.node.wait() == 0

@@ -166,8 +166,13 @@ class Master(Process):
             ROS_HOME=str(folder / "home"),
             ROS_LOG_DIR=str(folder / "log"),
         )
-        super().__init__(["/usr/bin/rosmaster", "--core", "-p", str(self.port)], self.variables, folder / "master")
+        self._command = ["/usr/bin/rosmaster", "--core", "-p", str(self.port)]
+        super().__init__(self._command, self.variables, folder / "master")
         until(self._is_up, "the master")
+
+    def another(self, folder: Path) -> Process:
+        """One in its place that knows nobody; it has ended."""
+        return Process(self._command, self.variables, folder)
 
     def _is_up(self) -> bool:
         assert self.is_running, self.stderr

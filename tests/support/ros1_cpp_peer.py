@@ -68,12 +68,16 @@ class Service:
 
 
 class Action:
-    """Tells what comes; goals are accepted, rejected and ended as told."""
+    """Tells what comes; goals are accepted, rejected and ended as told. It may ignore them, or cancels."""
 
-    def __init__(self, name: str, kind: str) -> None:
+    def __init__(self, name: str, kind: str, unheard: str | None) -> None:
         self._name = name
         self.kind = kind
         self.server = ActionServer(name, type_of(kind + "Action", "msg"), self._take, self._cancel, auto_start=False)
+        if unheard == "goal":
+            self.server.internal_goal_callback = lambda goal: tell(kind="goal", name=name)
+        elif unheard == "cancel":
+            self.server.internal_cancel_callback = lambda goal: tell(kind="cancel", name=name)
         self.server.start()
 
     def _take(self, goal: Any) -> None:
@@ -106,7 +110,7 @@ def obey(order: dict[str, Any]) -> None:
     elif what == "end service":
         services.pop(name).server.shutdown("told to")
     elif what == "action":
-        actions[name] = Action(name, order["type"])
+        actions[name] = Action(name, order["type"], order["data"])
     elif what == "accept":
         goals[name].set_accepted()
     elif what == "reject":

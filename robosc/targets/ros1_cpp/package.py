@@ -26,7 +26,7 @@ _MIDDLEWARE = Middleware(
     target="ros1-cpp",
     include=lambda kind, type_: f"{type_.package}/{_ended(kind, type_)}.h",
     type_name=lambda kind, type_: f"::{type_.package}::{_ended(kind, type_)}",
-    runtime=("ros1.hpp", "ros1_actions.hpp"),
+    runtime=("ros1.hpp", "ros1_actions.hpp", "ros1_master.hpp"),
     module="robosc.targets.ros1_cpp",
     templates={
         "CMakeLists.txt": "CMakeLists.txt.j2",

@@ -130,8 +130,8 @@ inline void obey(const std::string& line)
     }
 }
 
-// Handle one line, waiting for it for so long.
-inline void step(int timeout_ms)
+// Handle one line, waiting for it for so long: whether there was one.
+inline bool step(int timeout_ms)
 {
     World& here = world();
     std::size_t end = here.input.find('\n');
@@ -154,13 +154,14 @@ inline void step(int timeout_ms)
         if (line.compare(0, 5, "wait ") == 0 && here.done[line.substr(5)]-- <= 0) {
             here.done[line.substr(5)] = 0;
             poll(nullptr, 0, timeout_ms < 5 ? timeout_ms : 5);
-            return;
+            return false;
         }
         here.input.erase(0, end + 1);
         if (line.compare(0, 5, "wait ") != 0) {
             obey(line);
         }
     }
+    return end != std::string::npos;
 }
 
 inline void print(const std::string& what, const std::string& name, const std::string& yaml)

@@ -171,6 +171,8 @@ public:
             }
             return;
         }
+        /* What was heard of calls and goals came earlier. */
+        advance();
         take_in(take);
         tell_reasons();
     }

@@ -2,6 +2,7 @@
 
 #pragma once
 
+#include <cstdint>
 #include <iostream>
 #include <string>
 
@@ -9,6 +10,9 @@
 #include "signals.hpp"
 
 namespace robosc {
+
+/* For so long, at most, what has come is taken in before anything is decided. */
+constexpr std::uint64_t DRAIN_US = 50000;
 
 inline void complain(const std::string& text)
 {
@@ -19,8 +23,9 @@ inline void complain(const std::string& text)
     std::cerr << model::PACKAGE << ": " << line << std::endl;
 }
 
-/* Run until a signal, a fault or `is_over`, then stop the robot: the exit status. `spin` handles what comes, for at
-   most so many microseconds; `deliver` gives what was sent last time to arrive. */
+/* Run until a signal, a fault or `is_over`, then stop the robot: the exit status. `spin` waits at most so many
+   microseconds for the first that comes, and handles all that is there by then: nothing is decided on less. `is_over`
+   throws where the end is a fault. `deliver` gives what was sent last time to arrive. */
 template <class Spin, class IsOver, class Deliver>
 int run(Controller& controller, const Spin& spin, const IsOver& is_over, const Deliver& deliver)
 {

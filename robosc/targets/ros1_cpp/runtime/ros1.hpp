@@ -5,6 +5,7 @@
 #include <atomic>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <sstream>
 #include <string>
 #include <thread>
@@ -12,8 +13,10 @@
 #include <vector>
 
 #include <ros/callback_queue.h>
+#include <ros/connection.h>
 #include <ros/ros.h>
 #include <ros/service_manager.h>
+#include <ros/service_server_link.h>
 #include <ros/xmlrpc_manager.h>
 
 #include "controller.hpp"
@@ -21,8 +24,10 @@
 
 namespace robosc {
 
-/* Calls of one service that may wait for their reply in a thread of their own. */
-constexpr int MAXIMUM_PENDING = 16;
+/* Calls of one service whose reply is still listened for, so that a late one is noticed. */
+constexpr std::size_t MAXIMUM_PENDING = 16;
+/* Threads of one service; one that is connecting cannot be ended before its connection has failed. */
+constexpr std::size_t MAXIMUM_THREADS = 2 * MAXIMUM_PENDING;
 
 /* Wakes the node's thread. */
 class Wake : public ros::CallbackInterface {
@@ -54,6 +59,58 @@ inline std::pair<ros::NodeHandle, std::string> place(const std::shared_ptr<Share
 }
 
 #if ROBOT_SERVICE_COUNT > 0
+/* The calls of one service that wait. Of calls that never end, only so many are kept. */
+class Pending {
+public:
+    /* There is a call more, for which the oldest may be given up; false if too many threads have not ended. */
+    bool begin(std::uint32_t id)
+    {
+        ros::ServiceServerLinkPtr oldest;
+        {
+            const std::lock_guard<std::mutex> lock(mutex_);
+            if (threads_ >= MAXIMUM_THREADS) {
+                return false;
+            }
+            if (links_.size() >= MAXIMUM_PENDING) {
+                oldest = links_.begin()->second;
+                links_.erase(links_.begin());
+            }
+            links_[id] = nullptr;
+            threads_++;
+        }
+        if (oldest) {
+            /* Its call ends without a reply. */
+            oldest->getConnection()->drop(ros::Connection::Destructing);
+        }
+        return true;
+    }
+
+    /* Whether it has not been given up before it was connected. */
+    bool connected(std::uint32_t id, const ros::ServiceServerLinkPtr& link)
+    {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        const auto found = links_.find(id);
+        if (found == links_.end()) {
+            return false;
+        }
+        found->second = link;
+        return true;
+    }
+
+    /* The thread of a call ends: whether it has not been given up. */
+    bool end(std::uint32_t id)
+    {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        threads_--;
+        return links_.erase(id) > 0;
+    }
+
+private:
+    std::mutex mutex_;
+    std::map<std::uint32_t, ros::ServiceServerLinkPtr> links_;
+    std::size_t threads_ = 0;
+};
+
 /* The calls of one service. roscpp's call waits for the reply: each has a thread of its own. */
 template <class Service>
 class ServiceCalls {
@@ -81,16 +138,15 @@ public:
 
     void call(std::uint32_t id, const Request& request)
     {
-        if (*pending_ >= MAXIMUM_PENDING) {
+        if (!pending_->begin(id)) {
             fail(*shared_, id);
             return;
         }
-        ++*pending_;
         ++shared_->calls;
         try {
             std::thread(work, shared_, pending_, name_, answer_, id, request).detach();
         } catch (const std::system_error&) {
-            --*pending_;
+            pending_->end(id);
             --shared_->calls;
             fail(*shared_, id);
         }
@@ -102,29 +158,46 @@ private:
         shared.report([id](robot_t* robot, std::uint64_t now, Notes&) { robot_call_failed(robot, now, id); });
     }
 
-    static void work(std::shared_ptr<Shared> shared, std::shared_ptr<std::atomic<int>> pending, std::string name,
-        Answer answer, std::uint32_t id, Request request)
+    /* Connect, call and wait; false if there is no reply. */
+    static bool asked(
+        Pending& pending, const std::string& name, std::uint32_t id, const Request& request, Response& response)
+    {
+        const std::string digest = ros::service_traits::md5sum<Service>();
+        const ros::ServiceServerLinkPtr link
+            = ros::ServiceManager::instance()->createServiceServerLink(name, false, digest, digest, {});
+        ros::SerializedMessage reply;
+        if (!link || !pending.connected(id, link)
+            || !link->call(ros::serialization::serializeMessage(request), reply)) {
+            return false;
+        }
+        ros::serialization::deserializeMessage(reply, response);
+        return true;
+    }
+
+    static void work(std::shared_ptr<Shared> shared, std::shared_ptr<Pending> pending, std::string name, Answer answer,
+        std::uint32_t id, Request request)
     {
         const auto response = std::make_shared<Response>();
         bool is_answered = false;
         try {
-            is_answered = ros::service::call(name, request, *response);
+            is_answered = asked(*pending, name, id, request, *response);
         } catch (const std::exception& failure) {
             ROS_WARN("the call of %s failed: %s", name.c_str(), failure.what());
         }
-        if (is_answered) {
+        if (!pending->end(id)) {
+            /* It was given up. */
+        } else if (is_answered) {
             shared->report([answer, id, response](robot_t* robot, std::uint64_t now, Notes& notes) {
                 answer(robot, now, id, *response, notes);
             });
         } else {
             fail(*shared, id);
         }
-        --*pending;
         --shared->calls;
     }
 
     std::shared_ptr<Shared> shared_;
-    std::shared_ptr<std::atomic<int>> pending_ = std::make_shared<std::atomic<int>>(0);
+    std::shared_ptr<Pending> pending_ = std::make_shared<Pending>();
     std::string name_;
     Answer answer_;
 };
@@ -216,6 +289,14 @@ inline bool found_master()
     return true;
 }
 
+/* End the process at once. */
+[[noreturn]] inline void leave(int status)
+{
+    std::cerr.flush();
+    std::cout.flush();
+    std::_Exit(status);
+}
+
 /* End roscpp; a call that nobody answers is not waited for. */
 inline void end_ros(const Shared& shared, int status)
 {
@@ -225,9 +306,7 @@ inline void end_ros(const Shared& shared, int status)
         std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
     if (shared.calls > 0) {
-        std::cerr.flush();
-        std::cout.flush();
-        std::_Exit(status);
+        leave(status);
     }
 }
 

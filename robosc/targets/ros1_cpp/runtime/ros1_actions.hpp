@@ -7,12 +7,19 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <actionlib/client/action_client.h>
+#include <actionlib_msgs/GoalStatusArray.h>
 
 #include "ros1.hpp"
 
 namespace robosc {
+
+/* A server that still reports a goal as running so long after its cancel does not mean to cancel it. */
+constexpr std::uint64_t REFUSAL_US = 1000000;
+/* A goal whose receipt, or whose result after its end, was not heard of for so long is lost. */
+constexpr std::uint64_t SILENCE_US = 5000000;
 
 template <class Action>
 class ActionGoals {
@@ -28,6 +35,11 @@ public:
         const auto [handle, rest] = place(shared_, name);
         name_ = handle.resolveName(rest);
         client_ = std::make_unique<actionlib::ActionClient<Action>>(handle, rest, &shared_->queue);
+        /* The client comes first: when a message counts as heard, it has told what it says of goals. */
+        ros::NodeHandle listener = handle;
+        const boost::function<void(const actionlib_msgs::GoalStatusArray::ConstPtr&)> hear
+            = [this](const actionlib_msgs::GoalStatusArray::ConstPtr&) { heard_us_ = now_us(); };
+        statuses_ = listener.subscribe<actionlib_msgs::GoalStatusArray>(rest + "/status", 100, hear);
     }
 
     const std::string& name() const { return name_; }
@@ -40,31 +52,43 @@ public:
             end(id);
             return;
         }
-        goals_[id].handle = client_->sendGoal(
+        Handle handle = client_->sendGoal(
             goal, [this, id](Handle handle) { changed(id, handle); },
             [this, id](Handle, const FeedbackConstPtr& feedback) { told(id, feedback); });
+        goals_[id] = Sent{handle, now_us()};
     }
 
+    /* Ask for the cancel of an accepted goal; there is no answer. Its end may be known here and wait to be told. */
     void cancel(std::uint32_t id)
     {
         const auto found = goals_.find(id);
         if (found != goals_.end()) {
+            found->second.is_cancelled = !has_heard_cancel(found->second.handle.getCommState());
+            found->second.cancelled_us = now_us();
             found->second.handle.cancel();
         }
     }
 
-    /* Notice a lost server, and one that is back. */
+    /* Notice a lost server, one that is back, goals that nothing is heard of, and cancels that are ignored. */
     void check(std::uint64_t now)
     {
         ended_.clear();
         if (goals_.empty()) {
             presence_.forget();
         } else if (presence_.is_lost(is_ready(), now)) {
-            for (auto& [id, goal] : goals_) {
-                end(id);
-                abandoned_.emplace(id, goal.handle);
+            while (!goals_.empty()) {
+                abandon(goals_.begin()->first);
             }
-            goals_.clear();
+        }
+        for (const std::uint32_t id : silent(now)) {
+            abandon(id);
+        }
+        for (auto& [id, goal] : goals_) {
+            /* Its server goes on to report, and has not taken notice of the cancel. */
+            if (goal.is_cancelled && heard_us_ >= goal.cancelled_us + REFUSAL_US) {
+                goal.is_cancelled = false;
+                refuse(id);
+            }
         }
         /* Nobody else would ever stop a lost goal that runs on. */
         if (!abandoned_.empty() && is_ready()) {
@@ -92,8 +116,42 @@ public:
 private:
     struct Sent {
         Handle handle;
+        /* When something was heard of it last. */
+        std::uint64_t since_us = 0;
         bool is_accepted = false;
+        /* Its cancel was asked for then, and not heard of. */
+        bool is_cancelled = false;
+        std::uint64_t cancelled_us = 0;
     };
+
+    static bool has_heard_cancel(const actionlib::CommState& state)
+    {
+        return state == actionlib::CommState::WAITING_FOR_RESULT || state == actionlib::CommState::RECALLING
+            || state == actionlib::CommState::PREEMPTING || state == actionlib::CommState::DONE;
+    }
+
+    /* The goals whose receipt or result nothing was heard of for too long. */
+    std::vector<std::uint32_t> silent(std::uint64_t now) const
+    {
+        std::vector<std::uint32_t> found;
+        for (const auto& [id, goal] : goals_) {
+            const actionlib::CommState state = goal.handle.getCommState();
+            if ((state == actionlib::CommState::WAITING_FOR_GOAL_ACK
+                    || state == actionlib::CommState::WAITING_FOR_RESULT)
+                && now >= goal.since_us + SILENCE_US) {
+                found.push_back(id);
+            }
+        }
+        return found;
+    }
+
+    /* Tell that a goal is lost; it may be running, or on its way, and it is not forgotten. */
+    void abandon(std::uint32_t id)
+    {
+        abandoned_.emplace(id, goals_.at(id).handle);
+        goals_.erase(id);
+        end(id);
+    }
 
     void changed(std::uint32_t id, Handle handle)
     {
@@ -105,6 +163,10 @@ private:
             return;
         }
         const actionlib::CommState state = handle.getCommState();
+        found->second.since_us = now_us();
+        if (has_heard_cancel(state)) {
+            found->second.is_cancelled = false;
+        }
         if (state == actionlib::CommState::DONE) {
             finish(id, handle);
             /* A handle must not be let go of in its own callback. */
@@ -152,6 +214,12 @@ private:
         }
     }
 
+    void refuse(std::uint32_t id)
+    {
+        shared_->report(
+            [id](robot_t* robot, std::uint64_t now, Notes&) { robot_cancel_refused(robot, now, id, false); });
+    }
+
     void end(std::uint32_t id)
     {
         shared_->report([id](robot_t* robot, std::uint64_t now, Notes&) { robot_goal_ended(robot, now, id); });
@@ -165,6 +233,8 @@ private:
     std::map<std::uint32_t, Sent> goals_;
     std::map<std::uint32_t, Handle> abandoned_;
     std::list<Handle> ended_;
+    ros::Subscriber statuses_;
+    std::uint64_t heard_us_ = 0;
     Presence presence_;
 };
 

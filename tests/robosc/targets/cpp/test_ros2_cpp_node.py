@@ -55,6 +55,23 @@ def numbers_of(yaml: str) -> list[float]:
     return sorted(number for number in numbers if number)
 
 
+def test_nothing_is_decided_before_all_that_has_come_is_taken_in(maze_node: Path, tmp_path: Path) -> None:
+    # They fit into a pipe at once, and by then a decision is due at every moment.
+    burst = ["message /scan " + " ".join(distance * 360) for distance in "3131"]
+    lines = [line for scan in burst for line in (scan, "message /rotate_done")]
+    lines = ["wait publish /state", *lines, "wait publish /state", "wait publish /state", END]
+    assert len("\n".join(lines)) < 4000
+    done = run(maze_node, lines, "period:=0.0001", "publish_state:=true", f"log_folder:={tmp_path}")
+    assert (done.returncode, done.stderr) == (0, "")
+    kinds = [
+        "request" if entry["controllable"] else "message" for entry in entries_of(tmp_path) if entry["kind"] == "event"
+    ]
+    first, last = kinds.index("message"), len(kinds) - kinds[::-1].index("message")
+    assert kinds[first:last] == ["message"] * (last - first)
+    assert last - first > len(burst)
+    assert "request" in kinds[last:]
+
+
 def test_the_other_way_of_comparing_can_fail(maze: Supervisor, maze_node: Path, tmp_path: Path) -> None:
     lines = [f"message /scan {' '.join(['3.0'] * 360)}", "message /rotate_done", END]
     run(maze_node, lines, *BY_EVENT, f"log_folder:={tmp_path}")

@@ -363,6 +363,13 @@ public:
         stand_in::step(static_cast<int>(whole.count()));
     }
 
+    void spin_all(std::chrono::nanoseconds max_duration)
+    {
+        const auto limit = std::chrono::steady_clock::now() + max_duration;
+        while (std::chrono::steady_clock::now() < limit && stand_in::step(0)) {
+        }
+    }
+
 private:
     std::shared_ptr<Node> node_;
 };

@@ -209,6 +209,34 @@ def test_layer_and_controller_end_together(porter: Porter) -> None:
     )
 
 
+@pytest.mark.parametrize("number", [signal.SIGQUIT, signal.SIGKILL])
+def test_a_starter_that_is_ended_in_another_way_leaves_nobody_driving(number: signal.Signals, porter: Porter) -> None:
+    porter.start_with_careless("server_wait:=0.0", "command_timeout:=0.0")
+    porter.allow(True)
+    porter.until(lambda: porter.speed == 0.3, "the robot to move")
+    porter.layer.signal(number)
+    porter.peer.spin_until(
+        lambda: porter.speed == 0.0 and "careless" not in porter.peer.node.get_node_names(), 30.0, "the end of both"
+    )
+
+
+def test_what_had_come_before_a_request_is_heeded_first(porter: Porter) -> None:
+    """The layer was busy elsewhere: the permission that it has not looked at is withdrawn already."""
+    porter.start("server_wait:=0.0", "command_timeout:=0.0")
+    porter.drive()
+    before = len(porter.commands)
+    porter.layer.signal(signal.SIGSTOP)
+    for _ in range(8):
+        porter.tell_allowed(True)
+    porter.tell_allowed(False)
+    porter.peer.spin_for(0.2)
+    porter.send(0.7)
+    porter.peer.spin_for(0.2)
+    porter.layer.signal(signal.SIGCONT)
+    porter.until(lambda: bool(porter.blocked), "the request to be held back")
+    assert 0.7 not in [command.linear.x for command in porter.commands[before:]]
+
+
 def test_a_controller_that_fails_ends_the_layer_and_the_robot_stands_still(porter: Porter) -> None:
     failing = f"""
 import os, sys, threading, time
@@ -260,6 +288,45 @@ def test_a_prefix_goes_before_both_sides(porter: Porter) -> None:
     text = (porter.folder / "printing" / "stdout.txt").read_text()
     assert "-r /robot1/cmd_vel:=/robot1/supervised/cmd_vel" in text
     assert "-r /robot1/count/_action/send_goal:=/robot1/supervised/count/_action/send_goal" in text
+
+
+@pytest.mark.parametrize("how", ["option", "argument", "file"])
+def test_wherever_the_prefix_is_from_the_controller_is_remapped_by_it(how: str, porter: Porter) -> None:
+    from geometry_msgs.msg import Twist
+
+    given = {"option": ["--topic-prefix", "/robot1"], "argument": ["--ros-args", "-p", "topic_prefix:=/robot1"]}
+    file = porter.folder / "own.yaml"
+    file.write_text("/**:\n  ros__parameters:\n    topic_prefix: /robot1\n")
+    arguments = given.get(how, ["--ros-args", "--params-file", str(file)])
+    porter.layer = porter.process(
+        [
+            *("-m", f"{PACKAGE}.start", *arguments, "--ros-args", "-p", "server_wait:=0.0"),
+            *("--controller", sys.executable, str(CARELESS), "--ros-args", "-r", "__ns:=/robot1"),
+        ],
+        "layer",
+    )
+    driven = porter.peer.receive(Twist, "/robot1/supervised/cmd_vel")
+    porter.until(lambda: bool(driven), "the controller to drive")
+
+    def publishers() -> list[str]:
+        return [end.node_name for end in porter.peer.node.get_publishers_info_by_topic("/robot1/cmd_vel")]
+
+    porter.until(lambda: PACKAGE in publishers(), "the layer")
+    assert publishers() == [PACKAGE]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "problem"),
+    [
+        (["--ros-args", "-p", "a:=1", "--", "--controller", "x"], "--controller stands behind '--'"),
+        (["--ros-args", "-p", "topic_prefix:=robot1"], "parameter 'topic_prefix' is 'robot1'"),
+        (["--ros-args", "-p", "topic_prefix:=1"], "parameter 'topic_prefix' is 1; it must be a string"),
+    ],
+)
+def test_what_would_part_layer_and_controller_is_refused(arguments: list[str], problem: str, porter: Porter) -> None:
+    process = porter.process(["-m", f"{PACKAGE}.start", *arguments, "--controller", "x"], "nothing")
+    assert process.wait() == 2
+    assert problem in process.stderr
 
 
 # Services.

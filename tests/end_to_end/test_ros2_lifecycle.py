@@ -50,7 +50,7 @@ robot Walker {
     component Lift {
         action lift with identifier: "/lift", request: none, response: none, feedback: none links lift
     }
-    requirement lift needs Base.halted and Motors.off
+    requirement lift needs Base.halted
     requirement walk needs Base.free and Motors.powered
     requirement power needs Motors.off
     provide walk with { linear: { x: 0.5 } }
@@ -76,7 +76,7 @@ class Stage:
     def until(self, condition: Callable[[], bool], what: str, repeat: Callable[[], object] = lambda: None) -> None:
         self.peer.spin_until(condition, LIMIT_S, what, self.node, repeat)
 
-    def _call(self, client: Any, request: Any) -> Any:
+    def call(self, client: Any, request: Any) -> Any:
         future = client.call_async(request)
         self.until(future.done, "an answer")
         return future.result()
@@ -87,13 +87,13 @@ class Stage:
         from lifecycle_msgs.srv import ChangeState
 
         number = getattr(Transition, f"TRANSITION_{transition.upper()}")
-        return bool(self._call(self._change, ChangeState.Request(transition=Transition(id=number))).success)
+        return bool(self.call(self._change, ChangeState.Request(transition=Transition(id=number))).success)
 
     @property
     def state(self) -> str:
         from lifecycle_msgs.srv import GetState
 
-        return str(self._call(self._get, GetState.Request()).current_state.label)
+        return str(self.call(self._get, GetState.Request()).current_state.label)
 
     @property
     def speed(self) -> float | None:
@@ -216,6 +216,76 @@ def test_shut_down_while_it_walks_it_stands(start: Callable[..., Stage]) -> None
     assert stage.change("active_shutdown")
     assert stage.node.wait() == 0
     stage.peer.spin_until(lambda: stage.speed == 0.0, LIMIT_S, "the last command")
+
+
+def test_what_came_while_it_was_deactivated_is_known(start: Callable[..., Stage]) -> None:
+    stage = start()
+    stage.walks()
+    assert stage.change("deactivate")
+    for _ in range(3):
+        stage.halt()
+        stage.peer.spin_for(0.1)
+    stage.commands.clear()
+    assert stage.change("activate")
+    stage.peer.spin_for(0.5)
+    assert not [command for command in stage.commands if command.linear.x]
+
+
+def test_a_goal_that_is_accepted_after_the_cleanup_is_cancelled(start: Callable[..., Stage]) -> None:
+    from rclpy.action import ActionServer, CancelResponse, GoalResponse
+    from rclpy.callback_groups import ReentrantCallbackGroup
+    from rclpy.task import Future
+    from test_msgs.action import Fibonacci
+
+    stage = start()
+    accepted, cancelled, goals = Future(), Future(), []
+
+    async def take(goal: Any) -> Any:
+        goals.append(goal)
+        await accepted
+        return GoalResponse.ACCEPT
+
+    def cancel(goal: Any) -> Any:
+        cancelled.set_result(None)
+        return CancelResponse.ACCEPT
+
+    async def work(goal: Any) -> Any:
+        await cancelled
+        goal.canceled()
+        return Fibonacci.Result()
+
+    # Callbacks wait for the test, and others go on meanwhile.
+    group = ReentrantCallbackGroup()
+    server = ActionServer(
+        stage.peer.node, Fibonacci, "/lift", work, goal_callback=take, cancel_callback=cancel, callback_group=group
+    )
+    stage.walks()
+    stage.until(lambda: bool(goals), "the goal", stage.halt)
+    assert stage.change("deactivate") and stage.change("cleanup")
+    assert not cancelled.done()
+    accepted.set_result(None)
+    stage.until(cancelled.done, "the cancel")
+    server.destroy()
+
+
+def test_parameters_are_set_before_it_is_configured(start: Callable[..., Stage]) -> None:
+    from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+    from rcl_interfaces.srv import SetParameters
+
+    stage = start("autostart:=false", "policy:=best")
+    client = stage.peer.node.create_client(SetParameters, f"/{PACKAGE}/set_parameters")
+    stage.until(client.service_is_ready, "the node's parameters")
+
+    def set_policy(policy: str) -> bool:
+        value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=policy)
+        request = SetParameters.Request(parameters=[Parameter(name="policy", value=value)])
+        return bool(stage.call(client, request).results[0].successful)
+
+    assert not stage.change("configure")
+    assert set_policy("fair")
+    assert stage.change("configure") and stage.change("activate")
+    stage.walks()
+    assert not set_policy("random")
 
 
 def test_a_fault_leaves_a_managed_node_at_rest_until_it_is_activated_anew(start: Callable[..., Stage]) -> None:

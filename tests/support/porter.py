@@ -153,14 +153,17 @@ class Porter:
             return None
         return str(json.loads(self._states[-1].data)["current"][component]["variables"][name])
 
-    def allow(self, is_allowed: bool) -> None:
+    def tell_allowed(self, is_allowed: bool) -> None:
         from std_msgs.msg import Bool
 
+        self.peer.publish(Bool(data=is_allowed), "/allowed")
+
+    def allow(self, is_allowed: bool) -> None:
         state = "granted" if is_allowed else "denied"
         self.until(
             lambda: self.state("Permission") == state,
             f"the permission {state}",
-            lambda: self.peer.publish(Bool(data=is_allowed), "/allowed"),
+            lambda: self.tell_allowed(is_allowed),
         )
 
     def blocks(self, identifier: str, count: int = 1) -> None:

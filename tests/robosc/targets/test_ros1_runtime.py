@@ -336,6 +336,14 @@ def test_a_running_goal_may_take_as_long_as_it_likes(goals: Goals) -> None:
     assert goals.passes(10 * SILENCE_S) == []
 
 
+def test_a_cancel_while_only_the_result_is_awaited_is_not_refused(goals: Goals) -> None:
+    goals.changes(ACTIVE, ACTIVE_STATUS)
+    goals.changes(WAITING_FOR_RESULT, SUCCEEDED)
+    goals.goals.cancel(1)
+    assert goals.passes(2 * REFUSAL_S) == []
+    assert goals.handles[0].cancels == 1
+
+
 def test_a_cancel_that_a_living_server_ignores_is_refused_once(goals: Goals) -> None:
     goals.changes(ACTIVE, ACTIVE_STATUS)
     goals.goals.cancel(1)

@@ -141,7 +141,8 @@ class ActionGoals:
         goal = self._goals.get(goal_id)
         # Its end may be known here and wait to be told.
         if goal is not None:
-            goal.cancelled_s = self._monotonic()
+            # Where its end is known and only the result awaited, no notice of the cancel will be taken.
+            goal.cancelled_s = None if goal.state in _CANCEL_HEARD else self._monotonic()
             goal.handle.cancel()
 
     def check(self, now_s: float) -> None:

@@ -12,11 +12,11 @@ from typing import Any
 import pytest
 
 from support.models import EXAMPLES
+from support.process import Process
 from support.ros1_cpp import (
     LIMIT_S,
     Master,
     Peer,
-    Process,
     built_once,
     missing,
     node_command,

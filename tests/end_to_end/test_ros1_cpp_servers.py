@@ -8,7 +8,8 @@ import pytest
 
 from robosc.supervisor.structure import Supervisor
 from support.node_logs import Entry, entries_of
-from support.ros1_cpp import Master, Peer, Process, built_once, missing, node_command, supervisor_of, until
+from support.process import Process
+from support.ros1_cpp import Master, Peer, built_once, missing, node_command, supervisor_of, until
 
 pytestmark = [
     pytest.mark.skipif(missing() is not None, reason=str(missing())),

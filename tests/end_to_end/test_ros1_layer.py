@@ -24,7 +24,8 @@ from support.porter_ros1 import (
     porter_robot,
     porter_supervisor,
 )
-from support.ros1 import PYTHON, Process, missing, until, wait_until
+from support.process import Process
+from support.ros1 import PYTHON, missing, until, wait_until
 
 pytestmark = [
     pytest.mark.ros1,

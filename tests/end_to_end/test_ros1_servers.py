@@ -12,7 +12,8 @@ import pytest
 from robosc.language import load_bundle
 from robosc.supervisor import make_supervisor
 from robosc.targets import generate, write_files
-from support.ros1 import Master, Peer, Process, missing, start_node, until, wait_until
+from support.process import Process
+from support.ros1 import Master, Peer, missing, start_node, until, wait_until
 
 pytestmark = [
     pytest.mark.ros1,

@@ -11,15 +11,15 @@ import subprocess
 import threading
 import time
 import xmlrpc.client
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
+
+from support.process import EXIT_LIMIT_S, Process
 
 PYTHON = "/usr/bin/python3"
 LIMIT_S = 20.0
-EXIT_LIMIT_S = 15.0
 REPEAT_S = 0.1
 
 _MODULES = (
@@ -60,68 +60,6 @@ def wait_until(condition: Callable[[], bool], what: str, limit_s: float = LIMIT_
     while not condition():
         assert time.monotonic() < deadline, f"waited {limit_s} s in vain for {what}"
         time.sleep(0.01)
-
-
-class Process:
-    """A program in an environment of ROS 1; ended at the latest when the `with` block ends.
-
-    Args:
-        command: What to run.
-        variables: Its environment.
-        folder: Folder for its output.
-    """
-
-    def __init__(self, command: Sequence[str], variables: Mapping[str, str], folder: Path) -> None:
-        folder.mkdir(parents=True, exist_ok=True)
-        self._error_file = folder / "stderr.txt"
-        self._output_file = folder / "stdout.txt"
-        with self._error_file.open("wb") as error, self._output_file.open("wb") as output:
-            self.popen = subprocess.Popen(
-                command,
-                env=dict(variables),
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=error,
-                cwd=folder,
-                start_new_session=True,
-            )
-
-    @property
-    def stderr(self) -> str:
-        """What it has written to standard error so far."""
-        return self._error_file.read_text(errors="replace")
-
-    @property
-    def stdout(self) -> str:
-        """What it has written to standard output so far."""
-        return self._output_file.read_text(errors="replace")
-
-    @property
-    def is_running(self) -> bool:
-        """Whether it has not ended."""
-        return self.popen.poll() is None
-
-    def signal(self, number: signal.Signals) -> None:
-        """Send a signal."""
-        self.popen.send_signal(number)
-
-    def wait(self, limit_s: float = EXIT_LIMIT_S) -> int:
-        """Its exit status, waiting for its end."""
-        try:
-            return self.popen.wait(limit_s)
-        except subprocess.TimeoutExpired:
-            raise AssertionError(f"the process did not end within {limit_s} s\n{self.stderr}") from None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        # Its children, too: it leads a session of its own.
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(self.popen.pid, signal.SIGKILL)
-        self.popen.wait()
 
 
 class Master:

@@ -5,6 +5,7 @@ Run by Debian's Python. It says on standard output what it was told, one JSON do
 
 import json
 import threading
+import time
 from typing import Any
 
 import rospy
@@ -16,6 +17,8 @@ from std_srvs.srv import SetBool
 
 PERIOD_S = 0.02
 SPEED = 0.3
+TIMES = 30
+PAUSE_S = 0.2
 
 _writing = threading.Lock()
 
@@ -26,20 +29,24 @@ def tell(what: str, data: Any) -> None:
 
 
 def ask() -> None:
-    rospy.wait_for_service("/power")
-    tell("reply", rospy.ServiceProxy("/power", SetBool)(True).success)
+    """Ask again and again: what is told of the first request may be lost, since connections are new then."""
     client = ActionClient("/count", TestAction)
+    power = rospy.ServiceProxy("/power", SetBool)
+    rospy.wait_for_service("/power")
     client.wait_for_server()
-    ended = threading.Event()
+    for _ in range(TIMES):
+        tell("reply", power(True).success)
+        ended = threading.Event()
 
-    def changed(handle: Any) -> None:
-        if handle.get_comm_state() == CommState.DONE:
-            tell("goal", handle.get_goal_status())
-            ended.set()
+        def changed(handle: Any, ended: threading.Event = ended) -> None:
+            if handle.get_comm_state() == CommState.DONE:
+                tell("goal", handle.get_goal_status())
+                ended.set()
 
-    handle = client.send_goal(TestGoal(goal=3), changed)
-    ended.wait()
-    del handle
+        handle = client.send_goal(TestGoal(goal=3), changed)
+        ended.wait()
+        del handle
+        time.sleep(PAUSE_S)
 
 
 def main() -> None:

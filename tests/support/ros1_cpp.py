@@ -4,14 +4,12 @@ import contextlib
 import json
 import os
 import shutil
-import signal
 import socket
 import subprocess
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import pytest
@@ -20,6 +18,7 @@ from robosc.language import load_bundle
 from robosc.supervisor import make_supervisor
 from robosc.supervisor.structure import Supervisor
 from robosc.targets import generate, write_files
+from support.process import Process
 from support.shared import shared
 
 LIMIT_S = 20.0
@@ -78,59 +77,6 @@ def built(supervisor: Supervisor, folder: Path, *options: str) -> Path:
 def built_once(supervisor: Supervisor, factory: pytest.TempPathFactory) -> Path:
     """The same for all tests of a run."""
     return shared(factory, f"ros1_cpp_{supervisor.model.name}", lambda folder: built(supervisor, folder))
-
-
-class Process:
-    """A program as a process of its own; killed at the latest when the `with` block ends.
-
-    Args:
-        command: What to run.
-        variables: Its environment.
-        folder: Folder for its output.
-    """
-
-    def __init__(self, command: Sequence[str], variables: Mapping[str, str], folder: Path) -> None:
-        folder.mkdir(parents=True, exist_ok=True)
-        self._files = {name: folder / f"{name}.txt" for name in ("stdout", "stderr")}
-        with self._files["stdout"].open("wb") as output, self._files["stderr"].open("wb") as error:
-            self._process = subprocess.Popen(
-                command, env=dict(variables), stdin=subprocess.DEVNULL, stdout=output, stderr=error, cwd=folder
-            )
-
-    @property
-    def stderr(self) -> str:
-        """What it has written to standard error so far."""
-        return self._files["stderr"].read_text(errors="replace")
-
-    @property
-    def stdout(self) -> str:
-        """What it has written to standard output so far."""
-        return self._files["stdout"].read_text(errors="replace")
-
-    @property
-    def is_running(self) -> bool:
-        """Whether it has not ended."""
-        return self._process.poll() is None
-
-    def signal(self, number: signal.Signals) -> None:
-        """Send a signal."""
-        self._process.send_signal(number)
-
-    def wait(self, limit_s: float = LIMIT_S) -> int:
-        """Its exit status, waiting for its end."""
-        try:
-            return self._process.wait(limit_s)
-        except subprocess.TimeoutExpired:
-            raise AssertionError(f"the process did not end within {limit_s} s\n{self.stderr}") from None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._process.kill()
-        self._process.wait()
 
 
 def until(condition: Callable[[], bool], what: str, repeat: Callable[[], object] = lambda: None) -> None:

@@ -4,7 +4,6 @@ import contextlib
 import fcntl
 import itertools
 import os
-import signal
 import subprocess
 import sys
 import tempfile
@@ -15,8 +14,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from support.process import Process
+
 DISCOVERY_LIMIT_S = 15.0
-EXIT_LIMIT_S = 15.0
 ORDERLY_END_S = 3.0
 
 LAST_DOMAIN = 101
@@ -80,8 +80,8 @@ def wait_until(condition: Callable[[], bool], limit_s: float, what: str, step_s:
         time.sleep(step_s)
 
 
-class RosProcess:
-    """A program on ROS 2, as a process of its own; ended at the latest when the `with` block ends.
+class RosProcess(Process):
+    """A program on ROS 2.
 
     Args:
         command: What to run, after the interpreter.
@@ -101,68 +101,17 @@ class RosProcess:
         stdin: int = subprocess.DEVNULL,
         program: str = sys.executable,
     ) -> None:
-        folder.mkdir(parents=True, exist_ok=True)
-        self._error_file = folder / "stderr.txt"
-        self._output_file = folder / "stdout.txt"
         path = os.pathsep.join([*map(str, python_path), os.environ.get("PYTHONPATH", "")]).rstrip(os.pathsep)
-        with self._error_file.open("wb") as error, self._output_file.open("wb") as output:
-            self._process = subprocess.Popen(
-                [program, *command],
-                env={**os.environ, **variables, "PYTHONPATH": path},
-                stdin=stdin,
-                stdout=output,
-                stderr=error,
-                cwd=folder,
-            )
-
-    @property
-    def stderr(self) -> str:
-        """What it has written to standard error so far."""
-        return self._error_file.read_text(errors="replace")
-
-    @property
-    def stdout(self) -> str:
-        """What it has written to standard output so far."""
-        return self._output_file.read_text(errors="replace")
-
-    @property
-    def is_running(self) -> bool:
-        """Whether it has not ended."""
-        return self._process.poll() is None
-
-    def resident_kb(self) -> int:
-        """Memory that it takes now."""
-        status = Path(f"/proc/{self._process.pid}/status").read_text()
-        return int(next(line.split()[1] for line in status.splitlines() if line.startswith("VmRSS:")))
-
-    def processor_s(self) -> float:
-        """Time of a processor that it has taken."""
-        fields = Path(f"/proc/{self._process.pid}/stat").read_text().rpartition(")")[2].split()
-        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-    def signal(self, number: signal.Signals) -> None:
-        """Send a signal."""
-        self._process.send_signal(number)
-
-    def wait(self, limit_s: float = EXIT_LIMIT_S) -> int:
-        """Its exit status, waiting for its end."""
-        try:
-            return self._process.wait(limit_s)
-        except subprocess.TimeoutExpired:
-            raise AssertionError(f"the process did not end within {limit_s} s\n{self.stderr}") from None
-
-    def __enter__(self) -> Self:
-        return self
+        super().__init__([program, *command], {**os.environ, **variables, "PYTHONPATH": path}, folder, stdin)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         # An orderly end leaves no shared memory behind; rclpy takes SIGTERM over, so only SIGKILL ends a hung node.
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.terminate()
-            self._process.wait(ORDERLY_END_S)
-        self._process.kill()
-        self._process.wait()
+            self.popen.terminate()
+            self.popen.wait(ORDERLY_END_S)
+        super().__exit__(kind, error, trace)
 
 
 class Peer:

@@ -17,7 +17,8 @@ from robosc.targets.ros.topics import Topic, servers, topics
 from support.equivalence.node_target import IN_CPP, LIMIT_S, NodeTarget, given, node_parameters, set_parts
 from support.equivalence.observation import Issued
 from support.equivalence.scenario import Action, Scenario
-from support.ros1 import PYTHON, Master, Peer, Process, until, wait_until
+from support.process import Process
+from support.ros1 import PYTHON, Master, Peer, until, wait_until
 from support.ros1_cpp import node_command
 
 _RUNNING = ("running", "waiting for the first message")

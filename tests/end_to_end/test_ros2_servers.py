@@ -308,7 +308,8 @@ def test_a_goal_that_somebody_else_cancels(courier: Courier) -> None:
     start_counting(courier, server)
     courier.until(lambda: server.cancels > 0, "the cancel", cancel)
     courier.reaches("Counter", "failed")
-    assert courier.reasons_of("count.error") == ["cancelled"]
+    # A goal that was asked for before the server was found may have ended earlier.
+    assert courier.reasons_of("count.error")[-1] == "cancelled"
 
 
 def test_a_missing_action_is_an_error_at_once(courier: Courier) -> None:

@@ -238,7 +238,7 @@ def test_a_goal_that_is_accepted_after_the_cleanup_is_cancelled(start: Callable[
     from test_msgs.action import Fibonacci
 
     stage = start()
-    accepted, cancelled, goals = Future(), Future(), []
+    accepted, cancelled, goals, ended = Future(), Future(), [], []
 
     async def take(goal: Any) -> Any:
         goals.append(goal)
@@ -252,6 +252,7 @@ def test_a_goal_that_is_accepted_after_the_cleanup_is_cancelled(start: Callable[
     async def work(goal: Any) -> Any:
         await cancelled
         goal.canceled()
+        ended.append(goal)
         return Fibonacci.Result()
 
     # Callbacks wait for the test, and others go on meanwhile.
@@ -265,6 +266,9 @@ def test_a_goal_that_is_accepted_after_the_cleanup_is_cancelled(start: Callable[
     assert not cancelled.done()
     accepted.set_result(None)
     stage.until(cancelled.done, "the cancel")
+    # What still waited for its turn would be told of by the next test.
+    stage.until(lambda: bool(ended), "the goal's end")
+    stage.peer.spin_for(0.1)
     server.destroy()
 
 

@@ -85,8 +85,7 @@ def test_a_careless_line_follower_stands_still_behind_its_layer(at: Stage) -> No
 
 
 def test_the_maze_solver_turns_left_at_a_wall_by_a_right_angle(at: Stage) -> None:
-    # As the launch file has it: nothing is requested before the first scan.
-    controller = at.controller("maze_solver", 'max_age:=["/scan=1.0"]')
+    controller = at.controller("maze_solver")
     rotator = at.helper("rotator", "speed_limit:=1.5")
     walls = [Wall(-2.0, -0.4, 2.0, -0.4), Wall(0.65, -0.4, 0.65, 3.0)]
     robot = at.robot = KinematicRobot(at.peer, World(walls))

@@ -28,11 +28,7 @@ def generate_launch_description() -> LaunchDescription:
                 package=CONTROLLER,
                 executable="controller",
                 output="screen",
-                # Nothing is requested before the first scan, or without scans: what is not measured counts as a wall.
-                parameters=[
-                    str(parameters),
-                    {"resample_scans": LaunchConfiguration("resample_scans"), "max_age": ["/scan=1.0"]},
-                ],
+                parameters=[str(parameters), {"resample_scans": LaunchConfiguration("resample_scans")}],
             ),
         ]
     )

@@ -326,6 +326,7 @@ class Robot:
 async def main():
     robot = Robot()
     robot.controller = AsyncController(Supervisor(), robot)
+    robot.controller.receive("/scan", {"ranges": [0.3] * 360})
     await robot.controller.run()
     print(robot.sent, [name for name in sys.modules if name.startswith("robosc")])
 
@@ -404,6 +405,7 @@ def test_the_text_of_a_controllers_file_says_how_it_is_used(tmp_path: Path) -> N
         _, code = code_of(package)
         names: dict[str, Any] = {"middleware": BothSides()}
         exec(code, names)
+        names["executor"].receive("/scan", {"ranges": [0.3] * 360})
         names["executor"].tick()
     assert [sent[:2] for sent in names["middleware"].sent] == [("publish", "rotate_left")]
 

@@ -76,6 +76,8 @@ def test_without_a_true_statement_the_middlewares_default_goes_out() -> None:
 
 def test_the_maze_solver_turns_and_waits() -> None:
     b = Bench(example_system("maze_solver/maze_solver"))
+    assert b.tick(3) == []
+    b.receive("/scan", {"ranges": [0.3] * 360})
     assert [sent[1] for sent in b.tick(3)] == ["rotate_left"]
     b.receive("/rotate_done")
     b.receive("/scan", {"ranges": [2.0] * 360})

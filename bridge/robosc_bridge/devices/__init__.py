@@ -1,0 +1,1 @@
+"""Drive bases and range scanners behind one narrow interface per kind."""

@@ -1,0 +1,226 @@
+"""What a drive base and a range scanner are to the rest of the bridge, whatever device is behind them.
+
+Both are used from one thread each, that of their line; none of their methods waits longer than its line's limit. Times
+are those of `time.monotonic`, in seconds. Axes are those of REP 103: x forward, angles counter-clockwise.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Protocol
+
+
+@dataclass(frozen=True)
+class Velocity:
+    """A velocity of the body.
+
+    Attributes:
+        linear_m_s: Forward.
+        angular_rad_s: Counter-clockwise.
+    """
+
+    linear_m_s: float = 0.0
+    angular_rad_s: float = 0.0
+
+
+STANDSTILL = Velocity()
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where the body is since the odometry began.
+
+    Attributes:
+        x_m: Along the first heading.
+        y_m: To its left.
+        heading_rad: Within (-pi, pi].
+    """
+
+    x_m: float = 0.0
+    y_m: float = 0.0
+    heading_rad: float = 0.0
+
+
+class MotorFault(StrEnum):
+    """What a wheel's motor or the base tells of itself; all but `VOLTAGE` switch its torque off."""
+
+    VOLTAGE = "input voltage"
+    OVERHEATING = "overheating"
+    ENCODER = "encoder"
+    SHOCK = "electrical shock"
+    OVERLOAD = "overload"
+    TORQUE_LOST = "torque off by itself"
+    WATCHDOG = "bus watchdog"
+
+
+@dataclass(frozen=True)
+class DriveReading:
+    """What a drive base told in one exchange.
+
+    Attributes:
+        time_s: When its last byte had come.
+        pose: Odometry.
+        velocity: As the wheels measure it.
+        wheels_m_s: Speed of the left and the right wheel.
+        is_torque_on: Whether the motors hold and obey.
+        faults: Of any motor.
+        battery_v: None: it does not tell.
+        battery_share: 0 to 1; None: it does not tell.
+        temperature_c: Of the hottest motor; None: it does not tell.
+        buttons: Whether each is pressed, by name: `button_1`, `bumper_1` and so on.
+        imu: Further measurements by name, such as `angular_velocity_z`; empty: there are none.
+    """
+
+    time_s: float
+    pose: Pose
+    velocity: Velocity
+    wheels_m_s: tuple[float, float]
+    is_torque_on: bool
+    faults: frozenset[MotorFault] = frozenset()
+    battery_v: float | None = None
+    battery_share: float | None = None
+    temperature_c: float | None = None
+    buttons: Mapping[str, bool] = field(default_factory=dict)
+    imu: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class DriveLimits:
+    """What a drive base can do.
+
+    Attributes:
+        linear_m_s: Fastest forward and backward.
+        angular_rad_s: Fastest turn.
+        wheel_m_s: Fastest wheel.
+    """
+
+    linear_m_s: float
+    angular_rad_s: float
+    wheel_m_s: float
+
+
+class DriveBase(Protocol):
+    """Two wheels, however they are reached."""
+
+    @property
+    def limits(self) -> DriveLimits:
+        """Known after `open`."""
+
+    def open(self) -> None:
+        """Find the device, check that it is the one that is meant, and leave it at a standstill with torque off.
+
+        Raises:
+            LineError: The line cannot be used.
+            DeviceError: What answers there cannot be driven.
+        """
+
+    def set_torque(self, is_on: bool) -> None:
+        """Let the motors hold and obey, from a standstill; or let them go, after a goal of zero.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceError: The device does not do it.
+        """
+
+    def exchange(self, velocity: Velocity) -> DriveReading:
+        """One cycle: command a velocity within the limits, keep every watchdog fed, read everything.
+
+        With torque off the velocity is not sent, and zero is what the device has as its goal.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceError: It did not answer, also when asked again within the cycle.
+        """
+
+    def reset(self) -> None:
+        """Reboot motors that have switched themselves off, when told to by a person; torque is off afterwards.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceError: The device does not come back, or its fault remains (too hot still).
+        """
+
+    def close(self) -> None:
+        """Stop the wheels, torque off, give the line back; never raises, may be called at any time and again."""
+
+
+@dataclass(frozen=True)
+class RawScan:
+    """One turn as the device measured it, in its order.
+
+    Attributes:
+        angles_rad: Of each point, counter-clockwise from the front, within [0, 2 pi).
+        ranges_m: NaN where nothing valid was measured.
+        intensities: As the device gives them.
+    """
+
+    angles_rad: tuple[float, ...]
+    ranges_m: tuple[float, ...]
+    intensities: tuple[float, ...]
+
+
+BINS = 360
+
+
+@dataclass(frozen=True)
+class Scan:
+    """One full turn.
+
+    Attributes:
+        time_s: When its last byte had come.
+        ranges_m: `BINS` bins of one degree, counter-clockwise, the first straight ahead and half a degree to both sides
+            of it; the smallest valid range of each, NaN if none.
+        raw: As it was measured.
+        turns_per_s: Speed of the motor as the device tells it.
+    """
+
+    time_s: float
+    ranges_m: tuple[float, ...]
+    raw: RawScan
+    turns_per_s: float
+
+
+@dataclass
+class ScannerCounters:
+    """How healthy a scanner's line is.
+
+    Attributes:
+        scans: Full turns.
+        frames: Well-formed frames.
+        bad_frames: Frames with a wrong checksum or impossible contents.
+        skipped_bytes: Bytes that belong to no frame.
+    """
+
+    scans: int = 0
+    frames: int = 0
+    bad_frames: int = 0
+    skipped_bytes: int = 0
+
+
+class RangeScanner(Protocol):
+    """A LiDAR that turns."""
+
+    counters: ScannerCounters
+
+    def open(self) -> None:
+        """Open the line and start the motor.
+
+        Raises:
+            LineError: The line cannot be used.
+        """
+
+    def receive(self, limit_s: float) -> Scan | None:
+        """The next full turn; None: none was complete within the limit, or before `wake` was called.
+
+        Raises:
+            LineError: The line is gone.
+        """
+
+    def wake(self) -> None:
+        """Let a `receive` that waits in another thread return at once."""
+
+    def restart(self) -> None:
+        """Stop and start a motor that has fallen silent, where the device can be told so."""
+
+    def close(self) -> None:
+        """Stop the motor, give the line back; never raises, may be called at any time and again."""

@@ -1,0 +1,65 @@
+"""What can go wrong between the bridge and the world.
+
+    BridgeError
+    |-- LineError               a serial line cannot be used
+    |   |-- LineMissingError    there is no such port (any more)
+    |   |-- LineBusyError       another program has it
+    |   |-- LineDeniedError     this user may not open it
+    |   `-- LineLostError       it was open and is gone: unplugged, hung up
+    `-- DeviceError             something answers, and not as the device should
+        |-- DeviceSilentError   it does not answer in time
+        |-- WrongDeviceError    another kind of device, another id, another firmware, another setting than can be driven
+        `-- DeviceFaultError    it tells a fault of its own, which a person must see to
+
+Whatever pyserial, termios, dynamixel-sdk or pymavlink raise is translated into one of these where it is first met.
+Malformed bytes from a wire are none: they are counted and dropped.
+"""
+
+
+class BridgeError(Exception):
+    """Base of all; its text is one line for a person, with what to do about it where that is known."""
+
+
+class LineError(BridgeError):
+    """A serial line cannot be used.
+
+    Args:
+        path: Of the port.
+        problem: What is wrong, without the path.
+    """
+
+    def __init__(self, path: str, problem: str) -> None:
+        super().__init__(f"{path}: {problem}")
+        self.path = path
+
+
+class LineMissingError(LineError):
+    """There is no such port: not plugged in, or called otherwise."""
+
+
+class LineBusyError(LineError):
+    """Another program has it."""
+
+
+class LineDeniedError(LineError):
+    """This user may not open it: most often not in the group `dialout`."""
+
+
+class LineLostError(LineError):
+    """It was open and is gone."""
+
+
+class DeviceError(BridgeError):
+    """Something answers, and not as the device should."""
+
+
+class DeviceSilentError(DeviceError, TimeoutError):
+    """It does not answer in time."""
+
+
+class WrongDeviceError(DeviceError):
+    """Another device, firmware or setting than can be driven."""
+
+
+class DeviceFaultError(DeviceError):
+    """It tells a fault of its own, which a person must see to."""

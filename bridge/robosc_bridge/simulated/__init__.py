@@ -1,0 +1,1 @@
+"""Simulated devices on pseudo-terminals, and the planar world that they move in and see."""

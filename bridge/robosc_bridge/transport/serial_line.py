@@ -1,0 +1,177 @@
+"""A serial line on pyserial whose reader waits in `select`, so that waiting costs nothing and can be interrupted."""
+
+import contextlib
+import errno
+import os
+import select
+import termios
+import threading
+import time
+from types import TracebackType
+from typing import Self
+
+import serial
+
+from robosc_bridge.errors import LineBusyError, LineDeniedError, LineError, LineLostError, LineMissingError
+
+_CHUNK = 4096
+# How a line says that it is gone: an OSError, pyserial's own (an OSError, too) or that of termios (which is none).
+_FAILURES = (OSError, termios.error)
+
+
+class SerialLine:
+    """An open serial line.
+
+    Args:
+        path: Of the port, best a stable name below /dev/serial/by-id or of a udev rule.
+        baud: Bits per second.
+
+    Raises:
+        LineMissingError: There is no such port.
+        LineBusyError: Another program has it.
+        LineDeniedError: This user may not open it.
+        LineError: It is no serial port, or cannot do this speed.
+    """
+
+    def __init__(self, path: str, baud: int) -> None:
+        self.path = path
+        self.baud = baud
+        try:
+            self._port = serial.Serial(path, baud, timeout=0, exclusive=True)
+        except (OSError, ValueError, termios.error) as error:
+            raise _not_opened(path, error) from error
+        os.set_blocking(self._port.fileno(), False)
+        self._woken, self._waker = os.pipe()
+        os.set_blocking(self._waker, False)
+        self._poll = select.poll()  # Unlike `select`, it takes any number of a file.
+        self._poll.register(self._port.fileno(), select.POLLIN)
+        self._poll.register(self._woken, select.POLLIN)
+        # Another thread may wake the line while it is being closed: its file's number may be somebody else's then.
+        self._guard = threading.Lock()
+        self._is_open = True
+
+    def read(self, limit_s: float) -> bytes:
+        """What has come, waiting for the first byte.
+
+        Args:
+            limit_s: Longest wait; 0: not at all.
+
+        Returns:
+            At least one byte, or none when nothing came in time or `wake` was called.
+
+        Raises:
+            LineLostError: The line is gone.
+        """
+        try:
+            readable = dict(self._poll.poll(max(limit_s, 0.0) * 1000))
+            if self._woken in readable:
+                os.read(self._woken, _CHUNK)
+            if self._port.fileno() not in readable:
+                return b""
+            found = os.read(self._port.fileno(), _CHUNK)
+        except BlockingIOError:
+            return b""
+        except (*_FAILURES, ValueError, TypeError) as error:
+            raise self._lost(error) from error
+        if not found:
+            raise LineLostError(self.path, "the device has hung up")
+        return found
+
+    def write(self, data: bytes, limit_s: float = 0.1) -> None:
+        """Send all of it.
+
+        Args:
+            data: What to send.
+            limit_s: Longest wait for the line to take it.
+
+        Raises:
+            LineLostError: The line is gone, or does not take what is written.
+        """
+        left = memoryview(data)
+        end_s = time.monotonic() + limit_s
+        try:
+            while left:
+                try:
+                    left = left[os.write(self._port.fileno(), left) :]
+                except BlockingIOError:
+                    if not self._is_writable(end_s - time.monotonic()):
+                        raise LineLostError(self.path, "the line takes no more bytes") from None
+        except (*_FAILURES, ValueError, TypeError) as error:
+            raise self._lost(error) from error
+
+    def _is_writable(self, limit_s: float) -> bool:
+        poll = select.poll()
+        poll.register(self._port.fileno(), select.POLLOUT)
+        return bool(poll.poll(max(limit_s, 0.0) * 1000))
+
+    def discard_input(self) -> None:
+        """Forget what has come and was not read.
+
+        Raises:
+            LineLostError: The line is gone.
+        """
+        try:
+            self._port.reset_input_buffer()
+        except (*_FAILURES, ValueError, TypeError) as error:
+            raise self._lost(error) from error
+
+    def set_baud(self, baud: int) -> None:
+        """Go on at another speed.
+
+        Raises:
+            LineError: The port cannot do this speed, or is gone.
+        """
+        try:
+            self._port.baudrate = baud
+        except (*_FAILURES, ValueError) as error:
+            raise LineError(self.path, f"cannot be set to {baud} baud: {_words(error)}") from error
+        self.baud = baud
+
+    def wake(self) -> None:
+        """Let a `read` that waits in another thread return; safe at any time."""
+        with self._guard:
+            if self._is_open:
+                # A full pipe: it is awake already.
+                with contextlib.suppress(BlockingIOError):
+                    os.write(self._waker, b"\0")
+
+    def close(self) -> None:
+        """Give it back; never raises, and may be called again."""
+        with self._guard:
+            if not self._is_open:
+                return
+            self._is_open = False
+            with contextlib.suppress(*_FAILURES):
+                self._port.close()
+            os.close(self._woken)
+            os.close(self._waker)
+
+    def _lost(self, error: Exception) -> LineLostError:
+        if isinstance(error, LineLostError):
+            return error
+        return LineLostError(self.path, f"the line is gone: {_words(error)}")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _not_opened(path: str, error: Exception) -> LineError:
+    number = getattr(error, "errno", None) or (error.args[0] if error.args else None)
+    match number:
+        case errno.ENOENT | errno.ENXIO | errno.ENODEV:
+            return LineMissingError(path, "there is no such port; is the device plugged in?")
+        case errno.EBUSY | errno.EAGAIN:
+            return LineBusyError(path, "another program uses this port")
+        case errno.EACCES | errno.EPERM:
+            return LineDeniedError(path, "no permission; is this user in the group dialout?")
+    return LineError(path, f"cannot be opened as a serial port: {_words(error)}")
+
+
+def _words(error: Exception) -> str:
+    found = " ".join(str(error.args[-1] if error.args else error).split())
+    return found or type(error).__name__

@@ -38,7 +38,7 @@ class SerialLine:
         self.baud = baud
         try:
             self._port = serial.Serial(path, baud, timeout=0, exclusive=True)
-        except (OSError, ValueError, termios.error) as error:
+        except (*_FAILURES, ValueError, OverflowError) as error:
             raise _not_opened(path, error) from error
         os.set_blocking(self._port.fileno(), False)
         self._woken, self._waker = os.pipe()
@@ -62,6 +62,7 @@ class SerialLine:
         Raises:
             LineLostError: The line is gone.
         """
+        self._check_open()
         try:
             readable = dict(self._poll.poll(max(limit_s, 0.0) * 1000))
             if self._woken in readable:
@@ -121,11 +122,25 @@ class SerialLine:
         Raises:
             LineError: The port cannot do this speed, or is gone.
         """
+        self._check_open()
         try:
             self._port.baudrate = baud
-        except (*_FAILURES, ValueError) as error:
+        except (*_FAILURES, ValueError, OverflowError) as error:
             raise LineError(self.path, f"cannot be set to {baud} baud: {_words(error)}") from error
         self.baud = baud
+
+    def set_dtr(self, is_on: bool) -> None:
+        """Set the modem line "data terminal ready", which opening a port raises; a pseudo-terminal has none.
+
+        Raises:
+            LineLostError: The line is gone.
+        """
+        self._check_open()
+        try:
+            self._port.dtr = is_on
+        except _FAILURES as error:
+            if getattr(error, "errno", None) not in (errno.EINVAL, errno.ENOTTY):
+                raise self._lost(error) from error
 
     def wake(self) -> None:
         """Let a `read` that waits in another thread return; safe at any time."""
@@ -145,6 +160,11 @@ class SerialLine:
                 self._port.close()
             os.close(self._woken)
             os.close(self._waker)
+
+    def _check_open(self) -> None:
+        # Of a closed line, the numbers of its files may be somebody else's, and pyserial only notes what is to be set.
+        if not self._is_open:
+            raise LineLostError(self.path, "the line is closed")
 
     def _lost(self, error: Exception) -> LineLostError:
         if isinstance(error, LineLostError):

@@ -1,0 +1,101 @@
+"""Finding frames in a stream of bytes that begins anywhere, comes in pieces of any size, and has noise in it.
+
+A frame counts only when its check holds. Where it does not, the search goes on one byte further, so that what looks
+like a header inside other data never takes a true frame behind it along. What is found depends on the bytes alone, not
+on how reads cut them: `feed(a) + feed(b)` is `feed(a + b)`.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+
+@dataclass
+class FrameCounts:
+    """What a decoder has met; every byte that was fed is in a frame, skipped, or still waiting for others.
+
+    Attributes:
+        frames: Well-formed frames.
+        bad_frames: Headers that were followed by a wrong check or impossible contents.
+        skipped_bytes: Bytes that belong to no well-formed frame.
+    """
+
+    frames: int = 0
+    bad_frames: int = 0
+    skipped_bytes: int = 0
+
+
+class FrameDecoder[Frame](ABC):
+    """Finds the frames of one format.
+
+    Holds fewer bytes than the longest frame and `look_ahead` have, whatever comes in.
+
+    Attributes:
+        first_byte: What every header begins with.
+        header_length: Bytes from which the length of a frame is known.
+        look_ahead: Bytes behind a frame that `_frame` wants to see.
+        counts: What was met so far.
+    """
+
+    first_byte: ClassVar[int]
+    header_length: ClassVar[int]
+    look_ahead: int = 0
+
+    def __init__(self) -> None:
+        self.counts = FrameCounts()
+        self._waiting = b""
+        self._is_aligned = False
+
+    @abstractmethod
+    def _length(self, data: bytes, at: int) -> int:
+        """Of the frame whose `header_length` bytes are there; 0: this is no header."""
+
+    @abstractmethod
+    def _frame(self, data: bytes, at: int, length: int) -> Frame | None:
+        """What a complete frame says; None: its check fails or it says what cannot be."""
+
+    def _align(self, is_aligned: bool) -> None:
+        """Told whether the next bytes follow a well-formed frame without a gap."""
+        self._is_aligned = is_aligned
+
+    def feed(self, data: bytes) -> list[Frame]:
+        """The frames that these bytes complete, in their order."""
+        counts = self.counts
+        data = self._waiting + data
+        found: list[Frame] = []
+        begin = 0
+        end = len(data)
+        while begin < end:
+            at = data.find(self.first_byte, begin)
+            if at != begin:
+                self._align(False)
+                counts.skipped_bytes += (end if at < 0 else at) - begin
+                begin = at
+                if at < 0:
+                    begin = end
+                    break
+            if begin + self.header_length > end:
+                break
+            length = self._length(data, begin)
+            if length:
+                if begin + length + self.look_ahead > end:
+                    break
+                frame = self._frame(data, begin, length)
+                if frame is not None:
+                    found.append(frame)
+                    begin += length
+                    self._align(True)
+                    continue
+                counts.bad_frames += 1
+            self._align(False)
+            begin += 1
+            counts.skipped_bytes += 1
+        self._waiting = data[begin:]
+        counts.frames += len(found)
+        return found
+
+    def forget(self) -> None:
+        """Begin anew: what comes next is not what followed what came last."""
+        self.counts.skipped_bytes += len(self._waiting)
+        self._waiting = b""
+        self._align(False)

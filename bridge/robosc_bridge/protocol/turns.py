@@ -1,0 +1,156 @@
+"""From points to full turns and from a turn to 360 ranges, the same for all LiDARs.
+
+A turn ends where the angle that the device counts passes 360 degrees. Whatever came before the first turn that was seen
+from its beginning is dropped, and so is a turn of which too much is missing; what is missing of another one stays
+missing, as nothing is taken from an earlier turn.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+BINS = 360
+
+WIDEST_STEP_DEG = 3.0
+"""Two points of one turn that are further apart than this have lost others between them.
+
+The widest step of a sound device is 2 degrees (LDS-03 at 20 turns/s); the narrowest frame of a full length is 6.
+"""
+
+MOST_LOST_DEG = 90.0
+"""A turn of which more is missing is no full turn."""
+
+MOST_POINTS = 2048
+"""Of one turn; the slowest of the three LiDARs has 800 at half its speed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Points:
+    """What one frame measured, in the order in which it was.
+
+    Attributes:
+        counted_deg: Angles as the device counts them: clockwise, growing, within [0, 360), passing 0 at most once.
+        angles_deg: Where the points are: counter-clockwise from the front, within [0, 360).
+        ranges_m: NaN where nothing valid was measured.
+        intensities: As the device gives them.
+        turns_per_s: Speed of the motor; None: this frame does not tell.
+        is_last: It is known without the next frame that the turn ends here.
+    """
+
+    counted_deg: tuple[float, ...]
+    angles_deg: tuple[float, ...]
+    ranges_m: tuple[float, ...]
+    intensities: tuple[float, ...]
+    turns_per_s: float | None = None
+    is_last: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """One full turn.
+
+    Attributes:
+        angles_deg: Of each point, counter-clockwise from the front, within [0, 360).
+        ranges_m: NaN where nothing valid was measured.
+        intensities: As the device gives them.
+        turns_per_s: Speed of the motor; NaN: the device has not told yet.
+    """
+
+    angles_deg: tuple[float, ...]
+    ranges_m: tuple[float, ...]
+    intensities: tuple[float, ...]
+    turns_per_s: float
+
+
+class TurnBuilder:
+    """Joins points to full turns."""
+
+    def __init__(self) -> None:
+        self._angles: list[float] = []
+        self._ranges: list[float] = []
+        self._intensities: list[float] = []
+        self._turns_per_s = math.nan
+        self._reached_deg: float | None = None
+        self._lost_deg = 0.0
+
+    def forget(self) -> None:
+        """Begin anew, after a silence or at another place of the stream."""
+        self._begin()
+        self._reached_deg = None
+
+    def add(self, points: Points) -> Turn | None:
+        """The turn that these points end; those behind its end begin the next one."""
+        if points.turns_per_s is not None:
+            self._turns_per_s = points.turns_per_s
+        counted = points.counted_deg
+        ended = None
+        if counted[-1] < counted[0]:
+            passed = next(k for k in range(1, len(counted)) if counted[k] < counted[k - 1])
+            ended = self._move(points, 0, passed)
+            ended = self._end() or ended
+            self._move(points, passed, len(counted))
+            return ended
+        ended = self._move(points, 0, len(counted))
+        return self._end() if points.is_last else ended
+
+    def _move(self, points: Points, begin: int, end: int) -> Turn | None:
+        """Take points that do not pass 0 among themselves; the turn that ended before the first of them."""
+        ended = None
+        first_deg = points.counted_deg[begin]
+        if self._reached_deg is None:
+            # Nobody knows what came before; only a beginning at 0 makes this a turn.
+            self._reached_deg = 0.0
+            self._lost_deg = 0.0 if first_deg <= WIDEST_STEP_DEG else math.inf
+        elif first_deg < self._reached_deg - WIDEST_STEP_DEG:
+            ended = self._end()
+        if len(self._angles) + end - begin > MOST_POINTS:
+            self.forget()
+            return ended
+        self._lose(first_deg - self._reached_deg)
+        self._angles += points.angles_deg[begin:end]
+        self._ranges += points.ranges_m[begin:end]
+        self._intensities += points.intensities[begin:end]
+        self._reached_deg = points.counted_deg[end - 1]
+        return ended
+
+    def _lose(self, gap_deg: float) -> None:
+        if gap_deg > WIDEST_STEP_DEG:
+            self._lost_deg += gap_deg
+
+    def _end(self) -> Turn | None:
+        self._lose(360.0 - (self._reached_deg or 0.0))
+        turn = None
+        if self._angles and self._lost_deg <= MOST_LOST_DEG:
+            turn = Turn(tuple(self._angles), tuple(self._ranges), tuple(self._intensities), self._turns_per_s)
+        self._begin()
+        return turn
+
+    def _begin(self) -> None:
+        self._angles.clear()
+        self._ranges.clear()
+        self._intensities.clear()
+        self._reached_deg = 0.0
+        self._lost_deg = 0.0
+
+
+def nearest_by_degree(angles_deg: Iterable[float], ranges_m: Iterable[float]) -> tuple[float, ...]:
+    """The smallest range of each of `BINS` bins of one degree, NaN where there is none.
+
+    Args:
+        angles_deg: Not negative; bin k covers [k - 0.5, k + 0.5).
+        ranges_m: NaN counts as none.
+    """
+    nearest = [math.inf] * BINS
+    for angle_deg, range_m in zip(angles_deg, ranges_m, strict=True):
+        k = int(angle_deg)
+        if angle_deg - k >= 0.5:  # Exact, as adding one half and rounding down is not.
+            k += 1
+        if range_m < nearest[k % BINS]:
+            nearest[k % BINS] = range_m
+    return tuple([range_m if range_m < math.inf else math.nan for range_m in nearest])
+
+
+def wrapped_deg(angle_deg: float) -> float:
+    """The same direction within [0, 360)."""
+    wrapped = angle_deg % 360.0
+    return wrapped if wrapped < 360.0 else 0.0  # The remainder of a tiny negative number is rounded to 360.

@@ -1,14 +1,11 @@
 """The three LiDARs of the TurtleBot3, as bytes: frames paced in time, from what the world's walls return.
 
-LDS-01 after ROBOTIS-GIT/hls_lfcd_lds_driver, LDS-02 after ROBOTIS-GIT/ld08_driver, LDS-03 after
-ROBOTIS-GIT/coin_d4_driver. All turn clockwise. What goes on the wire is what the real sensor would measure, so that a
-driver that corrects as the stock one does finds the walls where they are:
+Behaviour after the vendors' drivers (see `lidar_frames`). All turn clockwise. What goes on the wire is what the real
+sensor would measure, so that a driver that corrects as the stock one does finds the walls where they are:
 
 - LDS-01: sample i of a turn is at 359 - i degrees counter-clockwise;
 - LDS-02: distances are from the optical centre, beside the axis and in a direction that deviates from the nominal one;
 - LDS-03: angles are counter-clockwise when negated.
-
-The checksum of LDS-01 is not documented; two equal bytes 0xFF - sum are sent.
 """
 
 import math
@@ -18,6 +15,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
+from robosc_bridge.simulated.lidar_frames import lds01_frame, lds02_frame, lds03_frame, lds03_identity
 from robosc_bridge.simulated.line import Sending
 from robosc_bridge.simulated.world import World
 
@@ -163,24 +161,10 @@ class Lds01(Lidar):
 
     def _frame(self) -> bytes:
         degrees = [6 * self._index + place + 1 for place in range(6)]
-        frame = bytearray((0xFA, 0xA0 + self._index))
-        frame += round(self.turns_per_s * 600).to_bytes(2, "little")
-        for distance_mm in self._distances_mm(degrees):
-            intensity = 1000 if distance_mm else 0
-            frame += intensity.to_bytes(2, "little") + distance_mm.to_bytes(2, "little") + b"\0\0"
-        checksum = 0xFF - sum(frame) % 256
+        points = [(distance_mm, 1000 if distance_mm else 0) for distance_mm in self._distances_mm(degrees)]
+        frame = lds01_frame(self._index, round(self.turns_per_s * 600), points)
         self._index = (self._index + 1) % 60
-        return bytes(frame) + bytes((checksum, checksum))
-
-
-def crc8(data: bytes) -> int:
-    """Polynomial 0x4D, from 0, no reflection, no final XOR."""
-    crc = 0
-    for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = (crc << 1 ^ 0x4D if crc & 0x80 else crc << 1) & 0xFF
-    return crc
+        return frame
 
 
 class Lds02(Lidar):
@@ -209,14 +193,12 @@ class Lds02(Lidar):
         span = round(speed / self._SAMPLES_PER_S * 100 * (self._POINTS - 1))
         # A host places the points in whole hundredths of a degree.
         step = span // (self._POINTS - 1)
-        frame = bytearray((0x54, 0x20 | self._POINTS))
-        frame += round(speed).to_bytes(2, "little") + start.to_bytes(2, "little")
-        for distance_mm in self._optical_mm([(start + place * step) / 100 for place in range(self._POINTS)]):
-            frame += distance_mm.to_bytes(2, "little") + bytes((200 if distance_mm else 0,))
-        frame += ((start + span) % 36_000).to_bytes(2, "little")
-        frame += (int(self._time.world_s() * 1000) % 65_536).to_bytes(2, "little")
+        degrees = [(start + place * step) / 100 for place in range(self._POINTS)]
+        points = [(distance_mm, 200 if distance_mm else 0) for distance_mm in self._optical_mm(degrees)]
+        stamp_ms = int(self._time.world_s() * 1000) % 65_536
+        frame = lds02_frame(round(speed), start, (start + span) % 36_000, stamp_ms, points)
         self._degrees = (self._degrees + self._POINTS * speed / self._SAMPLES_PER_S) % 360
-        return bytes(frame) + bytes((crc8(bytes(frame)),))
+        return frame
 
     def _optical_mm(self, device_degrees: Sequence[float]) -> list[int]:
         """What it measures from its optical centre, along the rays on which the corrected points lie."""
@@ -262,7 +244,7 @@ class Lds03(Lidar):
             match command:
                 case self._START:
                     if not self._is_spinning:
-                        found += [Sending(self._GREETING[:2]), Sending(identity()), Sending(self._GREETING)]
+                        found += [Sending(self._GREETING[:2]), Sending(lds03_identity()), Sending(self._GREETING)]
                     self._spin()
                 case self._STOP:
                     self._halt()
@@ -271,7 +253,7 @@ class Lds03(Lidar):
                 case self._FAST:
                     self.nominal_hz = 10.0
                 case self._VERSION:
-                    found.append(Sending(identity()))
+                    found.append(Sending(lds03_identity()))
                 case _:
                     held = command[1:] + held
         self._heard = held
@@ -298,16 +280,12 @@ class Lds03(Lidar):
     def _frame(self) -> bytes:
         count = self._samples()
         step = self._degrees_per_sample
-        words = [_angle_word(self._degrees), _angle_word(self._degrees + (count - 1) * step)]
+        first, last = (_angle(self._degrees + place * step) for place in (0, count - 1))
         # Where a host places them.
-        first, last = ((word >> 1) / 64 for word in words)
-        degrees = [first + index * (last - first) / max(count - 1, 1) for index in range(count)]
-        samples = bytearray()
-        for distance_mm in self._distances_mm(degrees):
-            intensity = 200 if distance_mm else 0
-            samples += bytes(((intensity & 0x3F) << 2, (distance_mm & 0x3F) << 2 | intensity >> 6, distance_mm >> 6))
-        kind = round(self.turns_per_s * 10) << 1 | 1 if self._begins_turn else 0
-        frame = lds03_frame(kind & 0xFF, count, words[0], words[1], bytes(samples))
+        degrees = [(first + place * (last - first) / max(count - 1, 1)) / 64 for place in range(count)]
+        points = [(distance_mm, 200 if distance_mm else 0) for distance_mm in self._distances_mm(degrees)]
+        kind = (round(self.turns_per_s * 10) << 1 | 1) & 0xFF if self._begins_turn else 0
+        frame = lds03_frame(kind, first, last, points)
         self._degrees += count * step
         self._begins_turn = self._degrees >= 360 - 1e-6
         if self._begins_turn:
@@ -315,34 +293,9 @@ class Lds03(Lidar):
         return frame
 
 
-def _angle_word(degrees: float) -> int:
-    return min(round(degrees * 64), 360 * 64 - 1) << 1 | 1
-
-
-def lds03_frame(kind: int, count: int, first: int, last: int, samples: bytes) -> bytes:
-    """A measurement frame of LDS-03 with its checksum.
-
-    Args:
-        kind: Byte CT: speed and the mark of a turn's beginning.
-        count: Of samples.
-        first: Angle word of the first sample.
-        last: Angle word of the last one.
-        samples: Three bytes each.
-    """
-    checksum = 0x55AA ^ first ^ (count << 8 | kind) ^ last
-    for index in range(0, len(samples), 3):
-        low, middle, high = samples[index : index + 3]
-        checksum ^= low ^ (high << 8 | middle)
-    words = (first, last, checksum)
-    return bytes((0xAA, 0x55, kind, count)) + b"".join(word.to_bytes(2, "little") for word in words) + samples
-
-
-def identity() -> bytes:
-    """What LDS-03 tells of itself."""
-    name = b"COIN-D4".ljust(19, b"\0") + b"\x01"
-    length = len(name).to_bytes(2, "little")
-    total = sum(b"\xa5\x5a") + sum(length) + 0x01 + sum(name)
-    return b"\xfa\xfa\xa5\x5a" + length + total.to_bytes(2, "little") + b"\x01" + name
+def _angle(degrees: float) -> int:
+    """In degrees / 64, below a whole turn."""
+    return min(round(degrees * 64), 360 * 64 - 1)
 
 
 LIDARS: dict[str, Callable[..., Lidar]] = {"lds01": Lds01, "lds02": Lds02, "lds03": Lds03}

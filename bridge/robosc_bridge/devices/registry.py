@@ -66,7 +66,17 @@ _BUILT_IN: dict[Kind, dict[str, tuple[str, str]]] = {
             "robosc_bridge.devices.opencr:OpenCrBase",
         ),
     },
-    Kind.RANGE_SCANNER: {},
+    Kind.RANGE_SCANNER: {
+        "lds01": (
+            "the LiDAR LDS-01 (HLS-LFCD2): 0.12 to 3.5 m, 5 turns a second",
+            "robosc_bridge.devices.lidar:make_lds01",
+        ),
+        "lds02": ("the LiDAR LDS-02 (LD08): 0.16 to 8 m, 6 turns a second", "robosc_bridge.devices.lidar:make_lds02"),
+        "lds03": (
+            "the LiDAR LDS-03 (COIN-D4): 0.05 to 12 m, 10 turns a second",
+            "robosc_bridge.devices.lidar:make_lds03",
+        ),
+    },
 }
 
 _registered: dict[tuple[Kind, str], Driver] = {}

@@ -21,44 +21,18 @@ from robosc_bridge.errors import (
     LineMissingError,
 )
 from robosc_bridge.transport.serial_line import SerialLine
-
-LIMIT_S = 10.0
-"""Longer than anything here takes when it works."""
-
-
-class Pty:
-    """The device's end of a line."""
-
-    def __init__(self) -> None:
-        self.master, slave = os.openpty()
-        self.path = os.ttyname(slave)
-        # Held open: a program that looks at the other end while nobody has it open would see it hung up.
-        self._slave: int | None = slave
-        self._is_open = True
-
-    def send(self, data: bytes) -> None:
-        os.write(self.master, data)
-
-    def baud_constant(self) -> int:
-        return int(termios.tcgetattr(self.master)[5])
-
-    def unplug(self) -> None:
-        if self._is_open:
-            self._is_open = False
-            os.close(self.master)
-            if self._slave is not None:
-                os.close(self._slave)
+from support.pty_end import LIMIT_S, PtyEnd
 
 
 @pytest.fixture
-def pty() -> Iterator[Pty]:
-    end = Pty()
+def pty() -> Iterator[PtyEnd]:
+    end = PtyEnd()
     yield end
     end.unplug()
 
 
 @pytest.fixture
-def line(pty: Pty) -> Iterator[SerialLine]:
+def line(pty: PtyEnd) -> Iterator[SerialLine]:
     with SerialLine(pty.path, 115200) as opened:
         yield opened
 
@@ -99,7 +73,7 @@ def _descriptors() -> int:
 # Reading and writing
 
 
-def test_bytes_arrive_as_they_were_sent_in_both_directions(pty: Pty, line: SerialLine) -> None:
+def test_bytes_arrive_as_they_were_sent_in_both_directions(pty: PtyEnd, line: SerialLine) -> None:
     every = bytes(range(256))
     pty.send(every)
     assert _everything(line, 256) == every
@@ -107,7 +81,7 @@ def test_bytes_arrive_as_they_were_sent_in_both_directions(pty: Pty, line: Seria
     assert os.read(pty.master, 1000) == every
 
 
-def test_reading_waits_for_the_first_byte_and_not_for_more(pty: Pty, line: SerialLine) -> None:
+def test_reading_waits_for_the_first_byte_and_not_for_more(pty: PtyEnd, line: SerialLine) -> None:
     reading = Background(lambda: line.read(LIMIT_S))
     begin_s = time.monotonic()
     pty.send(b"x")
@@ -122,7 +96,7 @@ def test_reading_gives_up_at_its_limit(line: SerialLine) -> None:
 
 
 @pytest.mark.parametrize("limit_s", [0.0, -1.0])
-def test_without_a_limit_reading_does_not_wait(pty: Pty, line: SerialLine, limit_s: float) -> None:
+def test_without_a_limit_reading_does_not_wait(pty: PtyEnd, line: SerialLine, limit_s: float) -> None:
     begin_s = time.monotonic()
     assert line.read(limit_s) == b""
     assert time.monotonic() - begin_s < 1.0
@@ -137,7 +111,7 @@ def test_a_full_line_is_an_error_after_the_limit(line: SerialLine) -> None:
     assert 0.09 <= time.monotonic() - begin_s < LIMIT_S
 
 
-def test_a_line_that_becomes_free_takes_the_rest(pty: Pty, line: SerialLine) -> None:
+def test_a_line_that_becomes_free_takes_the_rest(pty: PtyEnd, line: SerialLine) -> None:
     data = os.urandom(20_000)
     found = b""
 
@@ -152,7 +126,7 @@ def test_a_line_that_becomes_free_takes_the_rest(pty: Pty, line: SerialLine) -> 
     assert reading.end() == data
 
 
-def test_discarded_input_does_not_come(pty: Pty, line: SerialLine) -> None:
+def test_discarded_input_does_not_come(pty: PtyEnd, line: SerialLine) -> None:
     pty.send(b"old")
     assert line.read(LIMIT_S)[:1] == b"o"
     pty.send(b"older")
@@ -183,14 +157,14 @@ def test_wake_before_a_read_is_not_lost_and_holds_once(line: SerialLine) -> None
     assert time.monotonic() - begin_s >= 0.049
 
 
-def test_waking_a_line_that_nobody_reads_never_blocks(pty: Pty, line: SerialLine) -> None:
+def test_waking_a_line_that_nobody_reads_never_blocks(pty: PtyEnd, line: SerialLine) -> None:
     for _ in range(100_000):  # More than the pipe holds.
         line.wake()
     pty.send(b"x")
     assert _everything(line, 1) == b"x"
 
 
-def test_wake_does_not_take_bytes_along(pty: Pty, line: SerialLine) -> None:
+def test_wake_does_not_take_bytes_along(pty: PtyEnd, line: SerialLine) -> None:
     pty.send(b"x")
     line.wake()
     assert _everything(line, 1) == b"x"
@@ -204,7 +178,7 @@ def test_a_missing_port() -> None:
         SerialLine("/dev/no-such-port", 115200)
 
 
-def test_a_port_in_use(pty: Pty, line: SerialLine) -> None:
+def test_a_port_in_use(pty: PtyEnd, line: SerialLine) -> None:
     with pytest.raises(LineBusyError, match="another program uses this port"):
         SerialLine(pty.path, 115200)
     line.close()
@@ -221,7 +195,9 @@ def test_a_port_in_use(pty: Pty, line: SerialLine) -> None:
         (errno.ENODEV, LineMissingError),
     ],
 )
-def test_what_the_system_refuses(pty: Pty, monkeypatch: pytest.MonkeyPatch, number: int, kind: type[LineError]) -> None:
+def test_what_the_system_refuses(
+    pty: PtyEnd, monkeypatch: pytest.MonkeyPatch, number: int, kind: type[LineError]
+) -> None:
     """Refused as the system would: root, as which tests often run, is refused nothing."""
 
     def refuse(*_: object) -> int:
@@ -235,7 +211,7 @@ def test_what_the_system_refuses(pty: Pty, monkeypatch: pytest.MonkeyPatch, numb
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may open everything")
-def test_a_port_of_somebody_else(pty: Pty) -> None:
+def test_a_port_of_somebody_else(pty: PtyEnd) -> None:
     Path(pty.path).chmod(0)
     with pytest.raises(LineDeniedError, match="group dialout"):
         SerialLine(pty.path, 115200)
@@ -251,7 +227,7 @@ def test_no_serial_port(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("baud", [-1, 2**40])
-def test_a_speed_that_cannot_be(pty: Pty, baud: int) -> None:
+def test_a_speed_that_cannot_be(pty: PtyEnd, baud: int) -> None:
     with pytest.raises(LineError):
         SerialLine(pty.path, baud)
     with SerialLine(pty.path, 115200) as line:
@@ -260,7 +236,7 @@ def test_a_speed_that_cannot_be(pty: Pty, baud: int) -> None:
         assert line.baud == 115200
 
 
-def test_the_speed_is_set_and_can_be_changed(pty: Pty) -> None:
+def test_the_speed_is_set_and_can_be_changed(pty: PtyEnd) -> None:
     with SerialLine(pty.path, 115200) as line:
         assert pty.baud_constant() == termios.B115200
         line.set_baud(230400)
@@ -277,7 +253,7 @@ def test_a_pseudo_terminal_has_no_modem_lines(line: SerialLine) -> None:
 # Losing and closing
 
 
-def test_a_line_that_is_lost_while_a_thread_reads(pty: Pty, line: SerialLine) -> None:
+def test_a_line_that_is_lost_while_a_thread_reads(pty: PtyEnd, line: SerialLine) -> None:
     reading = Background(lambda: line.read(LIMIT_S))
     pty.unplug()
     result = reading.end()
@@ -285,7 +261,7 @@ def test_a_line_that_is_lost_while_a_thread_reads(pty: Pty, line: SerialLine) ->
     assert str(result).startswith(f"{pty.path}: ")
 
 
-def test_what_came_before_the_line_was_lost_is_read_or_lost_but_the_loss_is_told(pty: Pty, line: SerialLine) -> None:
+def test_what_came_before_the_line_was_lost_is_read_or_lost_but_the_loss_is_told(pty: PtyEnd, line: SerialLine) -> None:
     pty.send(b"x")
     pty.unplug()
     with pytest.raises(LineLostError):
@@ -306,7 +282,7 @@ def test_what_came_before_the_line_was_lost_is_read_or_lost_but_the_loss_is_told
 )
 @pytest.mark.parametrize("is_closed", [False, True])
 def test_every_use_of_a_line_that_is_gone_says_so(
-    pty: Pty, line: SerialLine, use: Callable[[SerialLine], object], is_closed: bool
+    pty: PtyEnd, line: SerialLine, use: Callable[[SerialLine], object], is_closed: bool
 ) -> None:
     if is_closed:
         line.close()
@@ -331,7 +307,7 @@ def test_a_closed_line_reads_nobody_elses_file(line: SerialLine) -> None:
             os.close(end)
 
 
-def test_closing_again_and_waking_a_closed_line_do_nothing(pty: Pty, line: SerialLine) -> None:
+def test_closing_again_and_waking_a_closed_line_do_nothing(pty: PtyEnd, line: SerialLine) -> None:
     line.close()
     line.close()
     line.wake()
@@ -339,12 +315,12 @@ def test_closing_again_and_waking_a_closed_line_do_nothing(pty: Pty, line: Seria
     line.close()
 
 
-def test_a_line_that_is_gone_can_be_closed(pty: Pty, line: SerialLine) -> None:
+def test_a_line_that_is_gone_can_be_closed(pty: PtyEnd, line: SerialLine) -> None:
     pty.unplug()
     line.close()
 
 
-def test_no_descriptor_is_left(pty: Pty, tmp_path: Path) -> None:
+def test_no_descriptor_is_left(pty: PtyEnd, tmp_path: Path) -> None:
     before = _descriptors()
     for _ in range(20):
         with SerialLine(pty.path, 115200) as line:
@@ -370,7 +346,7 @@ def test_a_file_number_above_1024_does_not_matter() -> None:
             stack.callback(os.close, number)
             if number > 1100:
                 break
-        pty = Pty()
+        pty = PtyEnd()
         stack.callback(pty.unplug)
         line = stack.enter_context(SerialLine(pty.path, 115200))
         pty.send(b"x")

@@ -1,0 +1,251 @@
+"""LiDARs against simulated ones in a world with walls: what is seen is where it is, whatever the line does."""
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from robosc.execution.clock import ManualClock
+from robosc_bridge.devices.interface import BINS, Scan
+from robosc_bridge.devices.lidar import BAUD_TRIAL_S, Lidar, make_lds01, make_lds02, make_lds03
+from robosc_bridge.errors import LineLostError
+from robosc_bridge.simulated import SimulatedTurtleBot3, Walls, room
+from support.pty_end import SkippingClock
+from support.wire import wait_until
+
+MAKERS: dict[str, Callable[..., Lidar[Any]]] = {"lds01": make_lds01, "lds02": make_lds02, "lds03": make_lds03}
+# Of an LDS-02, the correction moves neighbouring points apart where a wall comes nearer: a bin may lie between.
+FULL = {"lds01": BINS, "lds02": BINS - 6, "lds03": BINS}
+POSE = (0.3, 0.2, 0.7)
+each_lidar = pytest.mark.parametrize("name", MAKERS)
+
+
+class Scene:
+    """A robot in a world, and a driver of its LiDAR; the world's time passes when the test says so."""
+
+    def __init__(self, name: str, robot: SimulatedTurtleBot3) -> None:
+        self.robot = robot
+        self.clock = SkippingClock()
+        self.lidar: Lidar[Any] = MAKERS[name](robot.scanner_path, clock=self.clock)
+        self.name = name
+
+    def open(self) -> None:
+        self.lidar.open()
+        if self.name == "lds03":
+            wait_until(lambda: self.robot.scanner.is_spinning)
+
+    def scans(self, seconds: float) -> list[Scan]:
+        """What is seen while time passes."""
+        found = []
+        for _ in range(round(seconds / 0.05)):
+            self.robot.advance(0.05)
+            while scan := self.lidar.receive(0.005):
+                found.append(scan)
+        return found
+
+    def expected(self) -> list[tuple[float, float]]:
+        """Of each bin, the nearest and the farthest that may be seen in it."""
+        parts = 10
+        angles = [math.radians((k - parts / 2) / parts) for k in range(BINS * parts + 1)]
+        ranges = self.robot.world.ranges(angles)
+        return [
+            (min(ranges[k * parts : (k + 1) * parts + 1]), max(ranges[k * parts : (k + 1) * parts + 1]))
+            for k in range(BINS)
+        ]
+
+    def check(self, scan: Scan) -> int:
+        """Check every range that is there; how many there are."""
+        known = 0
+        for k, (range_m, (nearest_m, farthest_m)) in enumerate(zip(scan.ranges_m, self.expected(), strict=True)):
+            if not math.isnan(range_m):
+                known += 1
+                assert nearest_m - 0.003 <= range_m <= farthest_m + 0.003, f"bin {k}"
+        return known
+
+
+@contextmanager
+def scene(name: str, walls: Walls | None = None, **arguments: Any) -> Iterator[Scene]:
+    walls = walls or room(3.0, 2.0)
+    with SimulatedTurtleBot3(lidar=name, walls=walls, pose=POSE, clock=ManualClock(), **arguments) as robot:
+        made = Scene(name, robot)
+        try:
+            yield made
+        finally:
+            made.lidar.close()
+
+
+@each_lidar
+def test_every_degree_shows_the_wall_where_it_is(name: str) -> None:
+    with scene(name) as seen:
+        seen.open()
+        scans = seen.scans(1.0)
+        turns = {"lds01": 4, "lds02": 4, "lds03": 8}[name]
+        assert turns <= len(scans) <= turns + 2
+        for scan in scans:
+            assert seen.check(scan) >= FULL[name]
+            assert scan.turns_per_s == pytest.approx(seen.robot.scanner.turns_per_s, rel=0.01)
+        assert seen.lidar.counters.scans == len(scans)
+        assert seen.lidar.counters.bad_frames == 0
+
+
+@each_lidar
+def test_what_is_beyond_the_sensors_reach_is_unknown(name: str) -> None:
+    reach_m = {"lds01": 3.5, "lds02": 8.0, "lds03": 12.0}[name]
+    with scene(name, room(2 * reach_m + 2, 2.0)) as seen:
+        seen.open()
+        for scan in seen.scans(0.5):
+            known = seen.check(scan)
+            far = sum(nearest_m > reach_m + 0.01 for nearest_m, _ in seen.expected())
+            assert far > 5
+            assert BINS - far - 12 <= known <= BINS - far
+
+
+@each_lidar
+def test_a_covered_one_tells_scans_without_a_range(name: str) -> None:
+    with scene(name) as seen:
+        seen.robot.scanner.is_covered = True
+        seen.open()
+        scans = seen.scans(0.6)
+        assert scans
+        assert all(seen.check(scan) == 0 for scan in scans)
+
+
+@each_lidar
+def test_a_slow_motor_tells_it(name: str) -> None:
+    with scene(name) as seen:
+        seen.robot.scanner.speed_share = 0.5
+        seen.open()
+        scans = seen.scans(1.0)
+        assert {round(scan.turns_per_s / seen.robot.scanner.nominal_hz, 2) for scan in scans} == {0.5}
+
+
+@each_lidar
+@pytest.mark.parametrize(
+    "fault",
+    [
+        {"drop_share": 0.08},
+        {"corrupt_share": 0.08},
+        {"lose_bytes_share": 0.001},
+        {"garbage": b"\xfa\xa0\x54\x2c\xaa\x55"},
+    ],
+    ids=lambda fault: next(iter(fault)),
+)
+def test_on_a_bad_line_what_is_seen_is_still_where_it_is(name: str, fault: dict[str, Any]) -> None:
+    with scene(name) as seen:
+        seen.open()
+        assert seen.scans(0.6)
+        before = seen.lidar.counters.skipped_bytes, seen.lidar.counters.bad_frames
+        vars(seen.robot.scanner_faults).update(fault)
+        scans = seen.scans(1.5)
+        assert len(scans) >= 4
+        known = [seen.check(scan) for scan in scans]
+        assert max(known) > 270
+        if "drop_share" in fault:
+            assert min(known) < 355
+        else:
+            assert seen.lidar.counters.skipped_bytes > before[0]
+        if "corrupt_share" in fault:
+            assert seen.lidar.counters.bad_frames > before[1]
+        seen.robot.scanner_faults.clear()
+        *_, last = seen.scans(0.8)
+        assert seen.check(last) >= FULL[name]
+
+
+@each_lidar
+def test_bytes_that_come_one_by_one_are_the_same_scan(name: str) -> None:
+    with scene(name) as seen:
+        seen.open()
+        seen.robot.scanner_faults.split_s = 0.0
+        scans = seen.scans(0.6)
+        assert scans
+        assert all(seen.check(scan) >= FULL[name] for scan in scans)
+
+
+@each_lidar
+def test_a_stalled_one_tells_nothing_and_goes_on_without_a_mixture(name: str) -> None:
+    with scene(name) as seen:
+        seen.open()
+        assert seen.scans(0.5)
+        seen.robot.scanner.is_stalled = True
+        seen.scans(0.05)  # What is under way still.
+        for _ in range(4):
+            seen.clock.skip(0.2)
+            assert seen.scans(0.05) == []
+        # Meanwhile the robot was turned: ranges of before would be beside the walls.
+        seen.robot.world.heading_rad += 1.0
+        seen.robot.scanner.is_stalled = False
+        scans = seen.scans(0.8)
+        assert scans
+        assert all(seen.check(scan) >= FULL[name] for scan in scans)
+
+
+@each_lidar
+def test_an_unplugged_one_is_opened_again(name: str) -> None:
+    with scene(name) as seen:
+        seen.open()
+        assert seen.scans(0.5)
+        seen.robot.scanner_line.disconnect()
+        with pytest.raises(LineLostError):
+            seen.scans(0.1)
+        seen.lidar.close()
+        seen.robot.scanner_line.reconnect()
+        seen.open()
+        scans = seen.scans(0.6)
+        assert scans
+        assert all(seen.check(scan) >= FULL[name] for scan in scans)
+
+
+@pytest.mark.parametrize("name", ["lds01", "lds03"])
+def test_closing_stops_the_motor_and_opening_starts_it(name: str) -> None:
+    with scene(name) as seen:
+        seen.open()
+        assert seen.robot.scanner.is_spinning
+        seen.lidar.close()
+        wait_until(lambda: not seen.robot.scanner.is_spinning)
+        seen.open()
+        wait_until(lambda: seen.robot.scanner.is_spinning)
+
+
+def test_an_lds03_is_restarted() -> None:
+    with scene("lds03") as seen:
+        seen.open()
+        assert seen.scans(0.5)
+        seen.lidar.restart()
+        wait_until(lambda: not seen.robot.scanner.is_spinning)
+        seen.clock.skip(1.0)
+        assert seen.lidar.receive(0.0) is None
+        wait_until(lambda: seen.robot.scanner.is_spinning)
+        assert seen.scans(0.5)
+
+
+def test_an_lds03_of_the_other_speed_is_found() -> None:
+    with scene("lds03") as seen:
+        seen.robot.scanner.baud = 115_200
+        seen.lidar.open()
+        assert seen.scans(0.1) == []
+        assert not seen.robot.scanner.is_spinning
+        seen.clock.skip(BAUD_TRIAL_S)
+        assert seen.scans(0.05) == []
+        wait_until(lambda: seen.robot.scanner.is_spinning)
+        scans = seen.scans(0.5)
+        assert scans
+        assert all(seen.check(scan) >= BINS for scan in scans)
+        assert seen.lidar.baud == 115_200
+
+
+@each_lidar
+def test_in_real_time_scans_come_as_the_motor_turns(name: str) -> None:
+    with SimulatedTurtleBot3(lidar=name, walls=room(3.0, 2.0)) as robot:
+        lidar = MAKERS[name](robot.scanner_path)
+        lidar.open()
+        try:
+            first = lidar.receive(5.0)
+            second = lidar.receive(5.0)
+            assert first
+            assert second
+            assert first.time_s < second.time_s <= time.monotonic()
+        finally:
+            lidar.close()

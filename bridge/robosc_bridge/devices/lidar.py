@@ -197,6 +197,7 @@ class Lidar[Frame]:
 
     def _forget(self, now_s: float) -> None:
         self._decoder.forget()
+        self._count()
         self._turns.forget()
         self._listened_s = self._heard_s = now_s
 
@@ -225,14 +226,17 @@ class Lidar[Frame]:
             if turn:
                 self.counters.scans += 1
                 newest = turn
-        counts = self._decoder.counts
-        if counts.frames > self.counters.frames:
+        if self._decoder.counts.frames > self.counters.frames:
             self._is_baud_known = True
             self._trial_end_s = None
+        self._count()
+        return newest
+
+    def _count(self) -> None:
+        counts = self._decoder.counts
         self.counters.frames = counts.frames
         self.counters.bad_frames = counts.bad_frames
         self.counters.skipped_bytes = counts.skipped_bytes
-        return newest
 
     def _scan(self, turn: Turn, now_s: float) -> Scan:
         angles_deg = self._seen_by_the_robot(turn.angles_deg)

@@ -68,7 +68,8 @@ class FrameDecoder[Frame](ABC):
         while begin < end:
             at = data.find(self.first_byte, begin)
             if at != begin:
-                self._align(False)
+                if self._is_aligned:
+                    self._align(False)
                 counts.skipped_bytes += (end if at < 0 else at) - begin
                 begin = at
                 if at < 0:
@@ -87,7 +88,8 @@ class FrameDecoder[Frame](ABC):
                     self._align(True)
                     continue
                 counts.bad_frames += 1
-            self._align(False)
+            if self._is_aligned:
+                self._align(False)
             begin += 1
             counts.skipped_bytes += 1
         self._waiting = data[begin:]

@@ -21,12 +21,12 @@ STOP = b"e"
 FRAMES_PER_TURN = 60
 POINTS_PER_FRAME = 6
 
-RANGE_MIN_M = 0.12
-RANGE_MAX_M = 3.5
-
 PROOF_FRAMES = 16
 """A rule that this many frames in a row have kept is one: by chance, two equal bytes come so once in 2**128 times."""
 
+# What the sensor is made for, and what its official driver says of its ranges.
+_MIN_MM = 120
+_MAX_MM = 3500
 _HEADER = 0xFA
 _FIRST_INDEX = 0xA0
 _LENGTH = 42
@@ -80,13 +80,13 @@ class Decoder(FrameDecoder[Frame]):
 
     def _frame(self, data: bytes, at: int, length: int) -> Frame | None:
         index = data[at + 1] - _FIRST_INDEX
+        is_sum_known = self._summed_frames >= PROOF_FRAMES
+        if not is_sum_known and not self._has_neighbour(data, at, index):
+            return None
         check, again = data[at + _CHECK], data[at + _CHECK + 1]
         is_equal = check == again
         is_sum = is_equal and check == 0xFF - sum(data[at : at + _CHECK]) % 256
-        if self._summed_frames >= PROOF_FRAMES:
-            if not is_sum:
-                return None
-        elif (self._equal_frames >= PROOF_FRAMES and not is_equal) or not self._has_neighbour(data, at, index):
+        if (is_sum_known and not is_sum) or (self._equal_frames >= PROOF_FRAMES and not is_equal):
             return None
         self._equal_frames = self._equal_frames + 1 if is_equal else 0
         self._summed_frames = self._summed_frames + 1 if is_sum else 0
@@ -115,16 +115,11 @@ def points(frame: Frame) -> Points:
     return Points(
         _COUNTED_DEG[frame.index],
         _ANGLES_DEG[frame.index],
-        tuple([_range_m(distance_mm) for distance_mm in frame.distances_mm]),
+        tuple([mm / 1000 if _MIN_MM <= mm <= _MAX_MM else math.nan for mm in frame.distances_mm]),
         frame.intensities,
         turns_per_s(frame.speed),
         frame.index == FRAMES_PER_TURN - 1,
     )
-
-
-def _range_m(distance_mm: int) -> float:
-    range_m = distance_mm / 1000
-    return range_m if RANGE_MIN_M <= range_m <= RANGE_MAX_M else math.nan
 
 
 _COUNTED_DEG = [

@@ -17,8 +17,8 @@ from robosc_bridge.protocol.turns import WIDEST_STEP_DEG, Points, wrapped_deg
 POINTS_PER_FRAME = 12
 POINTS_PER_S = 2300
 
-RANGE_MAX_M = 8.0
-
+# What the sensor is made for.
+_MAX_SQUARE_MM2 = 8000.0**2
 _HEADER = 0x54
 _KINDS = (0x2C, 0xEC)
 _LENGTH = 47
@@ -80,23 +80,29 @@ class Decoder(FrameDecoder[Frame]):
         return _LENGTH if data[at + 1] in _KINDS else 0
 
     def _frame(self, data: bytes, at: int, length: int) -> Frame | None:
+        fields = _FIELDS.unpack_from(data, at)
+        speed_deg_s, start_cdeg, end_cdeg, time_ms = *fields[:2], *fields[-2:]
+        if not _is_plausible(speed_deg_s, start_cdeg, end_cdeg):
+            return None
         if crc8(data[at : at + length]):  # The CRC of anything with its own CRC behind it is 0.
             return None
-        fields = _FIELDS.unpack_from(data, at)
-        frame = Frame(fields[0], fields[1], fields[-2], fields[-1], fields[2:-2:2], fields[3:-2:2])
-        return frame if _is_plausible(frame) else None
+        return Frame(speed_deg_s, start_cdeg, end_cdeg, time_ms, fields[2:-2:2], fields[3:-2:2])
 
 
-def _is_plausible(frame: Frame) -> bool:
+def _is_plausible(speed_deg_s: int, start_cdeg: int, end_cdeg: int) -> bool:
     """Whether there are such angles, and the motor can have turned so far in a frame: the official driver's rule."""
-    if max(frame.start_cdeg, frame.end_cdeg) > _TURN_CDEG or frame.speed_deg_s > WIDEST_STEP_DEG * POINTS_PER_S:
+    if max(start_cdeg, end_cdeg) > _TURN_CDEG or speed_deg_s > WIDEST_STEP_DEG * POINTS_PER_S:
         return False
-    span_deg = (frame.end_cdeg // 100 - frame.start_cdeg // 100 + 360) % 360
-    return span_deg <= 1.5 * frame.speed_deg_s * POINTS_PER_FRAME / POINTS_PER_S
+    span_deg = (end_cdeg // 100 - start_cdeg // 100 + 360) % 360
+    return span_deg <= 1.5 * speed_deg_s * POINTS_PER_FRAME / POINTS_PER_S
 
 
 def points(frame: Frame) -> Points:
-    """Where the points of a frame are."""
+    """Where the points of a frame are, as seen from the axis of the motor instead of the optical centre.
+
+    The official driver publishes every range that is not 0: nothing near is dropped. Beyond what the sensor is made
+    for, a range promises free space that nobody measured.
+    """
     # The device's own arithmetic: whole hundredths of a degree.
     step_cdeg = (frame.end_cdeg + _TURN_CDEG - frame.start_cdeg) % _TURN_CDEG // (POINTS_PER_FRAME - 1)
     start_cdeg = frame.start_cdeg
@@ -104,22 +110,14 @@ def points(frame: Frame) -> Points:
     angles = []
     ranges = []
     for counted_deg, distance_mm in zip(counted, frame.distances_mm, strict=True):
-        angle_deg, range_m = _corrected(counted_deg, distance_mm)
-        angles.append(angle_deg)
+        angle_deg = 360.0 - counted_deg
+        range_m = math.nan
+        if distance_mm:
+            x_mm = distance_mm + 5.9
+            y_mm = 0.11923 * distance_mm - 20.14
+            angle_deg += math.degrees(math.atan(y_mm / x_mm))
+            if x_mm * x_mm + y_mm * y_mm <= _MAX_SQUARE_MM2:
+                range_m = math.hypot(x_mm, y_mm) / 1000
+        angles.append(wrapped_deg(angle_deg))
         ranges.append(range_m)
     return Points(counted, tuple(angles), tuple(ranges), frame.confidences, frame.speed_deg_s / 360)
-
-
-def _corrected(counted_deg: float, distance_mm: int) -> tuple[float, float]:
-    """Angle, counter-clockwise, and range as seen from the axis of the motor, not from the optical centre.
-
-    The official driver publishes every range that is not 0: nothing near is dropped. Beyond what the sensor is made
-    for, a range promises free space that nobody measured.
-    """
-    if not distance_mm:
-        return wrapped_deg(360.0 - counted_deg), math.nan
-    x_mm = distance_mm + 5.9
-    y_mm = 0.11923 * distance_mm - 20.14
-    range_m = math.hypot(x_mm, y_mm) / 1000
-    angle_deg = wrapped_deg(360.0 - counted_deg + math.degrees(math.atan(y_mm / x_mm)))
-    return angle_deg, range_m if range_m <= RANGE_MAX_M else math.nan

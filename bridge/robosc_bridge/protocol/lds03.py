@@ -7,28 +7,33 @@ ring start says the same, and a lost one would join two turns.
 """
 
 import math
+import struct
 from dataclasses import dataclass
 from functools import reduce
 from operator import xor
 
 from robosc_bridge.protocol.framing import FrameDecoder
-from robosc_bridge.protocol.turns import WIDEST_STEP_DEG, Points, wrapped_deg
+from robosc_bridge.protocol.turns import WIDEST_STEP_DEG, Points
 
 START = bytes.fromhex("aa55f00f")
 STOP = bytes.fromhex("aa55f50a")
 
-RANGE_MIN_M = 0.05
-RANGE_MAX_M = 12.0
-
 MOST_SAMPLES = 50
 """Twice as many as a frame was ever seen to have: a false header holds the frames behind it up no longer than two."""
 
+# What the sensor is made for.
+_MIN_MM = 50
+_MAX_MM = 12_000
 _HEADER = b"\xaa\x55"
 _SAMPLES = 10
 _HALF_TURN_TICKS = 180 * 64
 _TURN_TICKS = 2 * _HALF_TURN_TICKS
+# By count of samples: header, kind and count, first and last angle, checksum; then a byte and a word of each sample.
+_FIELDS = [struct.Struct("<HHHHH" + "BH" * samples) for samples in range(MOST_SAMPLES + 1)]
+# By the two lowest bits of a sample's word, and its byte.
+_INTENSITIES = [255 if bits & 1 else min(bits >> 2, 254) for bits in range(1 << 10)]
 # What is this near and this weak is no obstacle for the official driver.
-_WEAK_RANGE_MM = 150
+_WEAK_MM = 150
 _WEAK_INTENSITY = 65
 
 
@@ -65,25 +70,24 @@ class Decoder(FrameDecoder[Frame]):
         return _SAMPLES + 3 * samples if is_header else 0
 
     def _frame(self, data: bytes, at: int, length: int) -> Frame | None:
-        data = data[at : at + length]
-        # The sixteen-bit words of the header; of a sample, its first byte, and its second and third as a word.
-        low, middle, high = data[_SAMPLES::3], data[_SAMPLES + 1 :: 3], data[_SAMPLES + 2 :: 3]
-        if reduce(xor, low, reduce(xor, middle, data[0] ^ data[2] ^ data[4] ^ data[6])) != data[8]:
+        samples = (length - _SAMPLES) // 3
+        fields = _FIELDS[samples].unpack_from(data, at)
+        _, kind, first, last, _ = fields[:5]
+        low, high = fields[5::2], fields[6::2]
+        # The checksum itself is among the words, so that all of them together are 0.
+        if reduce(xor, high, reduce(xor, low, reduce(xor, fields[:5]))):
             return None
-        if reduce(xor, high, data[1] ^ data[3] ^ data[5] ^ data[7]) != data[9]:
+        first_ticks, last_ticks = first >> 1, last >> 1
+        if not _is_plausible(first_ticks, last_ticks, samples):
             return None
-        first_ticks = int.from_bytes(data[4:6], "little") >> 1
-        last_ticks = int.from_bytes(data[6:8], "little") >> 1
-        if not _is_plausible(first_ticks, last_ticks, len(low)):
-            return None
-        is_ring_start = bool(data[2] & 1)
+        is_ring_start = bool(kind & 1)
         return Frame(
             is_ring_start,
-            (data[2] >> 1) / 10 if is_ring_start else None,
+            (kind >> 1 & 0x7F) / 10 if is_ring_start else None,
             first_ticks,
             last_ticks,
-            tuple([b2 << 6 | b1 >> 2 for b1, b2 in zip(middle, high, strict=True)]),
-            tuple([255 if b0 & 1 else min((b1 & 3) << 6 | b0 >> 2, 254) for b0, b1 in zip(low, middle, strict=True)]),
+            tuple([word >> 2 for word in high]),
+            tuple([_INTENSITIES[(word & 3) << 8 | byte] for byte, word in zip(low, high, strict=True)]),
         )
 
 
@@ -105,18 +109,20 @@ def points(frame: Frame) -> Points:
     samples = len(frame.distances_mm)
     step_deg = _span_ticks(frame.first_ticks, frame.last_ticks) / 64 / max(samples - 1, 1)
     first_deg = frame.first_ticks / 64
-    counted = tuple([(first_deg + k * step_deg) % 360.0 for k in range(samples)])
+    counted = [first_deg + k * step_deg for k in range(samples)]
+    if counted[-1] >= 360.0:
+        counted = [counted_deg % 360.0 for counted_deg in counted]
     return Points(
-        counted,
-        tuple([wrapped_deg(360.0 - counted_deg) for counted_deg in counted]),
-        tuple([_range_m(*sample) for sample in zip(frame.distances_mm, frame.intensities, strict=True)]),
+        tuple(counted),
+        tuple([360.0 - counted_deg if counted_deg else 0.0 for counted_deg in counted]),
+        tuple(
+            [
+                mm / 1000
+                if _WEAK_MM < mm <= _MAX_MM or (_MIN_MM <= mm <= _WEAK_MM and intensity > _WEAK_INTENSITY)
+                else math.nan
+                for mm, intensity in zip(frame.distances_mm, frame.intensities, strict=True)
+            ]
+        ),
         frame.intensities,
         frame.frequency_hz,
     )
-
-
-def _range_m(distance_mm: int, intensity: int) -> float:
-    range_m = distance_mm / 1000
-    if not RANGE_MIN_M <= range_m <= RANGE_MAX_M or (distance_mm <= _WEAK_RANGE_MM and intensity <= _WEAK_INTENSITY):
-        return math.nan
-    return range_m

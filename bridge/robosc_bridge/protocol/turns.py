@@ -137,20 +137,22 @@ def nearest_by_degree(angles_deg: Iterable[float], ranges_m: Iterable[float]) ->
     """The smallest range of each of `BINS` bins of one degree, NaN where there is none.
 
     Args:
-        angles_deg: Not negative; bin k covers [k - 0.5, k + 0.5).
+        angles_deg: Within [0, 360); bin k covers [k - 0.5, k + 0.5).
         ranges_m: NaN counts as none.
     """
-    nearest = [math.inf] * BINS
+    nearest = [math.inf] * (BINS + 1)
     for angle_deg, range_m in zip(angles_deg, ranges_m, strict=True):
-        k = int(angle_deg)
-        if angle_deg - k >= 0.5:  # Exact, as adding one half and rounding down is not.
-            k += 1
-        if range_m < nearest[k % BINS]:
-            nearest[k % BINS] = range_m
+        k = int(angle_deg + 0.5)
+        if range_m < nearest[k]:
+            nearest[k] = range_m
+    # The last half degree belongs to the front.
+    nearest[0] = min(nearest[0], nearest.pop())
     return tuple([range_m if range_m < math.inf else math.nan for range_m in nearest])
 
 
 def wrapped_deg(angle_deg: float) -> float:
     """The same direction within [0, 360)."""
+    if 0.0 <= angle_deg < 360.0:
+        return angle_deg
     wrapped = angle_deg % 360.0
     return wrapped if wrapped < 360.0 else 0.0  # The remainder of a tiny negative number is rounded to 360.

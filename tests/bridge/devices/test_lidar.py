@@ -26,6 +26,7 @@ from robosc_bridge.errors import LineError, LineLostError, LineMissingError
 from robosc_bridge.transport.serial_line import SerialLine
 from support.lidar_frames import lds01_frame, lds02_frame, lds03_frame
 from support.pty_end import LIMIT_S, PtyEnd, SkippingClock
+from support.wire import wait_until
 
 START_LDS03 = bytes.fromhex("aa 55 f0 0f")
 STOP_LDS03 = bytes.fromhex("aa 55 f5 0a")
@@ -264,6 +265,18 @@ def test_halves_on_both_sides_of_a_silence_are_no_scan(rig: Rig) -> None:
     assert len(rig.scans(turn[1:] + turn[:1])) == 1
 
 
+def test_halves_of_a_frame_on_both_sides_of_a_silence_are_no_frame(rig: Rig) -> None:
+    first, second = rig.kit.turn(1000)[1:3]
+    rig.pty.send(first[:11])
+    for _ in range(5):
+        assert rig.lidar.receive(0.01) is None
+        rig.clock.skip(rig.kit.model.stale_after_s / 4)
+    rig.pty.send(first[11:] + second[:2])
+    assert rig.lidar.receive(0.05) is None
+    assert rig.lidar.counters.frames == 0
+    assert rig.lidar.counters.skipped_bytes >= 11
+
+
 def test_halves_on_both_sides_of_a_short_pause_are_a_scan(rig: Rig) -> None:
     turn = rig.kit.turn(1000)
     half = len(turn) // 2
@@ -301,7 +314,12 @@ def test_wake_ends_a_receive_while_frames_come(rig: Rig) -> None:
 def test_wake_holds_once(rig: Rig) -> None:
     rig.lidar.wake()
     assert rig.lidar.receive(LIMIT_S) is None
-    assert rig.whole_scan().ranges_m
+    turn = rig.kit.turn(1000)
+    waiting = Waiting(rig.lidar)
+    rig.pty.send(b"".join(turn[:4]))
+    wait_until(lambda: rig.lidar.counters.frames > 0)
+    rig.pty.send(b"".join(turn[4:] + turn[:1]))
+    assert isinstance(waiting.end(), Scan)
 
 
 def test_wake_of_a_closed_lidar_does_nothing(rig: Rig) -> None:
@@ -464,6 +482,20 @@ def test_without_frames_the_other_speed_is_tried_and_the_motor_started_again(rig
     clock.skip(10 * BAUD_TRIAL_S)
     assert lidar.receive(0.0) is None
     assert pty.baud_constant() == termios.B115200
+
+
+def test_what_came_at_one_speed_is_not_read_at_the_other(rig_lds03: Rig) -> None:
+    frame = _lds03_turn(1000)[1]
+    rig_lds03.pty.send(frame[:30])
+    assert rig_lds03.lidar.receive(0.05) is None
+    for _ in range(4):
+        rig_lds03.clock.skip(0.2)
+        assert rig_lds03.lidar.receive(0.0) is None
+    rig_lds03.pty.send(frame[30:])
+    rig_lds03.clock.skip(0.2)
+    assert rig_lds03.lidar.receive(0.05) is None
+    assert rig_lds03.pty.baud_constant() == termios.B115200
+    assert rig_lds03.lidar.counters == ScannerCounters(skipped_bytes=30)
 
 
 def test_another_speed_is_tried_while_receive_waits(rig_lds03: Rig) -> None:

@@ -123,6 +123,13 @@ def test_lds03_worked_frames() -> None:
     assert math.isnan(points.ranges_m[2])
 
 
+def test_lds03_frame_over_zero() -> None:
+    [frame] = lds03.Decoder().feed(lds03_frame(359, 1, [(1000, 200)] * 5))
+    points = lds03.points(frame)
+    assert points.counted_deg == (359, 359.5, 0, 0.5, 1)
+    assert points.angles_deg == (1, 0.5, 0, 359.5, 359)
+
+
 def test_lds03_captured_frame() -> None:
     [frame] = lds03.Decoder().feed(LDS03_GREETING + LDS03_CAPTURED)
     samples = list(zip(frame.distances_mm, frame.intensities, strict=True))
@@ -434,6 +441,17 @@ def test_lds01_forgets_what_it_knows_of_a_device() -> None:
     decoder.feed(b"".join(_lds01_stream(20, lambda _: None)))
     decoder.forget()
     assert len(decoder.feed(b"".join(_lds01_stream(20, lambda n: (n, n + 1))))) == 20
+
+
+def test_lds01_without_a_known_check_waits_for_the_successor_of_a_frame_that_follows_none() -> None:
+    frames = _lds01_stream(3, lambda n: (n, n + 1))
+    decoder = lds01.Decoder()
+    assert len(decoder.feed(frames[0] + frames[1][:2])) == 1
+    # One byte too many, which looks like a beginning.
+    decoder.forget()
+    assert len(decoder.feed(frames[0] + b"\xfa" + frames[1])) == 0
+    assert len(decoder.feed(frames[0] + frames[1] + b"\xfa" + frames[2])) == 2
+    assert len(decoder.feed(b"\xfa\xa3")) == 1
 
 
 def test_lds01_without_a_known_check_takes_no_frame_out_of_order() -> None:

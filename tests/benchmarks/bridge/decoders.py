@@ -1,0 +1,114 @@
+"""How many bytes of each LiDAR the bridge decodes in a second, beside what its line brings at most.
+
+The aim is a hundred times the line; time is that of the processor. *Frames*: bytes to frames. *Scans*: bytes to 360
+ranges. *Noise*: random bytes. *Headers*: nothing but what looks like the beginning of a frame, the worst that a line
+can bring.
+
+Usage: decoders.py
+"""
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from random import Random
+from typing import Any
+
+ROOT = Path(__file__).parents[3]
+sys.path[:0] = [str(ROOT), str(ROOT / "bridge"), str(ROOT / "tests"), str(ROOT / "tests" / "benchmarks")]
+
+from figures import text_table  # noqa: E402  # found through the path above
+from robosc_bridge.devices.lidar import LDS01, LDS02, LDS03, Model  # noqa: E402
+from robosc_bridge.protocol.turns import TurnBuilder, nearest_by_degree  # noqa: E402
+from support.lidar_frames import lds01_frame, lds02_frame, lds03_frame  # noqa: E402
+
+RUNS = 7
+TURNS = 60
+NOISE_BYTES = 200_000
+AIM = 100
+READS = (64, 4096)
+"""Bytes that come with one read: as they trickle in, and after a pause."""
+
+HEADER = ["stream, bytes a read", "MB/s", "line, MB/s", "times the line", f"aim ({AIM} times)"]
+
+
+def _lds01(dice: Random) -> Iterator[bytes]:
+    for index in range(60):
+        yield lds01_frame(index, [(dice.randrange(2000), dice.randrange(120, 3500)) for _ in range(6)])
+
+
+def _lds02(dice: Random) -> Iterator[bytes]:
+    for start in range(0, 36000, 1125):
+        points = [(dice.randrange(160, 8000), dice.randrange(256)) for _ in range(12)]
+        yield lds02_frame(start, (start + 1030) % 36000, points)
+
+
+def _lds03(dice: Random) -> Iterator[bytes]:
+    yield lds03_frame(0, 0, [(1000, 200)], ring_start_dhz=100)
+    for part in range(16):
+        points = [(dice.randrange(50, 12000), dice.randrange(256)) for _ in range(25)]
+        yield lds03_frame(part * 22.5 + 0.5, min(part * 22.5 + 22, 359.9), points)
+
+
+DEVICES: list[tuple[Model[Any], Callable[[Random], Iterator[bytes]], bytes]] = [
+    (LDS01, _lds01, b"\xfa\xa0"),
+    (LDS02, _lds02, b"\x54\x2c"),
+    (LDS03, _lds03, b"\xaa\x55\x00\x32\x01\x00\x01\x00"),
+]
+
+
+def _frames(model: Model[Any], reads: list[bytes]) -> int:
+    decoder = model.make_decoder()
+    return sum(len(decoder.feed(data)) for data in reads)
+
+
+def _scans(model: Model[Any], reads: list[bytes]) -> int:
+    decoder = model.make_decoder()
+    turns = TurnBuilder()
+    found = 0
+    for data in reads:
+        for frame in decoder.feed(data):
+            turn = turns.add(model.points(frame))
+            if turn:
+                found += len(nearest_by_degree(turn.angles_deg, turn.ranges_m)) == 360
+    return found
+
+
+def _row(
+    name: str, model: Model[Any], data: bytes, size: int, work: Callable[[Model[Any], list[bytes]], int], found: int
+) -> list[str]:
+    reads = [data[at : at + size] for at in range(0, len(data), size)]
+    best_s = float("inf")
+    for _ in range(RUNS):
+        begin = time.process_time()
+        count = work(model, reads)
+        best_s = min(best_s, time.process_time() - begin)
+        if count < found:
+            raise RuntimeError(f"{name}: {count} instead of {found} were found")
+    speed = len(data) / best_s / 1e6
+    line = model.bauds[0] / 10 / 1e6
+    verdict = "met" if speed >= AIM * line else "missed"
+    return [f"{name}, {size}", f"{speed:.2f}", f"{line:.4f}", f"{speed / line:.0f}", verdict]
+
+
+def table() -> str:
+    """The table."""
+    rows = []
+    for model, turn, header in DEVICES:
+        dice = Random(1)
+        frames = [frame for _ in range(TURNS) for frame in turn(dice)]
+        stream = b"".join(frames)
+        noise = dice.randbytes(NOISE_BYTES)
+        headers = header * (NOISE_BYTES // len(header))
+        for size in READS:
+            rows += [
+                _row(f"{model.name}: frames", model, stream, size, _frames, len(frames)),
+                _row(f"{model.name}: scans", model, stream, size, _scans, TURNS - 1),
+                _row(f"{model.name}: noise", model, noise, size, _frames, 0),
+                _row(f"{model.name}: headers", model, headers, size, _frames, 0),
+            ]
+    return text_table(f"LiDAR decoders, best of {RUNS} runs", HEADER, rows)
+
+
+if __name__ == "__main__":
+    sys.stdout.write(table() + "\n")

@@ -113,6 +113,7 @@ _READERS: dict[str, Callable[[str], object]] = {
     "corrupt_next": int,
     "corrupt_share": float,
     "lose_bytes_share": float,
+    "cut_next": int,
     "garbage": bytes.fromhex,
     "split_s": _seconds_or_none,
     "echo": _boolean,

@@ -10,6 +10,7 @@ from robosc_bridge.simulated.turtlebot3 import SimulatedTurtleBot3
 HELP = """\
 base|scanner disconnect|reconnect|sound     the plug of a line; `sound` removes its faults
 base|scanner FAULT VALUE                    a fault of a line: {faults}
+base answers_as ID|own                      the ID that its answers carry
 left|right overheat|cool_down|overload      a wheel's servo
 left|right block|release                    a wheel
 left|right voltage V                        a servo's supply
@@ -71,6 +72,13 @@ def _obey(robot: SimulatedTurtleBot3, words: list[str]) -> str:
             robot.scanner.is_stalled = what == "stall"
         case ["scanner", "turn", share]:
             robot.scanner.turn_at(float(share))
+        case ["base", "answers_as", device_id]:
+            answers_as = None if device_id == "own" else int(device_id)
+            # It has one of the two.
+            if robot.opencr is not None:
+                robot.opencr.answers_as = answers_as
+            if robot.bus is not None:
+                robot.bus.answers_as = answers_as
         case ["base" | "scanner" as which, *what]:
             _to_line(robot.base_line if which == "base" else robot.scanner_line, what)
         case _:
@@ -114,7 +122,6 @@ _READERS: dict[str, Callable[[str], object]] = {
     "corrupt_share": float,
     "lose_bytes_share": float,
     "cut_next": int,
-    "garbage": bytes.fromhex,
     "split_s": _seconds_or_none,
     "echo": _boolean,
     "is_deaf": _boolean,
@@ -129,6 +136,8 @@ def _to_line(line: SimulatedLine, words: list[str]) -> None:
             line.reconnect()
         case ["sound"]:
             line.faults.clear()
+        case ["garbage", *hexes] if hexes:
+            line.faults.garbage = bytes.fromhex("".join(hexes))
         case [name, value] if name in _READERS:
             setattr(line.faults, name, _READERS[name](value))
         case _:

@@ -114,6 +114,16 @@ def test_it_stops_half_a_second_after_the_last_heartbeat(station: Station) -> No
     assert station.wheels() == (126, 126)
 
 
+def test_after_a_change_of_state_the_half_second_begins_anew(station: Station) -> None:
+    station.robot.advance(0.1)
+    station.beat()
+    # One comparison is skipped, in the cycle after it.
+    station.robot.advance(0.51)
+    assert station.opencr.is_connected
+    station.robot.advance(0.05)
+    assert not station.opencr.is_connected
+
+
 def test_the_last_command_holds_for_ever(station: Station) -> None:
     station.live(0.2)
     station.command(5)
@@ -150,12 +160,14 @@ def test_linear_and_angular_are_clamped_apart_and_each_wheel_at_337(waffle: Stat
     # The left one stands: both clamps are the same speed of a wheel.
     # What 77 rpm at 12 V allow is 336 raw.
     assert waffle.wheels() == (0, 336)
+    assert [servo.table["goal velocity"] for servo in (waffle.robot.left, waffle.robot.right)] == [0, 337]
 
 
 def test_what_is_not_registered_reads_as_zero(station: Station) -> None:
     assert station.read(8, "B") == 0
     # A part of an item is none.
     assert station.read(1, "B") == 0
+    assert station.read(42, "H") == 0
     data, result, error = station.handler.readTxRx(station.port, 200, 300, 100)
     assert (bytes(data), result, error) == (bytes(100), 0, 0)
 

@@ -81,6 +81,13 @@ def test_noise_is_survived_and_a_packet_after_a_pause_is_heard(pieces: list[byte
     assert parser.feed(request(1, 1, b""), 1.0)[-1] == Request(1, 1, b"")
 
 
+def test_what_was_given_up_in_its_middle_is_forgotten() -> None:
+    parser = RequestParser()
+    assert parser.feed(request(1, 3, bytes(1000))[:100], 0.0) == []
+    assert parser.feed(request(1, 1, b""), 0.05) == []
+    assert parser.feed(request(2, 1, b""), 0.2) == [Request(2, 1, b"")]
+
+
 def test_a_packet_behind_one_that_was_cut_off_is_heard() -> None:
     parser = RequestParser()
     cut = request(1, 3, bytes(8))[:12]

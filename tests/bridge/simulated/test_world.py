@@ -107,6 +107,15 @@ def test_an_arc_comes_back_to_where_it_began() -> None:
     assert world.pose[2] - start[2] == pytest.approx(2 * math.pi, abs=0.01)
 
 
+def test_a_quarter_of_an_arc() -> None:
+    world = world_of(Walls(()))
+    drive(world, 2.0, 4.0, 0.5)
+    world.place(0.0, 0.0, 0.0)
+    # 0.4125 rad/s: in whole steps of the world.
+    drive(world, 2.0, 4.0, 3.805)
+    assert world.pose == pytest.approx((0.24, 0.24, math.pi / 2), abs=0.002)
+
+
 def test_a_waffle_turns_slower() -> None:
     world = world_of(Walls(()), body="waffle")
     drive(world, -4.0, 4.0, 0.5)

@@ -60,6 +60,8 @@ class Timebase:
     def advance(self, seconds: float) -> None:
         """Let time pass in small steps; when it returns, all devices have lived it.
 
+        What its host has written just before, a device hears in the first of them.
+
         Raises:
             TypeError: The clock moves by itself.
             ValueError: Time would go back.

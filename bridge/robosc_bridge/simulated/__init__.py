@@ -1,1 +1,42 @@
-"""Simulated devices on pseudo-terminals, and the planar world that they move in and see."""
+"""Simulated devices on pseudo-terminals, and the planar world that they move in and see.
+
+`SimulatedTurtleBot3` is a whole robot; its parts can be put together otherwise: a `World` with `Walls`, `Servo`s on a
+`ServoBus`, an `OpenCr`, one of the `LIDARS`, each on a `SimulatedLine`. `python -m robosc_bridge.simulated` serves one
+in a process of its own. Nothing here knows the drivers' encoders and decoders: both sides stand on the manuals alone.
+"""
+
+from robosc_bridge.simulated.lidar import LIDARS, Lds01, Lds02, Lds03, Lidar
+from robosc_bridge.simulated.line import Faults, SimulatedLine
+from robosc_bridge.simulated.opencr import OpenCr
+from robosc_bridge.simulated.robots import BODIES, Body
+from robosc_bridge.simulated.servo import Servo
+from robosc_bridge.simulated.servo_bus import ServoBus
+from robosc_bridge.simulated.timebase import Timebase
+from robosc_bridge.simulated.turtlebot3 import BASES, SimulatedTurtleBot3, wheel_servos
+from robosc_bridge.simulated.walls import Walls, maze, parse_walls, room
+from robosc_bridge.simulated.world import Wheel, World
+
+__all__ = [
+    "BASES",
+    "BODIES",
+    "LIDARS",
+    "Body",
+    "Faults",
+    "Lds01",
+    "Lds02",
+    "Lds03",
+    "Lidar",
+    "OpenCr",
+    "Servo",
+    "ServoBus",
+    "SimulatedLine",
+    "SimulatedTurtleBot3",
+    "Timebase",
+    "Walls",
+    "Wheel",
+    "World",
+    "maze",
+    "parse_walls",
+    "room",
+    "wheel_servos",
+]

@@ -1,0 +1,301 @@
+"""The three LiDARs of the TurtleBot3, as bytes: frames paced in time, from what the world's walls return.
+
+Behaviour after the vendors' drivers (see `lidar_frames`). All turn clockwise. What goes on the wire is what the real
+sensor would measure, so that a driver that corrects as the stock one does finds the walls where they are:
+
+- LDS-01: sample i of a turn is at 359 - i degrees counter-clockwise;
+- LDS-02: distances are from the optical centre, beside the axis and in a direction that deviates from the nominal one;
+- LDS-03: angles are counter-clockwise when negated.
+"""
+
+import math
+import random
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+
+from robosc_bridge.simulated.lidar_frames import lds01_frame, lds02_frame, lds03_frame, lds03_identity
+from robosc_bridge.simulated.line import Sending
+from robosc_bridge.simulated.world import World
+
+# A thread that was late sends what was missed, but not for longer than this.
+_BACKLOG_S = 0.5
+
+
+class Lidar(ABC):
+    """A LiDAR on the robot.
+
+    Args:
+        world: That it sees.
+        seed: Of the angle at which it begins, and of the noise.
+        noise_m: Standard deviation of what it measures.
+        starts_mid_frame: Whether the first frame after a start is cut, as when a host begins to listen at any time.
+
+    Attributes:
+        is_covered: Whether something covers it: it measures nothing.
+        is_stalled: Whether it has fallen silent.
+        speed_share: At which share of its nominal speed it turns.
+    """
+
+    baud: int | None
+    nominal_hz: float
+    nearest_m: float
+    farthest_m: float
+
+    def __init__(self, world: World, *, seed: int = 0, noise_m: float = 0.0, starts_mid_frame: bool = True) -> None:
+        self.is_covered = False
+        self.is_stalled = False
+        self.speed_share = 1.0
+        self._world = world
+        self._time = world.time
+        self._chance = random.Random(seed)  # noqa: S311 (noise is no secret)
+        self._noise_m = noise_m
+        self._starts_mid_frame = starts_mid_frame
+        self._is_cut = False
+        self._is_spinning = False
+        self._frame_world_s = 0.0
+        self.plug_in()
+
+    @property
+    def is_spinning(self) -> bool:
+        """Whether its motor is on."""
+        return self._is_spinning
+
+    @property
+    def turns_per_s(self) -> float:
+        """As it turns now, in world time."""
+        return self.nominal_hz * self.speed_share
+
+    def plug_in(self) -> None:
+        """Power comes: it turns by itself."""
+        self._spin()
+
+    def due_s(self) -> float:
+        """When the next frame is complete."""
+        if not self._is_spinning:
+            return math.inf
+        return self._time.now_s() + (self._frame_world_s - self._time.world_s()) / self._time.factor
+
+    def live(self) -> Iterable[Sending]:
+        """All frames that are complete."""
+        found: list[Sending] = []
+        now_s = self._time.world_s()
+        self._frame_world_s = max(self._frame_world_s, now_s - _BACKLOG_S)
+        while self._is_spinning and self._frame_world_s <= now_s + 1e-9:
+            if self.is_stalled:
+                self._frame_world_s = now_s + self._frame_s()
+                break
+            frame = self._frame()
+            self._frame_world_s += self._frame_s()
+            if self._is_cut:
+                frame = frame[self._chance.randrange(1, len(frame)) :]
+                self._is_cut = False
+            found.append(Sending(frame))
+        return found
+
+    def receive(self, data: bytes, baud: int) -> Iterable[Sending]:
+        """It has no ears, unless a model says otherwise."""
+        return ()
+
+    def _spin(self) -> None:
+        if not self._is_spinning:
+            self._is_spinning = True
+            self._is_cut = self._starts_mid_frame
+            self._begin_turn(self._chance.random())
+            self._frame_world_s = self._time.world_s() + self._frame_s()
+
+    def _halt(self) -> None:
+        self._is_spinning = False
+
+    @abstractmethod
+    def _begin_turn(self, share: float) -> None:
+        """Be at this share of a turn when the motor starts."""
+
+    @abstractmethod
+    def _frame_s(self) -> float:
+        """How long the frame takes that is being measured."""
+
+    @abstractmethod
+    def _frame(self) -> bytes:
+        """The frame that is complete now."""
+
+    def _distances_mm(self, device_degrees: Sequence[float]) -> list[int]:
+        """What is measured at clockwise angles from the front; 0: nothing."""
+        angles = -np.radians(np.asarray(device_degrees))
+        directions = np.stack((np.cos(angles), np.sin(angles)), axis=1)
+        return self._measured(self._world.cast(np.zeros_like(directions), directions))
+
+    def _measured(self, lengths_m: Iterable[float]) -> list[int]:
+        found = []
+        for length_m in lengths_m:
+            if self._noise_m:
+                length_m += self._chance.gauss(0.0, self._noise_m)
+            is_seen = not self.is_covered and self.nearest_m <= length_m <= self.farthest_m
+            found.append(round(length_m * 1000) if is_seen else 0)
+        return found
+
+
+class Lds01(Lidar):
+    """LDS-01 (HLS-LFCD2): `b` starts the motor, `e` stops it; it turns at power-on without being told."""
+
+    baud = 230_400
+    nominal_hz = 5.0
+    nearest_m = 0.12
+    farthest_m = 3.5
+
+    def receive(self, data: bytes, baud: int) -> Iterable[Sending]:
+        """Obey the last command in it."""
+        for byte in data:
+            if byte == ord("b"):
+                self._spin()
+            elif byte == ord("e"):
+                self._halt()
+        return ()
+
+    def _begin_turn(self, share: float) -> None:
+        self._index = int(share * 60)
+
+    def _frame_s(self) -> float:
+        return 1.0 / (60 * self.turns_per_s)
+
+    def _frame(self) -> bytes:
+        degrees = [6 * self._index + place + 1 for place in range(6)]
+        points = [(distance_mm, 1000 if distance_mm else 0) for distance_mm in self._distances_mm(degrees)]
+        frame = lds01_frame(self._index, round(self.turns_per_s * 600), points)
+        self._index = (self._index + 1) % 60
+        return frame
+
+
+class Lds02(Lidar):
+    """LDS-02 (LD08): it only talks, from power-on."""
+
+    baud = 115_200
+    nominal_hz = 2152 / 360
+    nearest_m = 0.16
+    farthest_m = 8.0
+
+    _POINTS = 12
+    _SAMPLES_PER_S = 2300.0
+    # Corrected point of a distance d (mm) at angle 0: (d + 5.9, 0.11923 d - 20.14).
+    _CENTRE_M = (0.0059, -0.02014)
+    _DIRECTION = (1.0, 0.11923)
+
+    def _begin_turn(self, share: float) -> None:
+        self._degrees = share * 360
+
+    def _frame_s(self) -> float:
+        return self._POINTS / self._SAMPLES_PER_S
+
+    def _frame(self) -> bytes:
+        speed = self.turns_per_s * 360
+        start = round(self._degrees * 100) % 36_000
+        span = round(speed / self._SAMPLES_PER_S * 100 * (self._POINTS - 1))
+        # A host places the points in whole hundredths of a degree.
+        step = span // (self._POINTS - 1)
+        degrees = [(start + place * step) / 100 for place in range(self._POINTS)]
+        points = [(distance_mm, 200 if distance_mm else 0) for distance_mm in self._optical_mm(degrees)]
+        stamp_ms = int(self._time.world_s() * 1000) % 65_536
+        frame = lds02_frame(round(speed), start, (start + span) % 36_000, stamp_ms, points)
+        self._degrees = (self._degrees + self._POINTS * speed / self._SAMPLES_PER_S) % 360
+        return frame
+
+    def _optical_mm(self, device_degrees: Sequence[float]) -> list[int]:
+        """What it measures from its optical centre, along the rays on which the corrected points lie."""
+        angles = -np.radians(np.asarray(device_degrees))
+        cosines, sines = np.cos(angles), np.sin(angles)
+
+        def turned(vector: tuple[float, float]) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+            x, y = vector
+            return np.stack((x * cosines - y * sines, x * sines + y * cosines), axis=1)
+
+        return self._measured(self._world.cast(turned(self._CENTRE_M), turned(self._DIRECTION)))
+
+
+class Lds03(Lidar):
+    """LDS-03 (COIN-D4): idle until it is told to start; tells its identity then.
+
+    Which speeds its two exposures have is not documented: 6 and 10 turns a second.
+    """
+
+    baud = 230_400
+    nominal_hz = 10.0
+    nearest_m = 0.05
+    farthest_m = 12.0
+
+    _SAMPLES_PER_S = 4000.0
+    _FULL = 25
+    _START, _STOP, _SLOW, _FAST, _VERSION = (
+        bytes((0xAA, 0x55, code, 0xFF - code)) for code in (0xF0, 0xF5, 0xF1, 0xF2, 0xFC)
+    )
+    _GREETING = bytes.fromhex("a55a0000800181")
+
+    def plug_in(self) -> None:
+        """Power comes: it waits for its start command."""
+        self._heard = b""
+        self._halt()
+
+    def receive(self, data: bytes, baud: int) -> Iterable[Sending]:
+        """Obey what it knows; the rest is noise."""
+        found: list[Sending] = []
+        held = self._heard + data
+        while len(held) >= 4:
+            command, held = held[:4], held[4:]
+            match command:
+                case self._START:
+                    if not self._is_spinning:
+                        found += [Sending(self._GREETING[:2]), Sending(lds03_identity()), Sending(self._GREETING)]
+                    self._spin()
+                case self._STOP:
+                    self._halt()
+                case self._SLOW:
+                    self.nominal_hz = 6.0
+                case self._FAST:
+                    self.nominal_hz = 10.0
+                case self._VERSION:
+                    found.append(Sending(lds03_identity()))
+                case _:
+                    held = command[1:] + held
+        self._heard = held
+        return found
+
+    def _begin_turn(self, share: float) -> None:
+        # The part of a turn that is left, in samples.
+        self._degrees = share * 360
+        self._begins_turn = False
+
+    @property
+    def _degrees_per_sample(self) -> float:
+        return 360 * self.turns_per_s / self._SAMPLES_PER_S
+
+    def _samples(self) -> int:
+        if self._begins_turn:
+            return 1
+        left = math.ceil((360 - self._degrees) / self._degrees_per_sample - 1e-6)
+        return max(1, min(self._FULL, left))
+
+    def _frame_s(self) -> float:
+        return self._samples() / self._SAMPLES_PER_S
+
+    def _frame(self) -> bytes:
+        count = self._samples()
+        step = self._degrees_per_sample
+        first, last = (_angle(self._degrees + place * step) for place in (0, count - 1))
+        # Where a host places them.
+        degrees = [(first + place * (last - first) / max(count - 1, 1)) / 64 for place in range(count)]
+        points = [(distance_mm, 200 if distance_mm else 0) for distance_mm in self._distances_mm(degrees)]
+        kind = (round(self.turns_per_s * 10) << 1 | 1) & 0xFF if self._begins_turn else 0
+        frame = lds03_frame(kind, first, last, points)
+        self._degrees += count * step
+        self._begins_turn = self._degrees >= 360 - 1e-6
+        if self._begins_turn:
+            self._degrees = max(self._degrees - 360, 0.0)
+        return frame
+
+
+def _angle(degrees: float) -> int:
+    """In degrees / 64, below a whole turn."""
+    return min(round(degrees * 64), 360 * 64 - 1)
+
+
+LIDARS: dict[str, Callable[..., Lidar]] = {"lds01": Lds01, "lds02": Lds02, "lds03": Lds03}

@@ -1,0 +1,308 @@
+"""The device's end of a serial line: a pseudo-terminal, a thread that serves it, and faults of the wire.
+
+The wire lives in real time, whatever clock the device has, because the host at its other end does: a delayed answer is
+late by real seconds.
+"""
+
+import contextlib
+import math
+import os
+import random
+import select
+import tempfile
+import termios
+import threading
+import time
+import tty
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Protocol, Self
+
+from robosc_bridge.simulated.timebase import Timebase
+
+_CHUNK = 4096
+_BAUDS = {
+    getattr(termios, f"B{baud}"): baud
+    for baud in (
+        9600, 19200, 38400, 57600, 115200, 230400, 460800, 500000, 576000, 921600, 1000000, 1152000, 1500000, 2000000,
+        2500000, 3000000, 3500000, 4000000,
+    )
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Sending:
+    """Bytes that a device sends.
+
+    Attributes:
+        data: One packet or frame.
+        after_s: How long the device itself takes before it sends them.
+    """
+
+    data: bytes
+    after_s: float = 0.0
+
+
+class Device(Protocol):
+    """What hangs on a line. All is called under the lock of its time."""
+
+    @property
+    def baud(self) -> int | None:
+        """At which it talks; None: any speed is right (a USB device), or it sees to it itself (a bus)."""
+
+    def receive(self, data: bytes, baud: int) -> Iterable[Sending]:
+        """Hear bytes at the host's speed and answer."""
+
+    def live(self) -> Iterable[Sending]:
+        """Live until now, and send what is due by itself."""
+
+    def due_s(self) -> float:
+        """When, by the clock, `live` is needed next; infinity: not until something comes."""
+
+    def plug_in(self) -> None:
+        """Begin after its line was plugged in again."""
+
+
+@dataclass
+class Faults:
+    """What is wrong with a wire; may be changed at any time, and acts on what is sent from then on.
+
+    Attributes:
+        delay_s: By which every packet to the host is late, in real seconds.
+        drop_next: How many of the next packets to the host are lost.
+        drop_share: Share of packets to the host that are lost.
+        corrupt_next: How many of the next packets have a wrong byte.
+        corrupt_share: Share of packets that have a wrong byte.
+        lose_bytes_share: Share of single bytes that are lost.
+        garbage: Sent before every packet.
+        split_s: Seconds between single bytes; 0: each is written alone, at once; None: packets are whole.
+        echo: Whether the adapter sends back what the host sends.
+        is_deaf: Whether nothing of the host reaches the device.
+    """
+
+    delay_s: float = 0.0
+    drop_next: int = 0
+    drop_share: float = 0.0
+    corrupt_next: int = 0
+    corrupt_share: float = 0.0
+    lose_bytes_share: float = 0.0
+    garbage: bytes = b""
+    split_s: float | None = None
+    echo: bool = False
+    is_deaf: bool = False
+
+    def clear(self) -> None:
+        """A sound wire again."""
+        self.__dict__.update(Faults().__dict__)
+
+
+class SimulatedLine:
+    """Serves a device on a pseudo-terminal until it is closed.
+
+    Args:
+        device: That answers.
+        time: That it lives by.
+        link: Where the port's stable name, a symbolic link, is to be; None: in a folder of its own.
+        seed: Of the faults that come by chance.
+
+    Attributes:
+        path: Of the port: stable over `disconnect` and `reconnect`, as a udev rule makes it.
+        faults: Of the wire.
+        lost_bytes: That the host has not read in time, as with a full buffer of a serial driver.
+        received: Bytes that the host has sent.
+        sent: Bytes that have been sent to it.
+
+    Raises:
+        FileExistsError: There is something at `link` already.
+    """
+
+    def __init__(self, device: Device, time: Timebase, link: Path | None = None, seed: int = 0) -> None:
+        self.device = device
+        self.faults = Faults()
+        self.lost_bytes = 0
+        self.received = 0
+        self.sent = 0
+        self._time = time
+        self._chance = random.Random(seed)  # noqa: S311 (faults are no secrets)
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        if link is None:
+            self._folder = tempfile.TemporaryDirectory(prefix="robosc-port-")
+            link = Path(self._folder.name) / "port"
+        self._link = link
+        self.path = str(self._link)
+        self._wire: deque[tuple[float, bytes]] = deque()
+        self._master = self._slave = -1
+        self._woken, self._waker = os.pipe()
+        os.set_blocking(self._woken, False)
+        os.set_blocking(self._waker, False)
+        self._is_open = True
+        self._plug()
+        time.join(self._live)
+        self._thread = threading.Thread(target=self._serve, name=f"simulated line {self.path}", daemon=True)
+        self._thread.start()
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether the port is there."""
+        return self._master >= 0
+
+    def disconnect(self) -> None:
+        """Pull the plug: the port is gone, and whoever has it open sees a hang-up."""
+        with self._time.lock:
+            if self._master < 0:
+                return
+            self._link.unlink(missing_ok=True)
+            os.close(self._master)
+            os.close(self._slave)
+            self._master = self._slave = -1
+            self._wire.clear()
+        self._wake()
+
+    def reconnect(self) -> None:
+        """Plug it in again: another port under the same name."""
+        with self._time.lock:
+            if self._master >= 0 or not self._is_open:
+                return
+            self._plug()
+            self.device.plug_in()
+        self._wake()
+
+    def close(self) -> None:
+        """End it and remove the port; may be called again."""
+        if not self._is_open:
+            return
+        self._is_open = False
+        self._wake()
+        self._thread.join()
+        self._time.leave(self._live)
+        self.disconnect()
+        os.close(self._woken)
+        os.close(self._waker)
+        if self._folder is not None:
+            self._folder.cleanup()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _plug(self) -> None:
+        master, slave = os.openpty()
+        try:
+            tty.setraw(slave)
+            os.set_blocking(master, False)
+            self._link.symlink_to(os.ttyname(slave))
+        except BaseException:
+            os.close(master)
+            os.close(slave)
+            raise
+        # The slave stays open here: the master would see an error whenever no host has the port open.
+        self._master, self._slave = master, slave
+
+    def _wake(self) -> None:
+        # A full pipe: it is awake already. A closed one: it has ended.
+        with contextlib.suppress(OSError):
+            os.write(self._waker, b"\0")
+
+    def _serve(self) -> None:
+        while self._is_open:
+            with self._time.lock:
+                self._live()
+                limit_s = self._limit_s()
+                master = self._master
+                poll = select.poll()
+                poll.register(self._woken, select.POLLIN)
+                if master >= 0:
+                    poll.register(master, select.POLLIN)
+            ready = dict(poll.poll(None if math.isinf(limit_s) else max(limit_s, 0.0) * 1000))
+            if self._woken in ready:
+                with contextlib.suppress(BlockingIOError):
+                    os.read(self._woken, _CHUNK)
+            if master in ready:
+                with self._time.lock:
+                    # It may have been pulled since; its number may be another file's by now.
+                    if self._master == master:
+                        self._hear()
+
+    def _hear(self) -> None:
+        try:
+            data = os.read(self._master, _CHUNK)
+        except OSError:
+            return
+        self.received += len(data)
+        if self.faults.echo:
+            self._send([Sending(data)])
+        if not self.faults.is_deaf:
+            self._send(self.device.receive(self._heard_through(data), self._host_baud()))
+
+    def _live(self) -> None:
+        with self._time.lock:
+            # It lives on without a line, and what it sends then goes nowhere.
+            sendings = self.device.live()
+            if self._master >= 0:
+                self._send(sendings)
+            self._flush()
+
+    def _limit_s(self) -> float:
+        wire_s = self._wire[0][0] - time.monotonic() if self._wire else math.inf
+        device_s = math.inf if self._time.is_manual else self.device.due_s() - self._time.now_s()
+        return min(wire_s, device_s)
+
+    def _host_baud(self) -> int:
+        return _BAUDS.get(termios.tcgetattr(self._slave)[5], 0)
+
+    def _send(self, sendings: Iterable[Sending]) -> None:
+        for sending in sendings:
+            data = self._spoilt(sending.data)
+            if data is None:
+                continue
+            faults = self.faults
+            due_s = time.monotonic() + sending.after_s + faults.delay_s
+            if self._wire:
+                due_s = max(due_s, self._wire[-1][0])
+            if faults.split_s is None:
+                self._wire.append((due_s, data))
+            else:
+                for index in range(len(data)):
+                    self._wire.append((due_s + index * faults.split_s, data[index : index + 1]))
+        self._flush()
+
+    def _spoilt(self, data: bytes) -> bytes | None:
+        faults, chance = self.faults, self._chance
+        if faults.drop_next > 0:
+            faults.drop_next -= 1
+            return None
+        if faults.drop_share and chance.random() < faults.drop_share:
+            return None
+        if faults.corrupt_next > 0 or (faults.corrupt_share and chance.random() < faults.corrupt_share):
+            faults.corrupt_next = max(faults.corrupt_next - 1, 0)
+            # Behind the header, so that it stays a frame, with a wrong checksum.
+            index = chance.randrange(len(data) // 2, len(data))
+            data = data[:index] + bytes((data[index] ^ chance.randrange(1, 256),)) + data[index + 1 :]
+        if faults.lose_bytes_share:
+            data = bytes(byte for byte in data if chance.random() >= faults.lose_bytes_share)
+        return self._heard_through(faults.garbage + data)
+
+    def _heard_through(self, data: bytes) -> bytes:
+        """What arrives of it: noise, if the two ends do not agree on the speed."""
+        is_right = self.device.baud is None or self.device.baud == self._host_baud()
+        return data if is_right else self._chance.randbytes(len(data))
+
+    def _flush(self) -> None:
+        now_s = time.monotonic()
+        while self._wire and self._wire[0][0] <= now_s:
+            _, data = self._wire.popleft()
+            if self._master < 0:
+                continue
+            try:
+                written = os.write(self._master, data)
+            except OSError:
+                written = 0
+            self.sent += written
+            self.lost_bytes += len(data) - written

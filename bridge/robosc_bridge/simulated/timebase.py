@@ -1,0 +1,78 @@
+"""Time as the simulated devices live it: the clock of their time-outs, and the world's time, which may pass faster.
+
+Two times are kept apart. Whatever a device owes its host (heartbeat, bus watchdog, restart) is measured on the clock as
+it is, because the host lives by it. Whatever is physical (motion, a turning scanner) is measured in world time, which
+passes `factor` times as fast.
+"""
+
+import math
+import threading
+from collections.abc import Callable
+
+from robosc.execution.clock import Clock, ManualClock, SystemClock
+
+_STEP_S = 0.005
+
+
+class Timebase:
+    """The time that all devices of one simulation share, and the lock under which they live.
+
+    Args:
+        clock: `SystemClock`: the devices live by themselves. `ManualClock`: they live when `advance` is called.
+        factor: How many seconds pass in the world in one of the clock.
+
+    Raises:
+        ValueError: The factor is no positive, finite number.
+    """
+
+    def __init__(self, clock: Clock | None = None, factor: float = 1.0) -> None:
+        if not (math.isfinite(factor) and factor > 0):
+            raise ValueError(f"the speed factor must be a positive number, and is {factor}")
+        self.clock: Clock = SystemClock() if clock is None else clock
+        self.factor = factor
+        self.lock = threading.RLock()
+        self._began_s = self.clock.monotonic()
+        self._members: list[Callable[[], None]] = []
+
+    @property
+    def is_manual(self) -> bool:
+        """Whether time passes only in `advance`."""
+        return isinstance(self.clock, ManualClock)
+
+    def now_s(self) -> float:
+        """The clock's reading."""
+        return self.clock.monotonic()
+
+    def world_s(self) -> float:
+        """Seconds that have passed in the world since the simulation began."""
+        return (self.now_s() - self._began_s) * self.factor
+
+    def join(self, live: Callable[[], None]) -> None:
+        """Call this whenever `advance` has moved the clock by a step."""
+        with self.lock:
+            self._members.append(live)
+
+    def leave(self, live: Callable[[], None]) -> None:
+        """Call it no more."""
+        with self.lock:
+            self._members.remove(live)
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass in small steps; when it returns, all devices have lived it.
+
+        Raises:
+            TypeError: The clock moves by itself.
+            ValueError: Time would go back.
+        """
+        if not isinstance(self.clock, ManualClock):
+            raise TypeError("this clock moves by itself")
+        if seconds < 0:
+            raise ValueError("time does not go back")
+        end_s = self.clock.now_s + seconds
+        while (left_s := end_s - self.clock.now_s) > 1e-12:
+            with self.lock:
+                self.clock.advance(min(left_s, _STEP_S))
+                members = tuple(self._members)
+            # Outside the lock of the devices: each takes what it needs, in its own order.
+            for live in members:
+                live()

@@ -1,0 +1,140 @@
+"""A whole TurtleBot3 in a world: a drive base and a LiDAR, each on a serial line of its own."""
+
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from robosc.execution.clock import Clock
+from robosc_bridge.simulated.lidar import LIDARS, Lidar
+from robosc_bridge.simulated.line import Faults, SimulatedLine
+from robosc_bridge.simulated.opencr import OpenCr
+from robosc_bridge.simulated.robots import BODIES
+from robosc_bridge.simulated.servo import Servo
+from robosc_bridge.simulated.servo_bus import ServoBus
+from robosc_bridge.simulated.timebase import Timebase
+from robosc_bridge.simulated.walls import Walls, room
+from robosc_bridge.simulated.world import World
+
+BASES = ("opencr", "dynamixel")
+# As the set-up of a TurtleBot3 leaves its motors: 1 Mbps, velocity mode, the right one reversed.
+_SET_UP = {"baud rate": 3, "operating mode": 1}
+
+
+def wheel_servos(world: World) -> tuple[Servo, Servo]:
+    """The left and the right servo of a robot, set up as a TurtleBot3's are."""
+    model = world.body.servo_model
+    left = Servo(model, world, world.left, 1, settings=_SET_UP)
+    right = Servo(model, world, world.right, 2, is_mirrored=True, settings={**_SET_UP, "drive mode": 1})
+    return left, right
+
+
+class SimulatedTurtleBot3:
+    """A robot whose devices are served until it is closed.
+
+    Args:
+        robot: Key of `BODIES`.
+        base: `opencr`, or `dynamixel` for two servos behind an adapter.
+        lidar: Key of `LIDARS`.
+        walls: Around it; None: a room of 4 m by 3 m.
+        clock: Of its devices; None: the computer's.
+        factor: How much faster the world is than the clock.
+        pose: Where it starts: x, y in metres, heading in rad.
+        base_link: Where the base's port is to be; None: anywhere.
+        scanner_link: Where the LiDAR's port is to be; None: anywhere.
+        seed: Of all that comes by chance.
+        has_motors: Whether OpenCR has found its motors when it started.
+        calibration_s: How long OpenCR's gyroscope is calibrated.
+        noise_m: Standard deviation of what the LiDAR measures.
+
+    Attributes:
+        time: That all of it lives by.
+        world: Walls, pose, wheels.
+        left: The left servo, also behind OpenCR.
+        right: The right one.
+        opencr: The board; None: the servos are reached directly.
+        bus: The servos' bus; None: they are behind OpenCR.
+        scanner: The LiDAR.
+        base_line: The base's line, with its faults.
+        scanner_line: The LiDAR's.
+
+    Raises:
+        ValueError: There is no such robot, base or LiDAR.
+        FileExistsError: There is something at a link already.
+    """
+
+    def __init__(
+        self,
+        robot: str = "burger",
+        base: str = "opencr",
+        lidar: str = "lds01",
+        *,
+        walls: Walls | None = None,
+        clock: Clock | None = None,
+        factor: float = 1.0,
+        pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        base_link: Path | None = None,
+        scanner_link: Path | None = None,
+        seed: int = 0,
+        has_motors: bool = True,
+        calibration_s: float = 5.0,
+        noise_m: float = 0.0,
+    ) -> None:
+        for kind, name, known in (("robot", robot, BODIES), ("base", base, BASES), ("LiDAR", lidar, LIDARS)):
+            if name not in known:
+                raise ValueError(f"there is no {kind} {name!r}; there are {', '.join(known)}")
+        self.time = Timebase(clock, factor)
+        self.world = World(BODIES[robot], room(4.0, 3.0) if walls is None else walls, self.time, pose)
+        self.left, self.right = wheel_servos(self.world)
+        self.opencr: OpenCr | None = None
+        self.bus: ServoBus | None = None
+        device: OpenCr | ServoBus
+        if base == "opencr":
+            device = self.opencr = OpenCr(
+                self.world, self.left, self.right, has_motors=has_motors, calibration_s=calibration_s
+            )
+        else:
+            device = self.bus = ServoBus((self.left, self.right))
+        self.scanner: Lidar = LIDARS[lidar](self.world, seed=seed, noise_m=noise_m)
+        self.base_line = SimulatedLine(device, self.time, base_link, seed)
+        try:
+            self.scanner_line = SimulatedLine(self.scanner, self.time, scanner_link, seed + 1)
+        except BaseException:
+            self.base_line.close()
+            raise
+
+    @property
+    def base_path(self) -> str:
+        """The port of the drive base."""
+        return self.base_line.path
+
+    @property
+    def scanner_path(self) -> str:
+        """The port of the LiDAR."""
+        return self.scanner_line.path
+
+    @property
+    def base_faults(self) -> Faults:
+        """Of the base's line."""
+        return self.base_line.faults
+
+    @property
+    def scanner_faults(self) -> Faults:
+        """Of the LiDAR's line."""
+        return self.scanner_line.faults
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass on a `ManualClock`; when it returns, all devices have lived it."""
+        self.time.advance(seconds)
+
+    def close(self) -> None:
+        """End it; may be called again."""
+        self.base_line.close()
+        self.scanner_line.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

@@ -24,6 +24,12 @@ from robosc_bridge.transport.serial_line import SerialLine
 ANSWER_LIMIT_S = 0.034
 """As the SDK has it: twice the 16 ms for which an adapter may keep bytes back, and 2 ms."""
 
+
+def exchange_limit_s(answer_limit_s: float) -> float:
+    """How long an exchange of a driver may take: three answers just in time, with what they take on the wire."""
+    return 3 * answer_limit_s + 0.02
+
+
 _EMPTY_STATUS = 11  # Bytes of an answer without data.
 
 # What a device is asked for to have all older answers behind it: address and length, by turns. The registers exist in
@@ -69,7 +75,7 @@ class DynamixelBus:
 
     Args:
         line: Open; stays its owner's.
-        name_of: What to call a device in messages.
+        name_of: What to call a device in messages, with the line.
         answer_limit_s: Longest wait for one answer.
 
     Attributes:
@@ -240,7 +246,7 @@ class DynamixelBus:
             self.settle(device)
         status = self._answered(device, transmit, lambda status: _fits(status, length), length, limit_s)
         if status.number == DAMAGED_REQUEST:
-            raise DeviceSilentError(f"{self._who(device)} received damaged bytes")
+            raise DeviceSilentError(f"{self._name_of(device)} received damaged bytes")
         return status
 
     def _answered(
@@ -255,16 +261,16 @@ class DynamixelBus:
         self._unsettled.add(device)
         self._sent(transmit())
         self._port.wait_for(_EMPTY_STATUS + length, limit_s)
+        other = ""
         while (status := self._received()) is not None:
             if status.device == device and fits(status):
                 self._unsettled.discard(device)
                 return status
             self.counters.foreign += 1
+            if status.device != device:
+                other = f", but device {status.device} does"
         self.counters.unanswered += 1
-        raise DeviceSilentError(f"{self._who(device)} does not answer")
-
-    def _who(self, device: int) -> str:
-        return f"{self._port.line.path}: {self._name_of(device)}"
+        raise DeviceSilentError(f"{self._name_of(device)} does not answer{other}")
 
     def _begin_request(self) -> None:
         if self._port.is_late:
@@ -293,7 +299,7 @@ class DynamixelBus:
 
     def _accepted(self, status: Status, problem: str) -> Status:
         if status.number:
-            raise RefusedError(f"{self._who(status.device)} {problem}", status)
+            raise RefusedError(f"{self._name_of(status.device)} {problem}", status)
         return status
 
     def _read(self, device: int, address: int, length: int) -> int:

@@ -11,7 +11,7 @@ import contextlib
 import time
 from collections.abc import Callable
 
-from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, DynamixelBus
+from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, DynamixelBus, exchange_limit_s
 from robosc_bridge.devices.following import FollowingWatch
 from robosc_bridge.devices.interface import DriveLimits, DriveReading, MotorFault, Velocity
 from robosc_bridge.devices.kinematics import body_velocity, opencr_words, wheel_speeds
@@ -23,9 +23,6 @@ from robosc_bridge.protocol.opencr import Block, decode_block, encode_command
 from robosc_bridge.transport.serial_line import SerialLine
 
 BAUD = 1_000_000  # A USB device: any is right.
-
-EXCHANGE_LIMIT_S = 0.12
-"""Longest `exchange`: three answers in time, and one request that is made again."""
 
 _CALIBRATION_LIMIT_S = 6.0
 _REST_RAW = 2
@@ -57,6 +54,7 @@ class OpenCrBase:
         self._robot = robot
         self._calibrates_gyro = calibrates_gyro
         self._answer_limit_s = answer_limit_s
+        self._exchange_limit_s = exchange_limit_s(answer_limit_s)
         self._line: SerialLine | None = None
         self._bus: DynamixelBus | None = None
         self._odometry = Odometry(robot.tick_m, robot.wheel_separation_m, self.limits.wheel_m_s)
@@ -79,7 +77,7 @@ class OpenCrBase:
         line = SerialLine(self._path, BAUD)
         try:
             self._line = line
-            self._bus = DynamixelBus(line, lambda device: "OpenCR", self._answer_limit_s)
+            self._bus = DynamixelBus(line, lambda device: f"{self._path}: OpenCR", self._answer_limit_s)
             self._uptime_ms = None
             self._is_torque_wanted = self._is_torque_lost = False
             self._odometry = self._odometry.rebased()
@@ -117,7 +115,7 @@ class OpenCrBase:
         self._following.forget()
 
     def exchange(self, velocity: Velocity) -> DriveReading:
-        """Command a velocity, change the heartbeat, read everything; at most `EXCHANGE_LIMIT_S`.
+        """Command a velocity, change the heartbeat, read everything; at most `exchange_limit_s` of the bus.
 
         Raises:
             LineError: The line is gone.
@@ -173,7 +171,7 @@ class OpenCrBase:
         return self._bus
 
     def _check_identity(self, bus: DynamixelBus) -> None:
-        bus.begin(EXCHANGE_LIMIT_S)
+        bus.begin(self._exchange_limit_s)
         model, firmware = bus.ping(opencr.DEVICE)
         # What came before may have been an answer to another session.
         bus.settle(opencr.DEVICE)
@@ -192,7 +190,7 @@ class OpenCrBase:
             )
 
     def _check_motors(self, bus: DynamixelBus) -> None:
-        bus.begin(EXCHANGE_LIMIT_S)
+        bus.begin(self._exchange_limit_s)
         status = bus.read(opencr.DEVICE, opencr.DEVICE_STATUS, 1).data
         are_connected = bus.read(opencr.DEVICE, opencr.MOTORS_CONNECTED, 1).data
         if status != b"\0" or are_connected != b"\1":
@@ -200,7 +198,7 @@ class OpenCrBase:
                 f"{self._path}: OpenCR found no wheel motors when it started; "
                 "check their cables, then switch the robot off and on"
             )
-        bus.begin(EXCHANGE_LIMIT_S)
+        bus.begin(self._exchange_limit_s)
         # The first one must be another than the board knows.
         self._heartbeat = bus.read(opencr.DEVICE, opencr.HEARTBEAT, 1).data[0]
 
@@ -228,7 +226,7 @@ class OpenCrBase:
 
     def _write_torque(self, is_on: bool) -> None:
         bus = self._used_bus
-        bus.begin(EXCHANGE_LIMIT_S)
+        bus.begin(self._exchange_limit_s)
         bus.write(opencr.DEVICE, opencr.TORQUE, bytes((is_on,)))
 
     def _cycles_until(self, is_done: Callable[[Block], bool], limit_s: float) -> bool:
@@ -243,7 +241,7 @@ class OpenCrBase:
     def _cycle(self, words: tuple[int, int] | None) -> Block:
         """Command, if there is anything to, change the heartbeat, and read."""
         bus = self._used_bus
-        bus.begin(EXCHANGE_LIMIT_S)
+        bus.begin(self._exchange_limit_s)
         if words is not None:
             self._command(words)
         self._heartbeat = (self._heartbeat + 1) % 256

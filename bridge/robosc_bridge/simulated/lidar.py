@@ -35,7 +35,6 @@ class Lidar(ABC):
     Attributes:
         is_covered: Whether something covers it: it measures nothing.
         is_stalled: Whether it has fallen silent.
-        speed_share: At which share of its nominal speed it turns.
     """
 
     baud: int | None
@@ -46,7 +45,7 @@ class Lidar(ABC):
     def __init__(self, world: World, *, seed: int = 0, noise_m: float = 0.0, starts_mid_frame: bool = True) -> None:
         self.is_covered = False
         self.is_stalled = False
-        self.speed_share = 1.0
+        self._speed_share = 1.0
         self._world = world
         self._time = world.time
         self._chance = random.Random(seed)  # noqa: S311 (noise is no secret)
@@ -65,7 +64,18 @@ class Lidar(ABC):
     @property
     def turns_per_s(self) -> float:
         """As it turns now, in world time."""
-        return self.nominal_hz * self.speed_share
+        return self.nominal_hz * self._speed_share
+
+    def turn_at(self, share: float) -> None:
+        """Turn at this share of the nominal speed.
+
+        Raises:
+            ValueError: The share is not above 0, or above 2.
+        """
+        if not 0 < share <= 2:
+            raise ValueError(f"a LiDAR turns at a share above 0 and up to 2 of its speed, not at {share}")
+        with self._time.lock:
+            self._speed_share = share
 
     def plug_in(self) -> None:
         """Power comes: it turns by itself."""

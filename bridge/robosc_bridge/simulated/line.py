@@ -5,10 +5,12 @@ late by real seconds.
 """
 
 import contextlib
+import fcntl
 import math
 import os
 import random
 import select
+import sys
 import tempfile
 import termios
 import threading
@@ -24,6 +26,9 @@ from typing import Protocol, Self
 from robosc_bridge.simulated.timebase import Timebase
 
 _CHUNK = 4096
+# As much as the line discipline holds: what is beyond it waits deeper in the kernel, where no host can flush it, and
+# would be old news for the next one that opens the port.
+_BUFFER = 4095
 _BAUDS = {
     getattr(termios, f"B{baud}"): baud
     for baud in (
@@ -77,6 +82,7 @@ class Faults:
         corrupt_next: How many of the next packets have a wrong byte.
         corrupt_share: Share of packets that have a wrong byte.
         lose_bytes_share: Share of single bytes that are lost.
+        cut_next: How many of the next packets end in their middle.
         garbage: Sent before every packet.
         split_s: Seconds between single bytes; 0: each is written alone, at once; None: packets are whole.
         echo: Whether the adapter sends back what the host sends.
@@ -89,6 +95,7 @@ class Faults:
     corrupt_next: int = 0
     corrupt_share: float = 0.0
     lose_bytes_share: float = 0.0
+    cut_next: int = 0
     garbage: bytes = b""
     split_s: float | None = None
     echo: bool = False
@@ -139,8 +146,12 @@ class SimulatedLine:
         os.set_blocking(self._woken, False)
         os.set_blocking(self._waker, False)
         self._is_open = True
-        self._plug()
-        time.join(self._live)
+        try:
+            self._plug()
+        except BaseException:
+            self._give_back()
+            raise
+        time.join(self._catch_up)
         self._thread = threading.Thread(target=self._serve, name=f"simulated line {self.path}", daemon=True)
         self._thread.start()
 
@@ -177,8 +188,11 @@ class SimulatedLine:
         self._is_open = False
         self._wake()
         self._thread.join()
-        self._time.leave(self._live)
+        self._time.leave(self._catch_up)
         self.disconnect()
+        self._give_back()
+
+    def _give_back(self) -> None:
         os.close(self._woken)
         os.close(self._waker)
         if self._folder is not None:
@@ -241,6 +255,13 @@ class SimulatedLine:
         if not self.faults.is_deaf:
             self._send(self.device.receive(self._heard_through(data), self._host_baud()))
 
+    def _catch_up(self) -> None:
+        """Hear what has come, then live until now: time is about to pass, or has passed."""
+        with self._time.lock:
+            if self._master >= 0:
+                self._hear()
+            self._live()
+
     def _live(self) -> None:
         with self._time.lock:
             # It lives on without a line, and what it sends then goes nowhere.
@@ -285,6 +306,9 @@ class SimulatedLine:
             # Behind the header, so that it stays a frame, with a wrong checksum.
             index = chance.randrange(len(data) // 2, len(data))
             data = data[:index] + bytes((data[index] ^ chance.randrange(1, 256),)) + data[index + 1 :]
+        if faults.cut_next > 0:
+            faults.cut_next -= 1
+            data = data[: len(data) // 2]
         if faults.lose_bytes_share:
             data = bytes(byte for byte in data if chance.random() >= faults.lose_bytes_share)
         return self._heard_through(faults.garbage + data)
@@ -294,15 +318,18 @@ class SimulatedLine:
         is_right = self.device.baud is None or self.device.baud == self._host_baud()
         return data if is_right else self._chance.randbytes(len(data))
 
+    def _unread(self) -> int:
+        return int.from_bytes(fcntl.ioctl(self._slave, termios.FIONREAD, bytes(4)), sys.byteorder)
+
     def _flush(self) -> None:
         now_s = time.monotonic()
         while self._wire and self._wire[0][0] <= now_s:
             _, data = self._wire.popleft()
             if self._master < 0:
                 continue
-            try:
-                written = os.write(self._master, data)
-            except OSError:
-                written = 0
+            written = 0
+            if self._unread() + len(data) <= _BUFFER:
+                with contextlib.suppress(OSError):
+                    written = os.write(self._master, data)
             self.sent += written
             self.lost_bytes += len(data) - written

@@ -112,6 +112,7 @@ class OpenCr:
         self._low_since_s: float | None = None
         self._start_heading_rad = world.heading_rad
         self._last_speed_m_s = 0.0
+        self._sensed_s = self._time.world_s()
         for address, value in (
             (_CHIP, 0x5000), (_INFORMATION, world.body.opencr_information), (6, 5), (7, DEVICE_ID), (9, 2),
         ):  # fmt: skip
@@ -356,8 +357,9 @@ class OpenCr:
         world = self._world
         speed_m_s, turn_rad_s = world.speed_m_s, world.turn_rad_s
         yaw_rad = world.heading_rad - self._start_heading_rad
-        forward_m_s2 = (speed_m_s - self._last_speed_m_s) / CYCLE_S
-        self._last_speed_m_s = speed_m_s
+        now_s = self._time.world_s()
+        forward_m_s2 = (speed_m_s - self._last_speed_m_s) / max(now_s - self._sensed_s, CYCLE_S)
+        self._last_speed_m_s, self._sensed_s = speed_m_s, now_s
         readings = (
             0.0, 0.0, turn_rad_s,
             forward_m_s2, speed_m_s * turn_rad_s, _GRAVITY_M_S2,

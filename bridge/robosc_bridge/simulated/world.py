@@ -18,6 +18,8 @@ STEP_S = 0.005
 # What a motor can do at all, and how soon a wheel that nothing drives stands.
 _STRONGEST_RAD_S2 = 150.0
 _FRICTION_RAD_S2 = 60.0
+# A body that has left a wall by so much has left it; less is the same collision.
+_APART_M = 0.005
 
 
 @dataclass
@@ -139,7 +141,7 @@ class World:
         nearest_m = self.walls.distance_m(x_m, y_m)
         if nearest_m >= self.body.radius_m or nearest_m > self.walls.distance_m(self.x_m, self.y_m):
             self.x_m, self.y_m = x_m, y_m
-            self.is_touching = nearest_m < self.body.radius_m
+            self.is_touching = self.is_touching and nearest_m < self.body.radius_m + _APART_M
         elif forward_m != 0.0 and not self.is_touching:
             self.is_touching = True
             self.collisions += 1

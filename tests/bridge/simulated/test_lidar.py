@@ -149,7 +149,7 @@ def test_frames_are_paced_in_time(lidar: str, rate: float) -> None:
 @pytest.mark.parametrize("lidar", DECODERS)
 def test_a_slow_motor_takes_longer_for_a_turn_and_tells_it(lidar: str) -> None:
     with SimulatedTurtleBot3(lidar=lidar, clock=ManualClock()) as robot, Host(robot.scanner_path, BAUDS[lidar]) as host:
-        robot.scanner.speed_share = 0.5
+        robot.scanner.turn_at(0.5)
         started(lidar, robot, host)
         data = heard(robot, host, 1.0)
         turned = {round(degrees) % 360 for degrees, _ in DECODERS[lidar](data[: len(data) // 6])}

@@ -1,0 +1,127 @@
+"""`python -m robosc_bridge.simulated`: serve a simulated TurtleBot3 until interrupted.
+
+A process of its own leaves the timing of a busy driver alone. It prints the two ports, one a line, as `base PATH` and
+`scanner PATH`, then does what its standard input says, one command a line (`help` lists them).
+"""
+
+import argparse
+import contextlib
+import signal
+import sys
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from types import FrameType
+
+from robosc_bridge.simulated.commands import UnknownCommandError, obey
+from robosc_bridge.simulated.lidar import LIDARS
+from robosc_bridge.simulated.robots import BODIES
+from robosc_bridge.simulated.turtlebot3 import BASES, SimulatedTurtleBot3
+from robosc_bridge.simulated.walls import Walls, maze, parse_walls, room
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command.
+
+    Args:
+        arguments: None: those of the process.
+
+    Returns:
+        The exit code: 0 when it was interrupted, 1 when it cannot be served.
+    """
+    options = _parser().parse_args(arguments)
+    ended = threading.Event()
+
+    def end(number: int, frame: FrameType | None) -> None:
+        ended.set()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, end)
+    try:
+        robot = SimulatedTurtleBot3(
+            options.robot,
+            options.base,
+            options.lidar,
+            walls=_walls(options),
+            factor=options.speed,
+            pose=options.pose,
+            base_link=options.base_link,
+            scanner_link=options.scanner_link,
+            seed=options.seed,
+            noise_m=options.noise,
+        )
+    except (OSError, ValueError) as error:
+        print(f"the robot cannot be simulated: {error}", file=sys.stderr)
+        return 1
+    with robot:
+        print(f"base {robot.base_path}")
+        print(f"scanner {robot.scanner_path}", flush=True)
+        threading.Thread(target=_listen, args=(robot,), name="commands", daemon=True).start()
+        ended.wait()
+    return 0
+
+
+def _listen(robot: SimulatedTurtleBot3) -> None:
+    """Obey standard input to its end; the robot is served on after it."""
+    with contextlib.suppress(ValueError):
+        for line in sys.stdin:
+            try:
+                answer = obey(robot, line)
+            except UnknownCommandError as error:
+                answer = f"error: {error}"
+            if answer:
+                print(answer, flush=True)
+
+
+def _walls(options: argparse.Namespace) -> Walls:
+    if options.walls is not None:
+        return parse_walls(options.walls.read_text(encoding="utf-8"))
+    if options.maze is not None:
+        columns, rows = options.maze
+        return maze(round(columns), round(rows), seed=options.seed)
+    return room(*options.room)
+
+
+def _numbers(text: str, separator: str, count: int) -> tuple[float, ...]:
+    try:
+        found = tuple(float(word) for word in text.split(separator))
+    except ValueError:
+        found = ()
+    if len(found) != count:
+        raise argparse.ArgumentTypeError(f"{count} numbers with `{separator}` between them are needed, not {text!r}")
+    return found
+
+
+def _size(text: str) -> tuple[float, ...]:
+    return _numbers(text, "x", 2)
+
+
+def _pose(text: str) -> tuple[float, ...]:
+    return _numbers(text, ",", 3)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m robosc_bridge.simulated",
+        description="Serve a simulated TurtleBot3 on two pseudo-terminals until interrupted.",
+    )
+    parser.add_argument("--robot", choices=sorted(BODIES), default="burger", help="default: %(default)s")
+    parser.add_argument("--base", choices=BASES, default="opencr", help="default: %(default)s")
+    parser.add_argument("--lidar", choices=sorted(LIDARS), default="lds02", help="default: %(default)s")
+    place = parser.add_mutually_exclusive_group()
+    place.add_argument("--room", type=_size, default=(4.0, 3.0), metavar="XxY", help="a room in metres; default: 4x3")
+    place.add_argument("--maze", type=_size, metavar="COLUMNSxROWS", help="a maze of 0.6 m cells, start at the first")
+    place.add_argument("--walls", type=Path, metavar="FILE", help="walls from a file, `x1 y1 x2 y2` in metres a line")
+    parser.add_argument(
+        "--pose", type=_pose, default=(0.0, 0.0, 0.0), metavar="X,Y,HEADING", help="start, in m and rad; default: 0,0,0"
+    )
+    parser.add_argument("--speed", type=float, default=1.0, metavar="N", help="the world passes N times as fast")
+    parser.add_argument("--noise", type=float, default=0.0, metavar="M", help="standard deviation of the LiDAR in m")
+    parser.add_argument("--seed", type=int, default=0, help="of the maze and of all faults that come by chance")
+    parser.add_argument("--base-link", type=Path, metavar="PATH", help="where the base's port is to be")
+    parser.add_argument("--scanner-link", type=Path, metavar="PATH", help="where the LiDAR's port is to be")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

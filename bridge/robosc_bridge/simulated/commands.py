@@ -1,0 +1,144 @@
+"""What can be done to a simulated robot by a line of text, for a simulator in a process of its own."""
+
+from collections.abc import Callable
+from dataclasses import fields
+
+from robosc_bridge.simulated.line import Faults, SimulatedLine
+from robosc_bridge.simulated.servo import Servo
+from robosc_bridge.simulated.turtlebot3 import SimulatedTurtleBot3
+
+HELP = """\
+base|scanner disconnect|reconnect|sound     the plug of a line; `sound` removes its faults
+base|scanner FAULT VALUE                    a fault of a line: {faults}
+base answers_as ID|own                      the ID that its answers carry
+left|right overheat|cool_down|overload      a wheel's servo
+left|right block|release                    a wheel
+left|right voltage V                        a servo's supply
+battery V                                   OpenCR's battery
+press|let NAME                              button_1, button_2, bumper_1, bumper_2 of OpenCR
+scanner cover|uncover|stall|go              the LiDAR
+scanner turn SHARE                          its speed, as a share of the nominal one
+pose [X Y HEADING]                          tell where the robot is, or put it there (m, rad)
+collisions                                  tell how often it came to a wall"""
+
+
+class UnknownCommandError(ValueError):
+    """There is no such command, or not with such values."""
+
+
+def obey(robot: SimulatedTurtleBot3, line: str) -> str:
+    """Do what a line says.
+
+    Args:
+        robot: To which it is done.
+        line: A command; an empty one does nothing.
+
+    Returns:
+        What there is to tell; else nothing.
+
+    Raises:
+        UnknownCommandError: It is not known.
+    """
+    words = line.split()
+    if not words:
+        return ""
+    try:
+        return _obey(robot, words)
+    except UnknownCommandError:
+        raise
+    except ValueError as error:
+        raise UnknownCommandError(str(error)) from error
+
+
+def _obey(robot: SimulatedTurtleBot3, words: list[str]) -> str:
+    match words:
+        case ["help"]:
+            return HELP.format(faults=", ".join(field.name for field in fields(Faults)))
+        case ["pose"]:
+            return "pose " + " ".join(f"{value:.4f}" for value in robot.world.pose)
+        case ["pose", x, y, heading]:
+            robot.world.place(float(x), float(y), float(heading))
+        case ["collisions"]:
+            return f"collisions {robot.world.collisions}"
+        case ["left" | "right" as side, *what]:
+            _to_servo(robot.left if side == "left" else robot.right, what)
+        case ["battery", voltage] if robot.opencr is not None:
+            robot.opencr.set_battery(float(voltage))
+        case ["press" | "let" as what, name] if robot.opencr is not None:
+            robot.opencr.press(**{name: what == "press"})
+        case ["scanner", "cover" | "uncover" as what]:
+            robot.scanner.is_covered = what == "cover"
+        case ["scanner", "stall" | "go" as what]:
+            robot.scanner.is_stalled = what == "stall"
+        case ["scanner", "turn", share]:
+            robot.scanner.turn_at(float(share))
+        case ["base", "answers_as", device_id]:
+            answers_as = None if device_id == "own" else int(device_id)
+            # It has one of the two.
+            if robot.opencr is not None:
+                robot.opencr.answers_as = answers_as
+            if robot.bus is not None:
+                robot.bus.answers_as = answers_as
+        case ["base" | "scanner" as which, *what]:
+            _to_line(robot.base_line if which == "base" else robot.scanner_line, what)
+        case _:
+            raise UnknownCommandError(f"unknown command {' '.join(words)!r}; `help` lists them")
+    return ""
+
+
+def _to_servo(servo: Servo, words: list[str]) -> None:
+    match words:
+        case ["overheat"]:
+            servo.overheat()
+        case ["cool_down"]:
+            servo.cool_down()
+        case ["overload"]:
+            servo.overload()
+        case ["block"]:
+            servo.block_wheel()
+        case ["release"]:
+            servo.block_wheel(False)
+        case ["voltage", voltage]:
+            servo.brown_out(float(voltage))
+        case _:
+            raise UnknownCommandError(f"a servo does not know {' '.join(words)!r}; `help` lists what it knows")
+
+
+def _boolean(text: str) -> bool:
+    if text not in ("true", "false"):
+        raise ValueError(f"true or false is needed, not {text!r}")
+    return text == "true"
+
+
+def _seconds_or_none(text: str) -> float | None:
+    return None if text == "none" else float(text)
+
+
+_READERS: dict[str, Callable[[str], object]] = {
+    "delay_s": float,
+    "drop_next": int,
+    "drop_share": float,
+    "corrupt_next": int,
+    "corrupt_share": float,
+    "lose_bytes_share": float,
+    "cut_next": int,
+    "split_s": _seconds_or_none,
+    "echo": _boolean,
+    "is_deaf": _boolean,
+}
+
+
+def _to_line(line: SimulatedLine, words: list[str]) -> None:
+    match words:
+        case ["disconnect"]:
+            line.disconnect()
+        case ["reconnect"]:
+            line.reconnect()
+        case ["sound"]:
+            line.faults.clear()
+        case ["garbage", *hexes] if hexes:
+            line.faults.garbage = bytes.fromhex("".join(hexes))
+        case [name, value] if name in _READERS:
+            setattr(line.faults, name, _READERS[name](value))
+        case _:
+            raise UnknownCommandError(f"a line does not know {' '.join(words)!r}; `help` lists what it knows")

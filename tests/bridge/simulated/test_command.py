@@ -1,0 +1,200 @@
+"""The simulator as a program of its own, and what can be told to it."""
+
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from robosc.execution.clock import ManualClock
+from robosc_bridge.simulated import Faults, SimulatedTurtleBot3
+from robosc_bridge.simulated.__main__ import main
+from robosc_bridge.simulated.commands import UnknownCommandError, obey
+from support.wire import Host, wait_until
+
+
+class Program:
+    """It, and its two ends."""
+
+    def __init__(self, *arguments: str) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "robosc_bridge.simulated", *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self.input, self.output = self.process.stdin, self.process.stdout
+
+    def tell(self, line: str) -> None:
+        self.input.write(line + "\n")
+        self.input.flush()
+
+    def ask(self, line: str) -> str:
+        self.tell(line)
+        return self.output.readline().strip()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_it_serves_until_it_is_interrupted(number: int, tmp_path: Path) -> None:
+    links = tmp_path / "base", tmp_path / "scanner"
+    program = Program(
+        "--robot", "burger", "--base", "dynamixel", "--lidar", "lds02", "--maze", "4x3", "--speed", "2",
+        "--base-link", str(links[0]), "--scanner-link", str(links[1]),
+    )  # fmt: skip
+    with program.process as process:
+        assert program.output.readline() == f"base {links[0]}\n"
+        assert program.output.readline() == f"scanner {links[1]}\n"
+        with Host(str(links[0])) as host:
+            assert host.ask("ff ff fd 00 01 03 00 01 19 4e") == "ff ff fd 00 01 07 00 55 00 24 04 2d f4 df"
+        with Host(str(links[1]), 115_200) as host:
+            assert b"\x54\x2c" in host.receive(200)
+        assert program.ask("pose") == "pose 0.0000 0.0000 0.0000"
+        assert program.ask("jump").startswith("error: unknown command 'jump'")
+        program.tell("base disconnect")
+        wait_until(lambda: not links[0].is_symlink())
+        process.send_signal(number)
+        assert process.wait(10) == 0
+        assert process.stderr is not None
+        assert process.stderr.read() == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_it_goes_on_when_its_input_ends() -> None:
+    program = Program("--lidar", "lds01")
+    with program.process as process:
+        base = program.output.readline().split()[1]
+        program.input.close()
+        with Host(base) as host:
+            assert host.ask("ff ff fd 00 c8 03 00 01 3b fa") == "ff ff fd 00 c8 07 00 55 00 00 50 05 4c b7"
+        process.terminate()
+        assert process.wait(10) == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["--speed", "0"], "speed factor"),
+        (["--walls", "/nowhere"], "No such file"),
+        (["--maze", "0x2"], "one cell"),
+    ],
+)
+def test_what_cannot_be_simulated_is_told(
+    arguments: list[str], text: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(signal, "signal", lambda number, handler: None)
+    assert main(arguments) == 1
+    found = capsys.readouterr()
+    assert found.out == ""
+    assert text in found.err
+    assert found.err.count("\n") == 1
+
+
+def test_wrong_arguments_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["--room", "3"])
+    assert "2 numbers with `x` between them" in capsys.readouterr().err
+
+
+def test_a_wall_map_is_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place = tmp_path / "walls"
+    place.write_text("1 0 0\n")
+    monkeypatch.setattr(signal, "signal", lambda number, handler: None)
+    assert main(["--walls", str(place)]) == 1
+    assert "line 1 of the wall map" in capsys.readouterr().err
+
+
+@pytest.fixture
+def robot() -> Iterator[SimulatedTurtleBot3]:
+    with SimulatedTurtleBot3(clock=ManualClock()) as found:
+        yield found
+
+
+def test_every_fault_of_a_wire_can_be_told(robot: SimulatedTurtleBot3) -> None:
+    values = {
+        "delay_s": ("0.1", 0.1),
+        "drop_next": ("3", 3),
+        "drop_share": ("0.5", 0.5),
+        "corrupt_next": ("2", 2),
+        "corrupt_share": ("0.25", 0.25),
+        "lose_bytes_share": ("0.01", 0.01),
+        "cut_next": ("1", 1),
+        "garbage": ("ff 00", b"\xff\0"),
+        "split_s": ("0.001", 0.001),
+        "echo": ("true", True),
+        "is_deaf": ("true", True),
+    }
+    assert set(values) == set(vars(Faults()))
+    for name, (text, _) in values.items():
+        assert obey(robot, f"scanner {name} {text}") == ""
+    assert vars(robot.scanner_faults) == {name: value for name, (_, value) in values.items()}
+    obey(robot, "scanner split_s none")
+    assert robot.scanner_faults.split_s is None
+    obey(robot, "scanner sound")
+    assert robot.scanner_faults == Faults()
+    assert robot.base_faults == Faults()
+
+
+def test_devices_are_told(robot: SimulatedTurtleBot3) -> None:
+    assert robot.opencr is not None
+    obey(robot, "left overheat")
+    assert robot.left.table["hardware error status"] == 0x04
+    obey(robot, "left cool_down")
+    assert robot.left.temperature_c == 33.0
+    obey(robot, "right overload")
+    assert robot.right.table["hardware error status"] == 0x20
+    obey(robot, "right block")
+    assert robot.world.right.is_blocked
+    obey(robot, "right release")
+    assert not robot.world.right.is_blocked
+    obey(robot, "left voltage 7.5")
+    assert robot.left.voltage_v == 7.5
+    obey(robot, "battery 11.2")
+    assert robot.opencr.panel.battery_v == 11.2
+    obey(robot, "press bumper_1")
+    assert robot.opencr.panel.bumper_1
+    obey(robot, "let bumper_1")
+    assert not robot.opencr.panel.bumper_1
+    obey(robot, "scanner cover")
+    obey(robot, "scanner stall")
+    obey(robot, "scanner turn 0.5")
+    assert (robot.scanner.is_covered, robot.scanner.is_stalled, robot.scanner.turns_per_s) == (True, True, 2.5)
+    obey(robot, "scanner uncover")
+    obey(robot, "scanner go")
+    assert (robot.scanner.is_covered, robot.scanner.is_stalled) == (False, False)
+    obey(robot, "base answers_as 7")
+    assert robot.opencr.answers_as == 7
+    obey(robot, "base answers_as own")
+    assert robot.opencr.answers_as is None
+    obey(robot, "scanner disconnect")
+    assert not robot.scanner_line.is_connected
+    obey(robot, "scanner reconnect")
+    assert robot.scanner_line.is_connected
+    obey(robot, "pose 1 0.5 3")
+    assert obey(robot, "pose") == "pose 1.0000 0.5000 3.0000"
+    assert obey(robot, "collisions") == "collisions 0"
+    assert obey(robot, "") == ""
+    assert "delay_s" in obey(robot, "help")
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["jump", "left", "left jump", "base jump 1", "base delay_s", "base delay_s x", "base echo 1", "press battery_v",
+     "scanner turn 0", "pose 1", "base garbage xx", "base answers_as x", "battery"],
+)  # fmt: skip
+def test_what_is_not_known_is_told(robot: SimulatedTurtleBot3, line: str) -> None:
+    with pytest.raises(UnknownCommandError):
+        obey(robot, line)
+
+
+def test_servos_have_no_buttons() -> None:
+    with SimulatedTurtleBot3(base="dynamixel", clock=ManualClock()) as robot:
+        for line in ("battery 11.0", "press button_1"):
+            with pytest.raises(UnknownCommandError):
+                obey(robot, line)

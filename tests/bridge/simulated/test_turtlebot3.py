@@ -1,0 +1,84 @@
+"""A whole robot that lives by itself."""
+
+import threading
+import time
+
+import pytest
+from dynamixel_sdk import GroupSyncWrite, PacketHandler, PortHandler
+
+from robosc_bridge.simulated import BASES, BODIES, LIDARS, SimulatedTurtleBot3, Walls
+from support.wire import Host, wait_until
+
+
+@pytest.mark.parametrize("robot", BODIES)
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize("lidar", LIDARS)
+def test_every_robot_can_be_put_together(robot: str, base: str, lidar: str) -> None:
+    with SimulatedTurtleBot3(robot, base, lidar) as simulated, Host(simulated.base_path) as host:
+        ping = "ff ff fd 00 c8 03 00 01 3b fa" if base == "opencr" else "ff ff fd 00 01 03 00 01 19 4e"
+        assert host.ask(ping)
+
+
+@pytest.mark.parametrize(("robot", "base", "lidar"), [("mule", "opencr", "lds01"), ("burger", "ros", "lds01"),
+                                                      ("burger", "opencr", "lds04")])  # fmt: skip
+def test_unknown_parts_are_told(robot: str, base: str, lidar: str) -> None:
+    before = threading.active_count()
+    with pytest.raises(ValueError, match=r"there is no .*; there are"):
+        SimulatedTurtleBot3(robot, base, lidar)
+    assert threading.active_count() == before
+
+
+@pytest.mark.parametrize("factor", [1.0, 5.0])
+def test_it_drives_by_the_computers_clock(factor: float) -> None:
+    with SimulatedTurtleBot3(base="dynamixel", walls=Walls(()), factor=factor) as robot:
+        port, handler = PortHandler(robot.base_path), PacketHandler(2.0)
+        assert port.setBaudRate(1_000_000)
+        for device_id in (1, 2):
+            assert handler.write1ByteTxRx(port, device_id, 64, 1) == (0, 0)
+        goals = GroupSyncWrite(port, handler, 104, 4)
+        for device_id in (1, 2):
+            goals.addParam(device_id, [100, 0, 0, 0])
+        goals.txPacket()
+        wait_until(lambda: robot.world.pose[0] > 0.0)
+        x_m, began_s = robot.world.pose[0], time.monotonic()
+        time.sleep(0.5)
+        moved_m, passed_s = robot.world.pose[0] - x_m, time.monotonic() - began_s
+        assert moved_m == pytest.approx(100 * 7.913672e-4 * passed_s * factor, rel=0.1)
+        port.closePort()
+
+
+def test_a_watchdog_trips_by_the_computers_clock_however_fast_the_world_is() -> None:
+    with SimulatedTurtleBot3(base="dynamixel", walls=Walls(()), factor=10.0) as robot:
+        with robot.time.lock:
+            for packet in ((64, b"\x01"), (104, b"\x64\0\0\0"), (98, b"\x0a")):
+                robot.left.hear()
+                assert robot.left.write(*packet) == 0
+        began_s = time.monotonic()
+        with Host(robot.base_path) as host:
+            # It is heard, and its own thread must wake for the end.
+            host.ask("ff ff fd 00 01 03 00 01 19 4e")
+            wait_until(lambda: robot.left.table["bus watchdog"] == 0xFF)
+        assert 0.19 < time.monotonic() - began_s < 1.0
+
+
+@pytest.mark.parametrize(("lidar", "start", "bytes_s"), [("lds01", "", 12_600), ("lds02", "", 9_008),
+                                                         ("lds03", "aa 55 f0 0f", 13_700)])  # fmt: skip
+def test_a_lidar_is_paced_by_the_computers_clock(lidar: str, start: str, bytes_s: int) -> None:
+    baud = 115_200 if lidar == "lds02" else 230_400
+    with SimulatedTurtleBot3(lidar=lidar) as robot, Host(robot.scanner_path, baud) as host:
+        host.send(start)
+        host.receive(500)
+        began_s = time.monotonic()
+        host.receive(bytes_s // 2)
+        assert time.monotonic() - began_s == pytest.approx(0.5, abs=0.15)
+
+
+def test_opencr_lives_by_the_computers_clock() -> None:
+    with SimulatedTurtleBot3(walls=Walls(())) as robot, Host(robot.base_path) as host:
+        assert robot.opencr is not None
+        opencr = robot.opencr
+        host.ask("ff ff fd 00 c8 06 00 03 13 00 01 37 a7")
+        assert opencr.is_connected
+        began_s = time.monotonic()
+        wait_until(lambda: not opencr.is_connected)
+        assert 0.45 < time.monotonic() - began_s < 1.0

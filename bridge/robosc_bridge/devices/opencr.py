@@ -212,15 +212,8 @@ class OpenCrBase:
         return self._cycles_until(lambda block: max(map(abs, block.velocities_raw)) <= _REST_RAW, _REST_LIMIT_S)
 
     def _switch_torque(self, is_on: bool) -> None:
-        begin_ms = self._cycle((0, 0)).uptime_ms
         self._write_torque(is_on)
-
-        def is_switched(block: Block) -> bool:
-            # Before, the board tells what was written and not what the motors do.
-            is_refreshed = (block.uptime_ms - begin_ms) % _UPTIME_MODULUS >= _REFRESHED_MS
-            return is_refreshed and block.is_torque_on == is_on
-
-        if not self._cycles_until(is_switched, _TORQUE_LIMIT_S):
+        if not self._cycles_until(lambda block: block.is_torque_on == is_on, _TORQUE_LIMIT_S):
             done = "hold" if is_on else "let go"
             raise DeviceFaultError(f"{self._path}: a wheel motor does not {done}; switch the robot off and on")
 
@@ -231,12 +224,17 @@ class OpenCrBase:
 
     def _cycles_until(self, is_done: Callable[[Block], bool], limit_s: float) -> bool:
         """Exchange with a command of zero until it has the effect; whether it had in time."""
+        begin_ms = self._cycle((0, 0)).uptime_ms
         end_s = time.monotonic() + limit_s
-        while not is_done(self._cycle((0, 0))):
+        while True:
+            time.sleep(_POLL_S)
+            block = self._cycle((0, 0))
+            # Before, the board tells what was written or how it was, and not what the motors do.
+            is_refreshed = (block.uptime_ms - begin_ms) % _UPTIME_MODULUS >= _REFRESHED_MS
+            if is_refreshed and is_done(block):
+                return True
             if time.monotonic() > end_s:
                 return False
-            time.sleep(_POLL_S)
-        return True
 
     def _cycle(self, words: tuple[int, int] | None) -> Block:
         """Command, if there is anything to, change the heartbeat, and read."""

@@ -9,7 +9,7 @@ from robosc_bridge.simulated.lidar import LIDARS, Lds01, Lds02, Lds03, Lidar
 from robosc_bridge.simulated.line import Faults, SimulatedLine
 from robosc_bridge.simulated.opencr import OpenCr
 from robosc_bridge.simulated.robots import BODIES, Body
-from robosc_bridge.simulated.servo import Servo
+from robosc_bridge.simulated.servo import HardwareError, Servo
 from robosc_bridge.simulated.servo_bus import ServoBus
 from robosc_bridge.simulated.timebase import Timebase
 from robosc_bridge.simulated.turtlebot3 import BASES, SimulatedTurtleBot3, wheel_servos
@@ -22,6 +22,7 @@ __all__ = [
     "LIDARS",
     "Body",
     "Faults",
+    "HardwareError",
     "Lds01",
     "Lds02",
     "Lds03",

@@ -4,14 +4,15 @@ from collections.abc import Callable
 from dataclasses import fields
 
 from robosc_bridge.simulated.line import Faults, SimulatedLine
-from robosc_bridge.simulated.servo import Servo
+from robosc_bridge.simulated.servo import HardwareError, Servo
 from robosc_bridge.simulated.turtlebot3 import SimulatedTurtleBot3
 
 HELP = """\
 base|scanner disconnect|reconnect|sound     the plug of a line; `sound` removes its faults
 base|scanner FAULT VALUE                    a fault of a line: {faults}
 base answers_as ID|own                      the ID that its answers carry
-left|right overheat|cool_down|overload      a wheel's servo
+left|right overheat|cool_down               a wheel's servo
+left|right trip ERROR                       an error of its hardware: {errors}
 left|right block|release                    a wheel
 left|right voltage V                        a servo's supply
 battery V                                   OpenCR's battery
@@ -53,7 +54,10 @@ def obey(robot: SimulatedTurtleBot3, line: str) -> str:
 def _obey(robot: SimulatedTurtleBot3, words: list[str]) -> str:
     match words:
         case ["help"]:
-            return HELP.format(faults=", ".join(field.name for field in fields(Faults)))
+            return HELP.format(
+                faults=", ".join(field.name for field in fields(Faults)),
+                errors=", ".join(name.lower() for name in HardwareError.__members__),
+            )
         case ["pose"]:
             return "pose " + " ".join(f"{value:.4f}" for value in robot.world.pose)
         case ["pose", x, y, heading]:
@@ -92,8 +96,8 @@ def _to_servo(servo: Servo, words: list[str]) -> None:
             servo.overheat()
         case ["cool_down"]:
             servo.cool_down()
-        case ["overload"]:
-            servo.overload()
+        case ["trip", name] if name.upper() in HardwareError.__members__:
+            servo.trip(HardwareError[name.upper()])
         case ["block"]:
             servo.block_wheel()
         case ["release"]:

@@ -29,6 +29,8 @@ _CHUNK = 4096
 # As much as the line discipline holds: what is beyond it waits deeper in the kernel, where no host can flush it, and
 # would be old news for the next one that opens the port.
 _BUFFER = 4095
+# `poll` knows whole milliseconds only.
+_FINE_S = 0.001
 _BAUDS = {
     getattr(termios, f"B{baud}"): baud
     for baud in (
@@ -234,6 +236,9 @@ class SimulatedLine:
                 poll.register(self._woken, select.POLLIN)
                 if master >= 0:
                     poll.register(master, select.POLLIN)
+            if 0.0 < limit_s < _FINE_S:
+                time.sleep(limit_s)
+                continue
             ready = dict(poll.poll(None if math.isinf(limit_s) else max(limit_s, 0.0) * 1000))
             if self._woken in ready:
                 with contextlib.suppress(BlockingIOError):

@@ -11,6 +11,7 @@ The motor follows goals in the velocity mode (1) and the PWM mode (16); in any o
 """
 
 import math
+from enum import IntFlag
 
 from robosc_bridge.simulated.control_table import MODELS, ControlTable, Item
 from robosc_bridge.simulated.packets import ALERT, Error
@@ -27,7 +28,6 @@ _PROCESSOR_V = 5.5
 # Silence after a reboot: not stated, "allow 0.5 s".
 REBOOT_S = 0.35
 
-_VOLTAGE, _OVERHEATING, _OVERLOAD = 0x01, 0x04, 0x20
 _REVERSE, _TIME_BASED, _TORQUE_BY_GOAL = 0x01, 0x04, 0x08
 _RESET_BY_MODE = frozenset(
     name
@@ -35,6 +35,16 @@ _RESET_BY_MODE = frozenset(
                   "feedforward 2nd gain|feedforward 1st gain|profile acceleration|profile velocity|goal velocity")
     for name in group.split("|")
 )  # fmt: skip
+
+
+class HardwareError(IntFlag):
+    """Bits of Hardware Error Status (70), and of Shutdown (63), which chooses those that switch torque off."""
+
+    VOLTAGE = 0x01
+    OVERHEATING = 0x04
+    ENCODER = 0x08
+    SHOCK = 0x10
+    OVERLOAD = 0x20
 
 
 class Servo:
@@ -100,9 +110,13 @@ class Servo:
 
     def overload(self) -> None:
         """Trip the protection against overload at once."""
+        self.trip(HardwareError.OVERLOAD)
+
+    def trip(self, error: HardwareError) -> None:
+        """Let it find an error of its hardware."""
         with self.time.lock:
             self.catch_up()
-            self._fail(_OVERLOAD)
+            self._fail(error)
 
     def brown_out(self, voltage_v: float) -> None:
         """Set the voltage at its input: beyond its limits it flags an error, below 5.5 V it is off."""
@@ -168,7 +182,7 @@ class Servo:
         elif self._blocked_s is None:
             self._blocked_s = now_s
         elif now_s - self._blocked_s >= OVERLOAD_S:
-            self._fail(_OVERLOAD)
+            self._fail(HardwareError.OVERLOAD)
 
     def due_s(self) -> float:
         """When something will happen by itself."""
@@ -308,11 +322,11 @@ class Servo:
     def _protect(self) -> None:
         table = self.table
         if self.temperature_c > table["temperature limit"]:
-            self._fail(_OVERHEATING)
+            self._fail(HardwareError.OVERHEATING)
         if self._has_power and not table["min voltage limit"] <= self.voltage_v * 10 <= table["max voltage limit"]:
-            self._fail(_VOLTAGE)
+            self._fail(HardwareError.VOLTAGE)
 
-    def _fail(self, bit: int) -> None:
+    def _fail(self, bit: HardwareError) -> None:
         self.table["hardware error status"] |= bit
         if bit & self.table["shutdown"]:
             self._release()

@@ -53,12 +53,15 @@ class ServoBus:
         for request in self._parser.feed(data, self.servos[0].time.now_s()):
             self.live()
             listening = [servo for servo in self.servos if servo.answers and _BAUDS[servo.table["baud rate"]] == baud]
-            after_s = 0.0
+            # A bus takes its time for bytes (ten bits each), and an adapter hands on what is complete.
+            byte_s = 10 / baud if baud else 0.0
+            after_s = byte_s * len(data)
             for servo, device_id, error, answer in _answers(request, listening):
-                # Each waits its own time after what came before it.
-                after_s += servo.table["return delay time"] * 2e-6
                 sender = device_id if self.answers_as is None else self.answers_as
-                found.append(Sending(status(sender, error | servo.error, answer), after_s))
+                packet = status(sender, error | servo.error, answer)
+                # Each waits its own time after what came before it.
+                after_s += servo.table["return delay time"] * 2e-6 + byte_s * len(packet)
+                found.append(Sending(packet, after_s))
         return found
 
 

@@ -147,7 +147,7 @@ def test_devices_are_told(robot: SimulatedTurtleBot3) -> None:
     assert robot.left.table["hardware error status"] == 0x04
     obey(robot, "left cool_down")
     assert robot.left.temperature_c == 33.0
-    obey(robot, "right overload")
+    obey(robot, "right trip overload")
     assert robot.right.table["hardware error status"] == 0x20
     obey(robot, "right block")
     assert robot.world.right.is_blocked
@@ -181,12 +181,13 @@ def test_devices_are_told(robot: SimulatedTurtleBot3) -> None:
     assert obey(robot, "collisions") == "collisions 0"
     assert obey(robot, "") == ""
     assert "delay_s" in obey(robot, "help")
+    assert "shock" in obey(robot, "help")
 
 
 @pytest.mark.parametrize(
     "line",
-    ["jump", "left", "left jump", "base jump 1", "base delay_s", "base delay_s x", "base echo 1", "press battery_v",
-     "scanner turn 0", "pose 1", "base garbage xx", "base answers_as x", "battery"],
+    ["jump", "left", "left jump", "left trip it", "base jump 1", "base delay_s", "base delay_s x", "base echo 1",
+     "press battery_v", "scanner turn 0", "pose 1", "base garbage xx", "base answers_as x", "battery"],
 )  # fmt: skip
 def test_what_is_not_known_is_told(robot: SimulatedTurtleBot3, line: str) -> None:
     with pytest.raises(UnknownCommandError):

@@ -39,7 +39,7 @@ def well_formed(packet: bytes) -> tuple[int, int, bytes]:
     assert int.from_bytes(packet[5:7], "little") == len(packet) - 7
     assert packet[7] == 0x55
     assert SDK.updateCRC(0, packet, len(packet) - 2) == int.from_bytes(packet[-2:], "little")
-    assert b"\xff\xff\xfd" not in packet[7:-2].replace(b"\xff\xff\xfd\xfd", b"")
+    assert b"\xff\xff\xfd" not in packet[7:-2].replace(b"\xff\xff\xfd\xfd", b"|")
     return packet[4], packet[8], packet[9:-2].replace(b"\xff\xff\xfd\xfd", b"\xff\xff\xfd")
 
 

@@ -1,13 +1,14 @@
 """The servos as dynamixel-sdk meets them: registers, access rules, protections, what a restart forgets."""
 
 import math
+import time
 from collections.abc import Iterator
 
 import pytest
 from dynamixel_sdk import GroupBulkRead, GroupBulkWrite, GroupSyncRead, GroupSyncWrite, PacketHandler, PortHandler
 
 from robosc.execution.clock import ManualClock
-from robosc_bridge.simulated import Servo, SimulatedTurtleBot3, Walls
+from robosc_bridge.simulated import HardwareError, Servo, SimulatedTurtleBot3, Walls
 
 OPEN_SPACE = Walls(())
 RAM_GOAL, TORQUE, WATCHDOG, HARDWARE_ERROR = 104, 64, 98, 70
@@ -315,6 +316,26 @@ def test_a_blocked_wheel_is_overloaded_after_a_second(station: Station) -> None:
     station.robot.advance(0.3)
     assert (station.read(HARDWARE_ERROR, 1), station.read(TORQUE, 1)) == (0x20, 0)
     assert station.read(TORQUE, 1, 2) == 1
+
+
+@pytest.mark.parametrize("error", HardwareError)
+def test_every_error_alerts_and_the_chosen_ones_shut_off(station: Station, error: HardwareError) -> None:
+    station.go(100)
+    station.robot.left.trip(error)
+    assert station.ping() == (1060, 0, 0x80)
+    assert station.read(HARDWARE_ERROR, 1) == error
+    assert station.read(TORQUE, 1) == int(not error & 0x34)
+
+
+def test_the_bus_takes_its_time(station: Station) -> None:
+    station.write(9, 1, 0)
+    station.write(8, 1, 1)
+    station.port.setBaudRate(57_600)
+    # 10 bytes there and 14 back.
+    for _ in range(5):
+        began_s = time.monotonic()
+        station.ping()
+        assert time.monotonic() - began_s > 24 * 10 / 57_600
 
 
 def test_a_shutdown_that_is_not_chosen_leaves_torque_on(station: Station) -> None:

@@ -6,13 +6,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from robosc_bridge.devices.dynamixel import DynamixelBase
+from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, exchange_limit_s
 from robosc_bridge.devices.interface import STANDSTILL, DriveReading, Velocity
 from robosc_bridge.devices.opencr import OpenCrBase
 from robosc_bridge.devices.robots import ROBOTS
 from robosc_bridge.simulated import SimulatedTurtleBot3
 from robosc_bridge.simulated.line import Device, Sending
 
-# The simulator is a thread of this process on a shared machine: what is no matter of time-outs is not measured by them.
+# The simulator is a thread of this process, on a machine that may be busy; time-outs are for the tests of time-outs.
 PATIENT_S = 0.5
 PERIOD_S = 0.01
 
@@ -72,6 +73,13 @@ class Rig:
         """Open it and switch torque on."""
         self.base.open()
         self.base.set_torque(True)
+
+    def hurry(self) -> None:
+        """From now on, time-outs as on a robot."""
+        bus = self.base._bus
+        assert bus is not None
+        bus._port.answer_limit_s = ANSWER_LIMIT_S
+        self.base._exchange_limit_s = exchange_limit_s(ANSWER_LIMIT_S)
 
     def drive(self, velocity: Velocity = STANDSTILL, seconds: float = 0.0) -> DriveReading:
         """Exchange for so long; the last reading."""

@@ -143,7 +143,7 @@ def test_the_gyroscope_is_calibrated_at_rest_if_asked_to() -> None:
 
 
 def test_a_late_answer_to_another_programs_calibration_is_none_of_ours() -> None:
-    with rig("opencr", answer_limit_s=0.034, calibration_s=0.4) as bench:
+    with rig("opencr", answer_limit_s=0.1, calibration_s=0.8) as bench:
         with Host(bench.robot.base_path) as host:
             # Somebody calibrates and leaves; the board is silent until it is done, and answers all of it then.
             host.send(CALIBRATE)
@@ -268,6 +268,7 @@ def test_torque_is_not_switched_on_while_the_wheels_turn(bench: Rig) -> None:
     wheel = bench.robot.world.left
     wheel.is_driven = True
     wheel.goal_rad_s = 2.0
+    wait_until(lambda: bool(bench.robot.world.pose) and wheel.speed_rad_s == 2.0)
     with pytest.raises(DeviceError, match="the wheels still turn"):
         bench.base.set_torque(True)
     assert TORQUE_ON not in bench.tap.packets

@@ -42,7 +42,7 @@ class Pose:
 
 
 class MotorFault(StrEnum):
-    """What a wheel's motor or the base tells of itself; all but `VOLTAGE` switch its torque off."""
+    """What a wheel's motor or the base tells of itself; those from `OVERHEATING` to `TORQUE_LOST` end its torque."""
 
     VOLTAGE = "input voltage"
     OVERHEATING = "overheating"
@@ -51,6 +51,7 @@ class MotorFault(StrEnum):
     OVERLOAD = "overload"
     TORQUE_LOST = "torque off by itself"
     WATCHDOG = "bus watchdog"
+    BLOCKED = "does not turn as told"
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,324 @@
+"""Two Dynamixel X servos as wheels, on a U2D2 or another half-duplex adapter.
+
+The servos' bus watchdogs are armed while torque is on: when nothing reaches them for half a second, they stop by
+themselves. A servo that has stopped itself, for whatever reason, is not set in motion again before torque is switched
+on anew, and one that has shut down not before a person has it restarted.
+
+Source: ROBOTIS e-Manual, pages XL430-W250, XM430-W210 and "DYNAMIXEL Protocol 2.0".
+"""
+
+import contextlib
+import logging
+import time
+from collections.abc import Sequence
+
+from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, DynamixelBus, exchange_limit_s
+from robosc_bridge.devices.following import FollowingWatch
+from robosc_bridge.devices.interface import DriveLimits, DriveReading, MotorFault, Velocity
+from robosc_bridge.devices.kinematics import body_velocity, wheel_goals
+from robosc_bridge.devices.odometry import Odometry
+from robosc_bridge.devices.robots import ACCELERATION_RAW_RAD_S2, Robot
+from robosc_bridge.devices.servo_pair import ServoPair
+from robosc_bridge.errors import BridgeError, DeviceError, DeviceSilentError
+from robosc_bridge.protocol import servo
+from robosc_bridge.protocol.servo import Measurement
+from robosc_bridge.transport.serial_line import SerialLine
+
+FACTORY_BAUD = 57_600
+"""What a servo fresh from the factory speaks; a robot's are set to 1 000 000."""
+
+CHECK_PERIOD_S = 0.1
+"""How often it is looked whether the motors have torque and their watchdogs have tripped, beside every exchange."""
+
+_FOLLOWING_S = 0.7
+
+_log = logging.getLogger(__name__)
+
+
+class DynamixelBase:
+    """A `DriveBase`. Used from one thread.
+
+    Args:
+        path: Of the adapter's port.
+        robot: Whose wheels they are.
+        motors: Ids of the left and the right one; the right one is mounted the other way round.
+        bauds: Speeds to look for them at, in this order.
+        acceleration_rad_s2: Of a wheel; None: as fast as it can.
+        watchdog_s: After how long without a request the motors stop by themselves, at least three exchanges.
+        answer_limit_s: Longest wait for one answer.
+
+    Raises:
+        ValueError: An argument is out of its range.
+    """
+
+    def __init__(
+        self,
+        path: str,
+        robot: Robot,
+        motors: tuple[int, int] = (1, 2),
+        bauds: Sequence[int] = (1_000_000,),
+        acceleration_rad_s2: float | None = None,
+        watchdog_s: float = 0.5,
+        answer_limit_s: float = ANSWER_LIMIT_S,
+    ) -> None:
+        if motors[0] == motors[1]:
+            raise ValueError("the two motors must have different ids")
+        if not bauds:
+            raise ValueError("there must be a speed to look for the motors at")
+        self._path = path
+        self._robot = robot
+        self._names = {motors[0]: f"{path}: motor {motors[0]} (left)", motors[1]: f"{path}: motor {motors[1]} (right)"}
+        self._bauds = tuple(bauds)
+        self._acceleration_raw, ramp_s = _profile(robot, acceleration_rad_s2)
+        self._watchdog = round(watchdog_s / servo.WATCHDOG_S)
+        if not 1 <= self._watchdog <= servo.WATCHDOG_MOST:
+            raise ValueError(f"the bus watchdog must be within {servo.WATCHDOG_MOST * servo.WATCHDOG_S:.2f} s")
+        self._answer_limit_s = answer_limit_s
+        self._exchange_limit_s = exchange_limit_s(answer_limit_s)
+        self._limits = robot.limits(robot.motor.velocity_limit_raw)
+        self._odometry = Odometry(robot.tick_m, robot.wheel_separation_m, self._limits.wheel_m_s)
+        self._following = FollowingWatch(_FOLLOWING_S + ramp_s)
+        self._line: SerialLine | None = None
+        self._bus: DynamixelBus | None = None
+        self._pair: ServoPair | None = None
+        self._is_torque_wanted = False
+        self._is_torque_on = False
+        # Why they stay at a standstill until torque is switched on anew.
+        self._stops: frozenset[MotorFault] = frozenset()
+        # Whether a motor may have restarted.
+        self._is_doubtful = True
+        self._commanded_s = 0.0
+        self._check_s = 0.0
+        self._is_watchdogs_turn = False
+
+    @property
+    def limits(self) -> DriveLimits:
+        """What the wheels can do; known after `open`."""
+        return self._limits
+
+    def open(self) -> None:
+        """Find both motors, check that they can be driven, and set them up; wheels at rest, torque off.
+
+        Hardware errors do not keep it from opening: they are told by `exchange`, and `reset` is what they need.
+
+        Raises:
+            LineError: The line cannot be used.
+            DeviceSilentError: A motor does not answer.
+            WrongDeviceError: They are no such motors, not alike, or set to what cannot be driven.
+            DeviceFaultError: A motor does not let go.
+        """
+        self.close()
+        self._odometry = self._odometry.rebased()
+        self._is_torque_wanted = self._is_torque_on = self._is_doubtful = False
+        self._stops = frozenset()
+        try:
+            self._line = SerialLine(self._path, self._bauds[0])
+            self._bus = DynamixelBus(self._line, self._names.__getitem__, self._answer_limit_s)
+            self._find(self._line, self._bus)
+            self._pair = ServoPair(self._bus, self._names, self._exchange_limit_s)
+            limits_raw = [settings.velocity_limit_raw for settings in self._pair.settings.values()]
+            self._limits = self._robot.limits(min(limits_raw))
+            self._pair.let_go()
+            self._pair.set_up()
+        except BaseException:
+            self._release()
+            raise
+
+    def set_torque(self, is_on: bool) -> None:
+        """Torque on and watchdogs armed, from a standstill; or both off, after a stop.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceSilentError: A motor does not answer.
+            DeviceFaultError: A motor has shut down, or does not do it.
+            DeviceError: The wheels still turn, or a motor refuses its settings.
+        """
+        pair, _ = self._opened()
+        self._is_torque_wanted = self._is_torque_on = False
+        if not is_on:
+            pair.let_go()
+            self._stops = frozenset()
+            return
+        try:
+            pair.arm(self._acceleration_raw, self._watchdog)
+        except BridgeError:
+            with contextlib.suppress(BridgeError):
+                pair.let_go()
+            raise
+        self._is_torque_wanted = self._is_torque_on = True
+        self._stops = frozenset()
+        self._following.forget()
+        self._commanded_s = time.monotonic()
+
+    def exchange(self, velocity: Velocity) -> DriveReading:
+        """Command the wheels and read both; at most `exchange_limit_s` of the bus.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceSilentError: A motor did not answer, also when asked again; the other one has been told to stop.
+        """
+        pair, bus = self._opened()
+        bus.begin(self._exchange_limit_s)
+        try:
+            return self._exchange(pair, bus, velocity)
+        except DeviceError:
+            self._is_doubtful = True
+            pair.halt()
+            raise
+
+    def reset(self) -> None:
+        """Restart the motors that tell of a hardware error; torque is off afterwards.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceSilentError: A motor does not come back.
+            DeviceFaultError: A motor is too hot still, or its error remains.
+        """
+        pair, _ = self._opened()
+        self._is_torque_wanted = self._is_torque_on = False
+        pair.halt()
+        is_left, is_right = pair.restart_faulty()
+        self._odometry = self._odometry.rebased(is_left, is_right)
+        pair.let_go()
+        pair.set_up()
+        self._stops = frozenset()
+
+    def close(self) -> None:
+        """Stop, torque off, watchdogs off, and give the line back."""
+        if self._pair is not None:
+            with contextlib.suppress(BridgeError):
+                self._pair.let_go()
+            with contextlib.suppress(BridgeError):
+                self._pair.sign_off()
+        self._release()
+
+    def _release(self) -> None:
+        if self._line is not None:
+            self._line.close()
+        self._line = self._bus = self._pair = None
+        self._is_torque_wanted = self._is_torque_on = False
+
+    def _opened(self) -> tuple[ServoPair, DynamixelBus]:
+        if self._pair is None or self._bus is None:
+            raise DeviceError(f"{self._path}: the motors are not open")
+        return self._pair, self._bus
+
+    def _find(self, line: SerialLine, bus: DynamixelBus) -> None:
+        """Set the line to the speed at which the left motor answers."""
+        left = next(iter(self._names))
+        for baud in self._bauds:
+            if baud != line.baud:
+                line.set_baud(baud)
+            bus.begin(self._exchange_limit_s)
+            try:
+                bus.ping(left)
+            except DeviceSilentError:
+                continue
+            if baud != self._bauds[0]:
+                _log.info("%s: the motors speak %d baud instead of %d", self._path, baud, self._bauds[0])
+            return
+        tried = " or ".join(map(str, self._bauds))
+        hint = "" if FACTORY_BAUD in self._bauds else f" A motor fresh from the factory speaks {FACTORY_BAUD} baud."
+        raise DeviceSilentError(f"{self._names[left]} does not answer at {tried} baud; has it power?{hint}")
+
+    def _exchange(self, pair: ServoPair, bus: DynamixelBus, velocity: Velocity) -> DriveReading:
+        if self._is_doubtful or self._has_paused():
+            # Nothing is commanded before it is known what became of the motors.
+            self._check_torque(pair)
+            self._check_watchdogs(pair)
+            self._is_doubtful = False
+        goals = (0, 0)
+        if self._is_torque_wanted:
+            if not self._stops:
+                goals = wheel_goals(velocity, self._limits, self._robot.wheel_separation_m, self._robot.raw_m_s)
+            pair.command(goals)
+            self._commanded_s = time.monotonic()
+        measured = pair.measure()
+        time_s = bus.received_s
+        for motor, (_, is_alert) in zip(pair.motors, measured, strict=True):
+            self._look_at(pair, motor, is_alert)
+        self._check_by_turns(pair)
+        return self._reading(pair, [measurement for measurement, _ in measured], goals, time_s)
+
+    def _has_paused(self) -> bool:
+        return self._is_torque_wanted and time.monotonic() - self._commanded_s > self._watchdog * servo.WATCHDOG_S / 2
+
+    def _look_at(self, pair: ServoPair, motor: int, is_alert: bool) -> None:
+        if not is_alert:
+            pair.hardware[motor] = frozenset()
+        elif faults := pair.read_hardware(motor) - {MotorFault.VOLTAGE}:
+            self._is_torque_on = False
+            # The other wheel, at once: one alone turns the robot.
+            self._stop_for(pair, faults)
+
+    def _check_by_turns(self, pair: ServoPair) -> None:
+        now_s = time.monotonic()
+        if now_s < self._check_s:
+            return
+        self._check_s = now_s + CHECK_PERIOD_S / 2
+        if self._is_watchdogs_turn:
+            self._check_watchdogs(pair)
+        else:
+            self._check_torque(pair)
+        self._is_watchdogs_turn = not self._is_watchdogs_turn
+
+    def _check_torque(self, pair: ServoPair) -> None:
+        self._is_torque_on, (has_left, has_right) = pair.read_torque()
+        if has_left or has_right:
+            self._odometry = self._odometry.rebased(has_left, has_right)
+        if not self._is_torque_on:
+            self._stop_for(pair, frozenset({MotorFault.TORQUE_LOST}))
+
+    def _check_watchdogs(self, pair: ServoPair) -> None:
+        if pair.has_tripped():
+            self._stop_for(pair, frozenset({MotorFault.WATCHDOG}))
+
+    def _stop_for(self, pair: ServoPair, faults: frozenset[MotorFault]) -> None:
+        if self._is_torque_wanted and not faults <= self._stops:
+            self._stops |= faults
+            pair.halt()
+
+    def _reading(
+        self, pair: ServoPair, measured: Sequence[Measurement], goals: tuple[int, int], time_s: float
+    ) -> DriveReading:
+        signs = [settings.sign for settings in pair.settings.values()]
+        left, right = (sign * one.ticks for sign, one in zip(signs, measured, strict=True))
+        velocities_raw = [sign * one.velocity_raw for sign, one in zip(signs, measured, strict=True)]
+        before = self._odometry.rebases
+        self._odometry = self._odometry.advanced(left, right, time_s)
+        # Wheels do not jump: a motor has restarted, and is looked at before anything else is commanded.
+        self._is_doubtful = self._odometry.rebases > before
+        faults = self._stops.union(*pair.hardware.values())
+        if not self._is_torque_wanted or self._stops:
+            self._following.forget()
+        elif self._following.is_blocked(goals, velocities_raw, time_s):
+            faults |= {MotorFault.BLOCKED}
+        left_m_s, right_m_s = (raw * self._robot.raw_m_s for raw in velocities_raw)
+        return DriveReading(
+            time_s=time_s,
+            pose=self._odometry.pose,
+            velocity=body_velocity(left_m_s, right_m_s, self._robot.wheel_separation_m),
+            wheels_m_s=(left_m_s, right_m_s),
+            is_torque_on=self._is_torque_on,
+            faults=faults,
+            battery_v=min(one.voltage_v for one in measured),
+            temperature_c=max(one.temperature_c for one in measured),
+        )
+
+
+def _profile(robot: Robot, acceleration_rad_s2: float | None) -> tuple[int, float]:
+    """The profile acceleration, and how long a wheel takes with it from one full speed to the other.
+
+    Raises:
+        ValueError: It cannot be set.
+    """
+    if acceleration_rad_s2 is None:
+        return 0, 0.0
+    raw = round(acceleration_rad_s2 / ACCELERATION_RAW_RAD_S2)
+    if not 1 <= raw <= servo.PROFILE_MOST:
+        raise ValueError(
+            f"the acceleration of a wheel must be between {ACCELERATION_RAW_RAD_S2:.2f} "
+            f"and {servo.PROFILE_MOST * ACCELERATION_RAW_RAD_S2:.0f} rad/s2"
+        )
+    fastest_rad_s = robot.linear_m_s / robot.wheel_radius_m
+    return raw, 2 * fastest_rad_s / (raw * ACCELERATION_RAW_RAD_S2)

@@ -1,0 +1,321 @@
+"""Requests to Dynamixel devices and their answers, never those of another request.
+
+Packets of protocol 2.0 carry no number by which an answer could be told to belong to its request, and an answer that
+comes too late looks as the answer to the next request. A device answers in the order in which it is asked, though. So a
+device that has not answered is first asked for something else, of a length that no other request has; once that answer
+is there, nothing older can follow. Only then is it asked again.
+
+Packets are those of dynamixel-sdk. Its `readTxRx`, `writeTxRx` and `GroupSyncRead` are not used: they take any answer
+of a device for the one they wait for, and the last forgets the error bytes and whatever came behind a missing device.
+"""
+
+import itertools
+import time
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+
+from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, INST_PING, INST_REBOOT
+
+from robosc_bridge.devices.dynamixel_port import DynamixelPort
+from robosc_bridge.errors import DeviceError, DeviceSilentError
+from robosc_bridge.protocol.dynamixel import DAMAGED_REQUEST, PING_DATA, PacketHandler, Status, status_of
+from robosc_bridge.transport.serial_line import SerialLine
+
+ANSWER_LIMIT_S = 0.034
+"""As the SDK has it: twice the 16 ms for which an adapter may keep bytes back, and 2 ms."""
+
+
+def exchange_limit_s(answer_limit_s: float) -> float:
+    """How long an exchange of a driver may take: three answers just in time, with what they take on the wire."""
+    return 3 * answer_limit_s + 0.02
+
+
+_EMPTY_STATUS = 11  # Bytes of an answer without data.
+
+# What a device is asked for to have all older answers behind it: address and length, by turns. The registers exist in
+# every device, and no request of a driver has one of these lengths.
+_SETTLING = ((6, 5), (6, 6), (6, 7), (104, 12), (104, 16), (104, 18), (104, 20), (104, 22))
+_turns = itertools.cycle(_SETTLING)  # Shared: a port that is opened anew may still get answers to the last session.
+
+
+class RefusedError(DeviceError):
+    """A device has refused a request.
+
+    Args:
+        problem: What was asked of which device.
+        status: Its answer.
+    """
+
+    def __init__(self, problem: str, status: Status) -> None:
+        super().__init__(f"{problem}: {status.refusal}")
+        self.number = status.number
+
+
+@dataclass
+class BusCounters:
+    """How healthy a line is.
+
+    Attributes:
+        requests: That wanted an answer.
+        unanswered: Of these, without a sound answer in time.
+        damaged: Answers with a wrong checksum or cut short.
+        foreign: Sound packets that were no answer to the request.
+        repeated: Requests that were made again.
+    """
+
+    requests: int = 0
+    unanswered: int = 0
+    damaged: int = 0
+    foreign: int = 0
+    repeated: int = 0
+
+
+class DynamixelBus:
+    """One or several devices on a line. Used from one thread.
+
+    Args:
+        line: Open; stays its owner's.
+        name_of: What to call a device in messages, with the line.
+        answer_limit_s: Longest wait for one answer.
+
+    Attributes:
+        counters: How healthy the line is.
+    """
+
+    def __init__(self, line: SerialLine, name_of: Callable[[int], str], answer_limit_s: float = ANSWER_LIMIT_S) -> None:
+        self.counters = BusCounters()
+        self._port = DynamixelPort(line, answer_limit_s)
+        self._handler = PacketHandler()
+        self._name_of = name_of
+        self._repeats = 0
+        self._unsettled: set[int] = set()
+
+    @property
+    def received_s(self) -> float:
+        """When the last byte came."""
+        return self._port.received_s
+
+    def begin(self, limit_s: float, repeats: int = 1) -> None:
+        """Begin a cycle.
+
+        Args:
+            limit_s: What the requests that follow may take together.
+            repeats: How many of them may be made again.
+        """
+        self._port.end_s = time.monotonic() + limit_s
+        self._repeats = repeats
+
+    def settle(self, device: int) -> bytes:
+        """Have every older answer of a device behind: what it answers to the next request, that is its answer.
+
+        Returns:
+            What was read for it.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceSilentError: There is no answer in time.
+        """
+        address, length = next(_turns)
+
+        def fits(status: Status) -> bool:
+            # A refusal has no length to know it by: it may be that of an older request.
+            return not status.number and len(status.data) == length
+
+        status = self._answered(device, lambda: self._read(device, address, length), fits, length)
+        return status.data
+
+    def ping(self, device: int) -> tuple[int, int]:
+        """Model number and version of the firmware.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceSilentError: There is no answer in time.
+        """
+        status = self._asked(device, lambda: self._plain(device, INST_PING), PING_DATA)
+        return int.from_bytes(status.data[:2], "little"), status.data[2]
+
+    def read(self, device: int, address: int, length: int) -> Status:
+        """What is at an address.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceSilentError: There is no answer in time.
+            RefusedError: The device refuses it.
+        """
+        return self._accepted(
+            self._asked(device, lambda: self._read(device, address, length), length),
+            f"does not let {length} bytes at {address} be read",
+        )
+
+    def write(self, device: int, address: int, data: bytes, limit_s: float | None = None) -> Status:
+        """Write to an address.
+
+        Args:
+            device: Whose.
+            address: Of the first byte.
+            data: What.
+            limit_s: Longest wait for the answer, where it is not the usual one.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceSilentError: There is no answer in time.
+            RefusedError: The device refuses it.
+        """
+
+        def transmit() -> int:
+            return int(self._handler.writeTxOnly(self._port, device, address, len(data), list(data)))
+
+        return self._accepted(
+            self._asked(device, transmit, 0, limit_s), f"does not let {len(data)} bytes at {address} be written"
+        )
+
+    def reboot(self, device: int) -> None:
+        """Restart a device; it is silent for a while then.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceSilentError: There is no answer in time.
+            RefusedError: The device refuses it.
+        """
+        self._accepted(self._asked(device, lambda: self._plain(device, INST_REBOOT), 0), "does not restart")
+
+    def sync_write(self, address: int, data: Mapping[int, bytes]) -> None:
+        """Write to the same address of several devices at once; none of them answers.
+
+        Args:
+            address: Of the first byte.
+            data: By device, all of the same length.
+
+        Raises:
+            LineError: The line is gone.
+        """
+        length = len(next(iter(data.values())))
+        parameters = [byte for device, value in data.items() for byte in (device, *value)]
+        self._sent(self._handler.syncWriteTxOnly(self._port, address, length, parameters, len(parameters)))
+
+    def sync_read(self, address: int, length: int, devices: Collection[int]) -> dict[int, Status]:
+        """What is at the same address of several devices.
+
+        Returns:
+            By device; those are missing that have not answered, also when asked again. Answers may be refusals.
+
+        Raises:
+            LineError: The line is gone.
+        """
+        found = self._sync_read(address, length, devices)
+        if len(found) < len(devices) and self._may_repeat():
+            found = self._sync_read(address, length, devices) or found
+        return found
+
+    def _sync_read(self, address: int, length: int, devices: Collection[int]) -> dict[int, Status]:
+        found: dict[int, Status] = {}
+        try:
+            for device in devices:
+                if device in self._unsettled:
+                    self.settle(device)
+            self._begin_request()
+        except DeviceSilentError:
+            return found
+        parameters = list(devices)
+        self._unsettled.update(devices)
+        self._sent(self._handler.syncReadTx(self._port, address, length, parameters, len(parameters), False))
+        self._port.wait_for(len(devices) * (_EMPTY_STATUS + length))
+        while len(found) < len(devices):
+            status = self._received()
+            if status is None:
+                self.counters.unanswered += 1
+                break
+            if status.device in devices and status.device not in found and _fits(status, length):
+                found[status.device] = status
+                self._unsettled.discard(status.device)
+            else:
+                self.counters.foreign += 1
+        return found
+
+    def _asked(self, device: int, transmit: Callable[[], int], length: int, limit_s: float | None = None) -> Status:
+        """The answer to a request, which is made again if there is none; never that to an older one."""
+        try:
+            return self._asked_once(device, transmit, length, limit_s)
+        except DeviceSilentError:
+            if not self._may_repeat():
+                raise
+            return self._asked_once(device, transmit, length, limit_s)
+
+    def _asked_once(self, device: int, transmit: Callable[[], int], length: int, limit_s: float | None) -> Status:
+        if device in self._unsettled:
+            self.settle(device)
+        status = self._answered(device, transmit, lambda status: _fits(status, length), length, limit_s)
+        if status.number == DAMAGED_REQUEST:
+            raise DeviceSilentError(f"{self._name_of(device)} received damaged bytes")
+        return status
+
+    def _answered(
+        self,
+        device: int,
+        transmit: Callable[[], int],
+        fits: Callable[[Status], bool],
+        length: int,
+        limit_s: float | None = None,
+    ) -> Status:
+        self._begin_request()
+        self._unsettled.add(device)
+        self._sent(transmit())
+        self._port.wait_for(_EMPTY_STATUS + length, limit_s)
+        other = ""
+        while (status := self._received()) is not None:
+            if status.device == device and fits(status):
+                self._unsettled.discard(device)
+                return status
+            self.counters.foreign += 1
+            if status.device != device:
+                other = f", but device {status.device} does"
+        self.counters.unanswered += 1
+        raise DeviceSilentError(f"{self._name_of(device)} does not answer{other}")
+
+    def _begin_request(self) -> None:
+        if self._port.is_late:
+            raise DeviceSilentError(f"{self._port.line.path}: no time is left to ask again")
+        self.counters.requests += 1
+
+    def _may_repeat(self) -> bool:
+        if self._repeats == 0 or self._port.is_late:
+            return False
+        self._repeats -= 1
+        self.counters.repeated += 1
+        return True
+
+    def _received(self) -> Status | None:
+        """The next sound packet in time; None: there is none, or a damaged one, after which it is best to ask again."""
+        while not self._port.isPacketTimeout():
+            packet, result = self._handler.rxPacket(self._port, False)
+            if result != COMM_SUCCESS:
+                self.counters.damaged += result != COMM_RX_TIMEOUT
+                return None
+            status = status_of(packet)
+            if status is not None:
+                return status
+            self.counters.damaged += 1
+        return None
+
+    def _accepted(self, status: Status, problem: str) -> Status:
+        if status.number:
+            raise RefusedError(f"{self._name_of(status.device)} {problem}", status)
+        return status
+
+    def _read(self, device: int, address: int, length: int) -> int:
+        return int(self._handler.readTx(self._port, device, address, length))
+
+    def _plain(self, device: int, instruction: int) -> int:
+        """Send a request without parameters; the handler has no call that only sends one."""
+        return int(self._handler.txPacket(self._port, [0, 0, 0, 0, device, 3, 0, instruction, 0, 0]))
+
+    @staticmethod
+    def _sent(result: int) -> None:
+        # The port raises for itself; what is left is a packet that is too long.
+        if result != COMM_SUCCESS:
+            raise ValueError(f"dynamixel-sdk does not send this packet: {result}")
+
+
+def _fits(status: Status, length: int) -> bool:
+    """Whether an answer can be one to a request for so many bytes: these, or an error and none."""
+    return len(status.data) == length or (status.number != 0 and not status.data)

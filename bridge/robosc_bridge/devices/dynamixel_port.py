@@ -1,0 +1,91 @@
+"""A port for dynamixel-sdk's packet handler on a serial line of ours.
+
+The SDK's own `PortHandler` asks for bytes over and over while it waits, which keeps a core busy (33 ms of computing for
+an answer that takes 34 ms); it measures time by a clock that a person may set; it lets the exceptions of pyserial,
+termios and the system through, and is busy for ever after one. This port waits in `poll`, by the monotonic clock,
+raises `LineError` alone, and is never busy: it is used from one thread.
+"""
+
+import time
+from collections.abc import Sequence
+
+from robosc_bridge.transport.serial_line import SerialLine
+
+_BITS_PER_BYTE = 10  # With a start and a stop bit.
+
+
+class DynamixelPort:
+    """What `PacketHandler` takes for a port.
+
+    Args:
+        line: That it sends and receives over.
+        answer_limit_s: Longest wait for an answer, beside the time that its bytes take on the wire.
+
+    Attributes:
+        line: The same.
+        answer_limit_s: The same.
+        end_s: Latest time of any wait, so that several requests together stay within a limit.
+        received_s: When the last byte came.
+    """
+
+    def __init__(self, line: SerialLine, answer_limit_s: float) -> None:
+        self.line = line
+        self.answer_limit_s = answer_limit_s
+        self.end_s = time.monotonic()
+        self.received_s = time.monotonic()
+        self._found = b""
+        self._answer_end_s = 0.0
+        self._is_over = False
+
+    @property
+    def is_using(self) -> bool:
+        """Whether another request is under way: never, with one thread."""
+        return False
+
+    @is_using.setter
+    def is_using(self, value: bool) -> None:
+        """The handler claims the port, and would not give it back after an exception."""
+
+    @property
+    def is_late(self) -> bool:
+        """Whether the time for requests is over."""
+        return time.monotonic() >= self.end_s
+
+    # The names below are the SDK's.
+
+    def clearPort(self) -> None:  # noqa: N802
+        """Forget what has come; called before each request."""
+        self.line.discard_input()
+        self._found = b""
+
+    def writePort(self, packet: Sequence[int]) -> int:  # noqa: N802
+        """Send all of a packet; how many bytes that were."""
+        self.line.write(bytes(packet))
+        return len(packet)
+
+    def setPacketTimeout(self, length: int) -> None:  # noqa: N802
+        """Begin to wait for an answer of so many bytes."""
+        self.wait_for(length)
+
+    def wait_for(self, length: int, limit_s: float | None = None) -> None:
+        """Begin to wait for answers of so many bytes together, longest for a limit of their own."""
+        wire_s = length * _BITS_PER_BYTE / self.line.baud
+        wait_s = wire_s + (self.answer_limit_s if limit_s is None else limit_s)
+        self._answer_end_s = min(time.monotonic() + wait_s, self.end_s)
+        self._is_over = False
+
+    def readPort(self, length: int) -> bytes:  # noqa: N802
+        """At most so many bytes, waiting for the first."""
+        if not self._found and not self._is_over:
+            limit_s = self._answer_end_s - time.monotonic()
+            # What came while this thread had no turn still counts: one look after the end, and no more.
+            self._is_over = limit_s <= 0.0
+            self._found = self.line.read(limit_s)
+            if self._found:
+                self.received_s = time.monotonic()
+        taken, self._found = self._found[:length], self._found[length:]
+        return taken
+
+    def isPacketTimeout(self) -> bool:  # noqa: N802
+        """Whether the wait is over and everything that came is read."""
+        return self._is_over and not self._found

@@ -1,0 +1,38 @@
+"""Whether the wheels turn as they are told."""
+
+from collections.abc import Sequence
+
+_LEAST_RAW = 20
+_SHARE = 0.5
+
+
+class FollowingWatch:
+    """Finds a wheel that is held, turns by itself, or has refused its goal without a word.
+
+    Args:
+        limit_s: For how long a wheel may be far from its goal.
+    """
+
+    def __init__(self, limit_s: float = 0.7) -> None:
+        self._limit_s = limit_s
+        self._since_s: list[float | None] = []
+
+    def forget(self) -> None:
+        """Begin anew: nothing is asked of the wheels."""
+        self._since_s = []
+
+    def is_blocked(self, goals_raw: Sequence[int], velocities_raw: Sequence[int], time_s: float) -> bool:
+        """Whether any wheel has been far from its goal for longer than the limit.
+
+        Args:
+            goals_raw: Of each wheel.
+            velocities_raw: That each has.
+            time_s: When they were read.
+        """
+        self._since_s = self._since_s or [None] * len(goals_raw)
+        for index, (goal, velocity) in enumerate(zip(goals_raw, velocities_raw, strict=True)):
+            if abs(goal - velocity) <= max(_LEAST_RAW, _SHARE * abs(goal)):
+                self._since_s[index] = None
+            elif self._since_s[index] is None:
+                self._since_s[index] = time_s
+        return any(since_s is not None and time_s - since_s > self._limit_s for since_s in self._since_s)

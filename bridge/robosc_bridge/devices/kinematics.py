@@ -1,0 +1,101 @@
+"""What two wheels are told so that the body moves as it should, within what they can do.
+
+The limits are applied in this order: the body's velocity is clamped; the wheels' speeds are made of it; where one is
+too fast, both are slowed by the same factor, which keeps the curvature; then they are rounded to what the wire carries.
+"""
+
+import math
+
+from robosc_bridge.devices.interface import DriveLimits, Velocity
+
+_CM = 100  # OpenCR takes centimetres and hundredths of a radian per second.
+
+
+def clamped(velocity: Velocity, limits: DriveLimits) -> Velocity:
+    """The velocity, each part within its limit; what is not a number is none.
+
+    Args:
+        velocity: Of the body.
+        limits: What it can do.
+    """
+    return Velocity(
+        _clamped(velocity.linear_m_s, limits.linear_m_s), _clamped(velocity.angular_rad_s, limits.angular_rad_s)
+    )
+
+
+def _clamped(value: float, limit: float) -> float:
+    return 0.0 if math.isnan(value) else max(-limit, min(limit, value))
+
+
+def wheel_speeds(velocity: Velocity, separation_m: float) -> tuple[float, float]:
+    """Speeds of the left and the right wheel, in metres per second."""
+    turn_m_s = velocity.angular_rad_s * separation_m / 2
+    return velocity.linear_m_s - turn_m_s, velocity.linear_m_s + turn_m_s
+
+
+def body_velocity(left_m_s: float, right_m_s: float, separation_m: float) -> Velocity:
+    """The velocity of a body whose wheels turn that fast."""
+    return Velocity((left_m_s + right_m_s) / 2, (right_m_s - left_m_s) / separation_m)
+
+
+def within_limits(velocity: Velocity, limits: DriveLimits, separation_m: float) -> Velocity:
+    """The velocity within all limits, of the same curvature as the clamped one."""
+    found = clamped(velocity, limits)
+    fastest_m_s = max(abs(speed) for speed in wheel_speeds(found, separation_m))
+    if fastest_m_s <= limits.wheel_m_s:
+        return found
+    factor = limits.wheel_m_s / fastest_m_s
+    return Velocity(found.linear_m_s * factor, found.angular_rad_s * factor)
+
+
+def wheel_goals(velocity: Velocity, limits: DriveLimits, separation_m: float, raw_m_s: float) -> tuple[int, int]:
+    """Goal velocities of the left and the right servo.
+
+    Args:
+        velocity: That the body should have.
+        limits: What it can do.
+        separation_m: Between the wheels.
+        raw_m_s: Speed of a wheel in one unit of its servo's velocity.
+
+    Returns:
+        In units of the servos' velocity, never beyond `limits.wheel_m_s`.
+    """
+    most = int(limits.wheel_m_s / raw_m_s + 1e-9)
+    speeds = wheel_speeds(within_limits(velocity, limits, separation_m), separation_m)
+    left, right = (max(-most, min(most, round(speed / raw_m_s))) for speed in speeds)
+    return left, right
+
+
+def opencr_words(velocity: Velocity, limits: DriveLimits, separation_m: float) -> tuple[int, int]:
+    """The words that OpenCR is commanded with, such that none of its own limits ever acts.
+
+    Its firmware clamps both parts on their own and then each wheel, which changes the curvature; and what it tells the
+    servos may be beyond their velocity limit, which they ignore altogether and keep their last speed.
+
+    Args:
+        velocity: That the body should have.
+        limits: What it can do.
+        separation_m: Between the wheels.
+
+    Returns:
+        Hundredths of a metre per second and of a radian per second.
+    """
+    found = within_limits(velocity, limits, separation_m)
+    linear = _word(found.linear_m_s, limits.linear_m_s)
+    angular = _word(found.angular_rad_s, limits.angular_rad_s)
+
+    def is_too_fast() -> bool:
+        speeds = wheel_speeds(Velocity(linear / _CM, angular / _CM), separation_m)
+        return max(map(abs, speeds)) > limits.wheel_m_s
+
+    if is_too_fast():
+        # Rounded up beyond the limit: the coarser word is rounded down, then the finer one.
+        linear = math.trunc(found.linear_m_s * _CM + math.copysign(1e-9, found.linear_m_s))
+    while is_too_fast():
+        angular -= int(math.copysign(1, angular))
+    return linear, angular
+
+
+def _word(value: float, limit: float) -> int:
+    most = int(limit * _CM + 1e-9)
+    return max(-most, min(most, round(value * _CM)))

@@ -1,0 +1,284 @@
+"""A stock TurtleBot3: its OpenCR board, which drives the wheels, as a Dynamixel device.
+
+The board has no time limit for commands: while its heartbeat changes, the last one holds. It stops the wheels half a
+second after the last change. It does not tell what is wrong with a motor, only that torque is off.
+
+Sources: ROBOTIS-GIT/OpenCR 1.5.3 (`turtlebot3_ros2`) and turtlebot3_node 2.3.6; what the latter does wrong is not done
+here (it reads the device status before it has one, and takes old readings for new ones).
+"""
+
+import contextlib
+import time
+from collections.abc import Callable
+
+from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, DynamixelBus, exchange_limit_s
+from robosc_bridge.devices.following import FollowingWatch
+from robosc_bridge.devices.interface import DriveLimits, DriveReading, MotorFault, Velocity
+from robosc_bridge.devices.kinematics import body_velocity, opencr_words, wheel_speeds
+from robosc_bridge.devices.odometry import Odometry
+from robosc_bridge.devices.robots import Robot
+from robosc_bridge.errors import BridgeError, DeviceError, DeviceFaultError, WrongDeviceError
+from robosc_bridge.protocol import opencr
+from robosc_bridge.protocol.opencr import Block, decode_block, encode_command
+from robosc_bridge.transport.serial_line import SerialLine
+
+BAUD = 1_000_000  # A USB device: any is right.
+
+_CALIBRATION_LIMIT_S = 6.0
+_REST_RAW = 2
+_REST_LIMIT_S = 1.0
+_TORQUE_LIMIT_S = 1.0
+_REFRESHED_MS = 45  # Two refreshes, every 20 ms, of what the board knows of its motors.
+_POLL_S = 0.01
+_UPTIME_MODULUS = 2**32
+
+
+class OpenCrBase:
+    """A `DriveBase`. Used from one thread.
+
+    Args:
+        path: Of its port.
+        robot: Which it is.
+        calibrates_gyro: Whether to calibrate the gyroscope when it is opened, at rest; takes up to 5 s.
+        answer_limit_s: Longest wait for one answer.
+
+    Attributes:
+        limits: What it can do.
+    """
+
+    def __init__(
+        self, path: str, robot: Robot, calibrates_gyro: bool = False, answer_limit_s: float = ANSWER_LIMIT_S
+    ) -> None:
+        self.limits: DriveLimits = robot.limits(robot.motor.velocity_limit_raw)
+        self._path = path
+        self._robot = robot
+        self._calibrates_gyro = calibrates_gyro
+        self._answer_limit_s = answer_limit_s
+        self._exchange_limit_s = exchange_limit_s(answer_limit_s)
+        self._line: SerialLine | None = None
+        self._bus: DynamixelBus | None = None
+        self._odometry = Odometry(robot.tick_m, robot.wheel_separation_m, self.limits.wheel_m_s)
+        self._following = FollowingWatch()
+        self._heartbeat = 0
+        self._uptime_ms: int | None = None
+        self._is_torque_wanted = False
+        self._is_torque_lost = False
+
+    def open(self) -> None:
+        """Find the board and check that it is the one that is meant; wheels at rest, torque off.
+
+        Raises:
+            LineError: The line cannot be used.
+            DeviceSilentError: Nothing answers.
+            WrongDeviceError: It is another device, firmware or robot.
+            DeviceFaultError: The board has found no motors, or a motor does not let go.
+        """
+        self.close()
+        line = SerialLine(self._path, BAUD)
+        try:
+            self._line = line
+            self._bus = DynamixelBus(line, lambda device: f"{self._path}: OpenCR", self._answer_limit_s)
+            self._uptime_ms = None
+            self._is_torque_wanted = self._is_torque_lost = False
+            self._odometry = self._odometry.rebased()
+            self._following.forget()
+            self._check_identity(self._bus)
+            self._check_motors(self._bus)
+            self._comes_to_rest()
+            self._switch_torque(False)
+            if self._calibrates_gyro:
+                self._calibrate(self._bus)
+        except BaseException:
+            self._release()
+            raise
+
+    def set_torque(self, is_on: bool) -> None:
+        """Torque on from a standstill, or off after a stop.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceSilentError: The board does not answer.
+            DeviceFaultError: A motor does not hold.
+            DeviceError: The wheels do not come to rest.
+        """
+        self._is_torque_wanted = False
+        if not self._comes_to_rest() and is_on:
+            raise DeviceError(f"{self._path}: the wheels still turn")
+        try:
+            self._switch_torque(is_on)
+        except DeviceFaultError:
+            # One wheel alone must not hold.
+            self._write_torque(False)
+            raise
+        self._is_torque_wanted = is_on
+        self._is_torque_lost = False
+        self._following.forget()
+
+    def exchange(self, velocity: Velocity) -> DriveReading:
+        """Command a velocity, change the heartbeat, read everything; at most `exchange_limit_s` of the bus.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceSilentError: The board did not answer, also when asked again.
+            DeviceError: The board has started anew.
+        """
+        is_obeying = self._is_torque_wanted and not self._is_torque_lost
+        words = opencr_words(velocity, self.limits, self._robot.wheel_separation_m) if is_obeying else (0, 0)
+        block = self._cycle(words if self._is_torque_wanted else None)
+        if self._is_torque_wanted and not block.is_torque_on and not self._is_torque_lost:
+            self._is_torque_lost = True
+            # A motor that has lost its power counts within one turn afterwards.
+            self._odometry = self._odometry.rebased()
+            self._command((0, 0))
+        faults = {MotorFault.TORQUE_LOST} if self._is_torque_lost else set()
+        if is_obeying and not self._is_torque_lost:
+            if self._following.is_blocked(self._wheels_raw(words), block.velocities_raw, self._used_bus.received_s):
+                faults.add(MotorFault.BLOCKED)
+        else:
+            self._following.forget()
+        return self._reading(block, frozenset(faults))
+
+    def reset(self) -> None:
+        """See whether both motors hold again; the board cannot restart them.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceSilentError: The board does not answer.
+            DeviceFaultError: A motor does not hold; the robot must be switched off and on.
+        """
+        self.set_torque(True)
+        self.set_torque(False)
+
+    def close(self) -> None:
+        """Stop, torque off, and give the line back."""
+        if self._bus is not None:
+            self._is_torque_wanted = False
+            with contextlib.suppress(BridgeError):
+                self._comes_to_rest()
+            with contextlib.suppress(BridgeError):
+                self._switch_torque(False)
+        self._release()
+
+    def _release(self) -> None:
+        if self._line is not None:
+            self._line.close()
+        self._line = self._bus = None
+
+    @property
+    def _used_bus(self) -> DynamixelBus:
+        if self._bus is None:
+            raise DeviceError(f"{self._path}: OpenCR is not open")
+        return self._bus
+
+    def _check_identity(self, bus: DynamixelBus) -> None:
+        bus.begin(self._exchange_limit_s)
+        model, firmware = bus.ping(opencr.DEVICE)
+        # What came before may have been an answer to another session.
+        bus.settle(opencr.DEVICE)
+        if model != opencr.MODEL_NUMBER:
+            raise WrongDeviceError(f"{self._path}: this is device model {model}, not an OpenCR ({opencr.MODEL_NUMBER})")
+        if firmware != opencr.FIRMWARE:
+            raise WrongDeviceError(
+                f"{self._path}: OpenCR has firmware version {firmware} instead of {opencr.FIRMWARE}; "
+                "load TurtleBot3's ROS 2 firmware onto it"
+            )
+        information = int.from_bytes(bus.read(opencr.DEVICE, opencr.MODEL_INFORMATION, 4).data, "little")
+        if information not in self._robot.opencr_information:
+            raise WrongDeviceError(
+                f"{self._path}: OpenCR's firmware is for another robot than '{self._robot.name}' "
+                f"(it tells {information})"
+            )
+
+    def _check_motors(self, bus: DynamixelBus) -> None:
+        bus.begin(self._exchange_limit_s)
+        status = bus.read(opencr.DEVICE, opencr.DEVICE_STATUS, 1).data
+        are_connected = bus.read(opencr.DEVICE, opencr.MOTORS_CONNECTED, 1).data
+        if status != b"\0" or are_connected != b"\1":
+            raise DeviceFaultError(
+                f"{self._path}: OpenCR found no wheel motors when it started; "
+                "check their cables, then switch the robot off and on"
+            )
+        bus.begin(self._exchange_limit_s)
+        # The first one must be another than the board knows.
+        self._heartbeat = bus.read(opencr.DEVICE, opencr.HEARTBEAT, 1).data[0]
+
+    def _calibrate(self, bus: DynamixelBus) -> None:
+        # The board does nothing else until it is done, and answers then.
+        bus.begin(_CALIBRATION_LIMIT_S)
+        bus.write(opencr.DEVICE, opencr.CALIBRATE_GYRO, b"\1", _CALIBRATION_LIMIT_S)
+
+    def _comes_to_rest(self) -> bool:
+        """Command zero and wait for the wheels; whether they came to rest in time."""
+        return self._cycles_until(lambda block: max(map(abs, block.velocities_raw)) <= _REST_RAW, _REST_LIMIT_S)
+
+    def _switch_torque(self, is_on: bool) -> None:
+        self._write_torque(is_on)
+        if not self._cycles_until(lambda block: block.is_torque_on == is_on, _TORQUE_LIMIT_S):
+            done = "hold" if is_on else "let go"
+            raise DeviceFaultError(f"{self._path}: a wheel motor does not {done}; switch the robot off and on")
+
+    def _write_torque(self, is_on: bool) -> None:
+        bus = self._used_bus
+        bus.begin(self._exchange_limit_s)
+        bus.write(opencr.DEVICE, opencr.TORQUE, bytes((is_on,)))
+
+    def _cycles_until(self, is_done: Callable[[Block], bool], limit_s: float) -> bool:
+        """Exchange with a command of zero until it has the effect; whether it had in time."""
+        begin_ms = self._cycle((0, 0)).uptime_ms
+        end_s = time.monotonic() + limit_s
+        while True:
+            time.sleep(_POLL_S)
+            block = self._cycle((0, 0))
+            # Before, the board tells what was written or how it was, and not what the motors do.
+            is_refreshed = (block.uptime_ms - begin_ms) % _UPTIME_MODULUS >= _REFRESHED_MS
+            if is_refreshed and is_done(block):
+                return True
+            if time.monotonic() > end_s:
+                return False
+
+    def _cycle(self, words: tuple[int, int] | None) -> Block:
+        """Command, if there is anything to, change the heartbeat, and read."""
+        bus = self._used_bus
+        bus.begin(self._exchange_limit_s)
+        if words is not None:
+            self._command(words)
+        self._heartbeat = (self._heartbeat + 1) % 256
+        bus.write(opencr.DEVICE, opencr.HEARTBEAT, bytes((self._heartbeat,)))
+        block = decode_block(bus.read(opencr.DEVICE, opencr.BLOCK_ADDRESS, opencr.BLOCK_LENGTH).data)
+        self._check_uptime(block.uptime_ms)
+        return block
+
+    def _command(self, words: tuple[int, int]) -> None:
+        self._used_bus.write(opencr.DEVICE, opencr.COMMAND, encode_command(*words))
+
+    def _check_uptime(self, uptime_ms: int) -> None:
+        before_ms = self._uptime_ms
+        if before_ms is not None and (uptime_ms - before_ms) % _UPTIME_MODULUS > _UPTIME_MODULUS // 2:
+            # It switches torque on by itself when it starts, and its motors count anew.
+            self._is_torque_wanted = False
+            raise DeviceError(f"{self._path}: OpenCR has started anew; it must be opened again")
+        self._uptime_ms = uptime_ms
+
+    def _wheels_raw(self, words: tuple[int, int]) -> tuple[int, int]:
+        velocity = Velocity(words[0] / 100, words[1] / 100)
+        left_m_s, right_m_s = wheel_speeds(velocity, self._robot.wheel_separation_m)
+        return int(left_m_s / self._robot.raw_m_s), int(right_m_s / self._robot.raw_m_s)
+
+    def _reading(self, block: Block, faults: frozenset[MotorFault]) -> DriveReading:
+        time_s = self._used_bus.received_s
+        self._odometry = self._odometry.advanced(*block.ticks, time_s)
+        left_m_s, right_m_s = (raw * self._robot.raw_m_s for raw in block.velocities_raw)
+        # Below this, the board no longer refreshes the share.
+        is_empty = block.battery_v < self._robot.battery.empty_v
+        return DriveReading(
+            time_s=time_s,
+            pose=self._odometry.pose,
+            velocity=body_velocity(left_m_s, right_m_s, self._robot.wheel_separation_m),
+            wheels_m_s=(left_m_s, right_m_s),
+            is_torque_on=block.is_torque_on,
+            faults=faults,
+            battery_v=block.battery_v,
+            battery_share=0.0 if is_empty else block.battery_share,
+            buttons=block.buttons,
+            imu=block.motion,
+        )

@@ -1,0 +1,106 @@
+"""TurtleBot3 robots as data.
+
+Sources: ROBOTIS e-Manual, "TurtleBot3: Features"; ROBOTIS-GIT/OpenCR 1.5.3, `turtlebot3_ros2` (what its firmware makes
+of a command); e-Manual pages XL430-W250 and XM430-W210.
+"""
+
+import math
+from dataclasses import dataclass
+
+from robosc_bridge.devices.interface import DriveLimits
+
+TICKS_PER_TURN = 4096
+
+RAW_RPM = 0.229
+"""Revolutions per minute in one unit of a servo's velocity."""
+
+ACCELERATION_RAW_RAD_S2 = 214.577 * 2 * math.pi / 3600
+"""One unit of a servo's profile acceleration (214.577 rev/min2)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Motor:
+    """A kind of wheel servo.
+
+    Attributes:
+        name: As on its label.
+        model_number: That it tells.
+        velocity_limit_raw: Of its goal velocity, as it left the factory; what is beyond, it ignores.
+    """
+
+    name: str
+    model_number: int
+    velocity_limit_raw: int
+
+
+XL430_W250 = Motor("XL430-W250", 1060, 265)
+XM430_W210 = Motor("XM430-W210", 1030, 330)
+MOTORS = {motor.model_number: motor for motor in (XL430_W250, XM430_W210)}
+
+
+@dataclass(frozen=True, slots=True)
+class Battery:
+    """When the battery is low.
+
+    Attributes:
+        warning_v: Tell a person.
+        stop_v: Stop safely. Below 11.0 V for 5 s, OpenCR cuts the motors' power by itself.
+        empty_v: What counts as nothing left.
+    """
+
+    warning_v: float = 11.5
+    stop_v: float = 11.1
+    empty_v: float = 10.5
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """A differential-drive robot.
+
+    Attributes:
+        name: What it is asked for by.
+        radius_m: Of the circle around it, as the firmware has it.
+        wheel_radius_m: Of both wheels.
+        wheel_separation_m: Between the wheels' middles.
+        linear_m_s: Fastest as published; also what the teleoperation of the stock robot clamps to.
+        angular_rad_s: The same of a turn.
+        motor: Of both wheels.
+        firmware_rpm: Where OpenCR's firmware limits what it is told.
+        opencr_information: Numbers that an OpenCR for this robot tells as its model information.
+        battery: When it is low.
+    """
+
+    name: str
+    radius_m: float
+    wheel_radius_m: float
+    wheel_separation_m: float
+    linear_m_s: float
+    angular_rad_s: float
+    motor: Motor
+    firmware_rpm: float
+    opencr_information: frozenset[int]
+    battery: Battery = Battery()
+
+    @property
+    def raw_m_s(self) -> float:
+        """Speed of a wheel in one unit of its servo's velocity."""
+        return RAW_RPM * 2 * math.pi / 60 * self.wheel_radius_m
+
+    @property
+    def tick_m(self) -> float:
+        """Way of a wheel in one tick of its encoder."""
+        return 2 * math.pi / TICKS_PER_TURN * self.wheel_radius_m
+
+    def limits(self, velocity_limit_raw: int) -> DriveLimits:
+        """What the robot can do with servos that take goal velocities up to a limit."""
+        firmware_m_s = self.firmware_rpm * 2 * math.pi / 60 * self.wheel_radius_m
+        wheel_m_s = min(velocity_limit_raw * self.raw_m_s, firmware_m_s)
+        turning_rad_s = wheel_m_s / (self.wheel_separation_m / 2)
+        return DriveLimits(min(self.linear_m_s, wheel_m_s), min(self.angular_rad_s, turning_rad_s), wheel_m_s)
+
+
+BURGER = Robot("burger", 0.105, 0.033, 0.160, 0.22, 2.84, XL430_W250, 61.0, frozenset({1}))
+# With an OpenManipulator, the board of a Waffle tells another number.
+WAFFLE = Robot("waffle", 0.220, 0.033, 0.287, 0.26, 1.82, XM430_W210, 77.0, frozenset({2, 3}))
+WAFFLE_PI = Robot("waffle_pi", 0.220, 0.033, 0.287, 0.26, 1.82, XM430_W210, 77.0, frozenset({2, 3}))
+ROBOTS = {robot.name: robot for robot in (BURGER, WAFFLE, WAFFLE_PI)}

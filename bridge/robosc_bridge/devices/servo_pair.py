@@ -1,0 +1,263 @@
+"""The two wheel servos on their bus: what is asked of both, and seen to be done."""
+
+import time
+from collections.abc import Mapping
+
+from robosc_bridge.devices.dynamixel_bus import DynamixelBus, RefusedError
+from robosc_bridge.devices.interface import MotorFault
+from robosc_bridge.devices.servo_settings import ServoSettings, read_settings
+from robosc_bridge.errors import DeviceError, DeviceFaultError, DeviceSilentError, WrongDeviceError
+from robosc_bridge.protocol import servo
+from robosc_bridge.protocol.dynamixel import Status
+from robosc_bridge.protocol.servo import Measurement, decode_measurement, encode_velocity
+
+_FAULTS = {
+    servo.VOLTAGE: MotorFault.VOLTAGE,
+    servo.OVERHEATING: MotorFault.OVERHEATING,
+    servo.ENCODER: MotorFault.ENCODER,
+    servo.SHOCK: MotorFault.SHOCK,
+    servo.OVERLOAD: MotorFault.OVERLOAD,
+}
+_COOLER_C = 10
+_REST_RAW = 2
+_REST_LIMIT_S = 1.0
+_REBOOT_LIMIT_S = 2.0
+_POLL_S = 0.01
+# What a servo's LED tells a person, and us: the bridge has it, and it has not restarted since.
+_OURS = b"\1"
+
+
+class ServoPair:
+    """Two servos, read and set up. Used from one thread.
+
+    Args:
+        bus: That they are on.
+        names: What to call each in messages, by id: the left one, then the right one.
+        exchange_limit_s: Longest time for a few requests.
+
+    Attributes:
+        motors: Ids of the left and the right one.
+        settings: Of each, once they are read.
+        hardware: Errors of each, as it told them last.
+
+    Raises:
+        LineError: The line is gone.
+        DeviceSilentError: One does not answer.
+        WrongDeviceError: They are no such motors, not alike, or set to what cannot be driven.
+    """
+
+    def __init__(self, bus: DynamixelBus, names: Mapping[int, str], exchange_limit_s: float) -> None:
+        self._bus = bus
+        self._names = names
+        self._limit_s = exchange_limit_s
+        self.motors: tuple[int, ...] = tuple(names)
+        self.hardware: dict[int, frozenset[MotorFault]] = {motor: frozenset() for motor in names}
+        self.settings: dict[int, ServoSettings] = {
+            motor: read_settings(bus, motor, names[motor], motor == self.motors[1], exchange_limit_s) for motor in names
+        }
+        left, right = self.settings.values()
+        if left.model_number != right.model_number:
+            raise WrongDeviceError(
+                f"{names[self.motors[0]]} is of model {left.model_number}, {names[self.motors[1]]} of "
+                f"{right.model_number}; they must be alike"
+            )
+
+    def set_up(self) -> None:
+        """Do what can be done with torque off, and lasts until they restart.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceError: One does not answer, or refuses it.
+        """
+        for motor in self.motors:
+            self._bus.begin(self._limit_s)
+            if self.settings[motor].operating_mode != servo.VELOCITY_MODE:
+                self._bus.write(motor, servo.OPERATING_MODE, bytes((servo.VELOCITY_MODE,)))
+            self._bus.write(motor, servo.LED, _OURS)
+            self.read_hardware(motor)
+
+    def arm(self, acceleration_raw: int, watchdog: int) -> None:
+        """Torque on from a standstill, then bus watchdogs, each seen to be done.
+
+        Args:
+            acceleration_raw: Profile acceleration.
+            watchdog: In units of `servo.WATCHDOG_S`.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceFaultError: One has shut down, or does not do it.
+            DeviceError: One does not answer or still turns, or refuses it.
+        """
+        self._bus.begin(self._limit_s)
+        for motor in self.motors:
+            if self.read_hardware(motor) - {MotorFault.VOLTAGE}:
+                raise DeviceFaultError(f"{self._hardware_text(motor)}; it must be reset")
+        self.halt()
+        if not self.comes_to_rest():
+            raise DeviceError(f"{self._names[self.motors[0]]} or {self._names[self.motors[1]]} still turns")
+        for motor in self.motors:
+            self._bus.begin(self._limit_s)
+            # First the watchdog: a tripped one lets nothing else be written.
+            self._bus.write(motor, servo.BUS_WATCHDOG, b"\0")
+            self._bus.write(motor, servo.PROFILE_ACCELERATION, acceleration_raw.to_bytes(4, "little"))
+            self._bus.write(motor, servo.GOAL_VELOCITY, encode_velocity(0))
+            self._bus.write(motor, servo.LED, _OURS)
+        self._write_both(servo.TORQUE, 1, "does not hold")
+        self._write_both(servo.BUS_WATCHDOG, watchdog, "does not arm its bus watchdog")
+
+    def let_go(self) -> None:
+        """Goal zero, wait for the wheels, watchdogs and torque off.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceError: One does not answer, or does not do it; the other one is let go all the same.
+        """
+        self.halt()
+        try:
+            self.comes_to_rest()
+            self._write_both(servo.BUS_WATCHDOG, 0, "does not disarm its bus watchdog")
+            self._write_both(servo.TORQUE, 0, "does not let go")
+        except DeviceError:
+            self._bus.sync_write(servo.TORQUE, dict.fromkeys(self.motors, b"\0"))
+            raise
+
+    def sign_off(self) -> None:
+        """Switch off what tells a person that the bridge has them."""
+        self._bus.sync_write(servo.LED, dict.fromkeys(self.motors, b"\0"))
+
+    def halt(self) -> None:
+        """A goal of zero for both."""
+        self.command((0, 0))
+
+    def command(self, goals_raw: tuple[int, int]) -> None:
+        """A goal for each, positive forward."""
+        goals = zip(self.settings.items(), goals_raw, strict=True)
+        data = {motor: encode_velocity(settings.sign * goal) for (motor, settings), goal in goals}
+        self._bus.sync_write(servo.GOAL_VELOCITY, data)
+
+    def comes_to_rest(self) -> bool:
+        """Whether both stand still in time."""
+        end_s = time.monotonic() + _REST_LIMIT_S
+        while True:
+            self._bus.begin(self._limit_s)
+            if all(abs(found.velocity_raw) <= _REST_RAW for found, _ in self.measure()):
+                return True
+            if time.monotonic() > end_s:
+                return False
+            time.sleep(_POLL_S)
+
+    def measure(self) -> list[tuple[Measurement, bool]]:
+        """What each measures, as the servo has it, and whether it tells of a hardware error.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceError: One does not answer, or refuses it.
+        """
+        found = self._read_both(servo.MEASUREMENT_ADDRESS, servo.MEASUREMENT_LENGTH)
+        return [(decode_measurement(found[motor].data), found[motor].is_alert) for motor in self.motors]
+
+    def read_torque(self) -> tuple[bool, list[bool]]:
+        """Whether both have torque, and whether each has restarted since this was asked last.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceError: One does not answer, or refuses it.
+        """
+        found = self._read_both(servo.TORQUE, 2)
+        have_restarted = [found[motor].data[1:] != _OURS for motor in self.motors]
+        if any(have_restarted):
+            self._bus.sync_write(servo.LED, dict.fromkeys(self.motors, _OURS))
+        return all(status.data[0] for status in found.values()), have_restarted
+
+    def has_tripped(self) -> bool:
+        """Whether the bus watchdog of one has stopped it.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceError: One does not answer, or refuses it.
+        """
+        found = self._read_both(servo.BUS_WATCHDOG, 1)
+        return any(status.data[0] == servo.WATCHDOG_TRIPPED for status in found.values())
+
+    def read_hardware(self, motor: int) -> frozenset[MotorFault]:
+        """The hardware errors of one.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceError: It does not answer, or refuses it.
+        """
+        bits = self._bus.read(motor, servo.HARDWARE_ERRORS, 1).data[0]
+        self.hardware[motor] = frozenset(fault for bit, fault in _FAULTS.items() if bits & bit)
+        return self.hardware[motor]
+
+    def restart_faulty(self) -> tuple[bool, bool]:
+        """Restart those that tell of a hardware error.
+
+        Returns:
+            Whether the left and the right one were.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceFaultError: One is too hot still; none was restarted then. Or its error remains.
+            DeviceSilentError: One does not come back.
+        """
+        self._bus.begin(self._limit_s)
+        faulty = [motor for motor in self.motors if self.read_hardware(motor)]
+        for motor in faulty:
+            self._require_cool(motor)
+        for motor in faulty:
+            self._bus.begin(self._limit_s)
+            self._bus.reboot(motor)
+        for motor in faulty:
+            self._await(motor)
+            self._bus.begin(self._limit_s)
+            if self.read_hardware(motor):
+                raise DeviceFaultError(f"{self._hardware_text(motor)}, also after its restart")
+        return self.motors[0] in faulty, self.motors[1] in faulty
+
+    def _require_cool(self, motor: int) -> None:
+        if MotorFault.OVERHEATING not in self.hardware[motor]:
+            return
+        self._bus.begin(self._limit_s)
+        temperature_c = self._bus.read(motor, servo.TEMPERATURE, 1).data[0]
+        most_c = self.settings[motor].temperature_limit_c - _COOLER_C
+        if temperature_c > most_c:
+            raise DeviceFaultError(
+                f"{self._names[motor]} is at {temperature_c} degrees; let it cool down to {most_c} first"
+            )
+
+    def _await(self, motor: int) -> None:
+        end_s = time.monotonic() + _REBOOT_LIMIT_S
+        while True:
+            self._bus.begin(self._limit_s, repeats=0)
+            try:
+                self._bus.ping(motor)
+            except DeviceSilentError:
+                if time.monotonic() > end_s:
+                    raise
+            else:
+                return
+
+    def _hardware_text(self, motor: int) -> str:
+        return f"{self._names[motor]} tells {', '.join(sorted(self.hardware[motor]))}"
+
+    def _write_both(self, address: int, value: int, problem: str) -> None:
+        """Write one byte to both at once, and see that they have it."""
+        self._bus.begin(self._limit_s)
+        for _ in range(2):  # Nobody answers to the first, which may have been lost.
+            self._bus.sync_write(address, dict.fromkeys(self.motors, bytes((value,))))
+            found = self._read_both(address, 1)
+            wrong = [motor for motor in self.motors if found[motor].data[0] != value]
+            if not wrong:
+                return
+        raise DeviceFaultError(f"{self._names[wrong[0]]} {problem}")
+
+    def _read_both(self, address: int, length: int) -> dict[int, Status]:
+        found = self._bus.sync_read(address, length, self.motors)
+        silent = [self._names[motor] for motor in self.motors if motor not in found]
+        if silent:
+            raise DeviceSilentError(" and ".join(silent) + (" does" if len(silent) == 1 else " do") + " not answer")
+        for motor, status in found.items():
+            if status.number:
+                raise RefusedError(f"{self._names[motor]} does not let {length} bytes at {address} be read", status)
+        return found

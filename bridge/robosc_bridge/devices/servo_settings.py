@@ -1,0 +1,82 @@
+"""What a wheel servo is set to, and whether it can be driven so."""
+
+from dataclasses import dataclass
+
+from robosc_bridge.devices.dynamixel_bus import DynamixelBus
+from robosc_bridge.devices.robots import MOTORS
+from robosc_bridge.errors import WrongDeviceError
+from robosc_bridge.protocol import servo
+
+_SHUTDOWN = servo.OVERHEATING | servo.SHOCK | servo.OVERLOAD
+
+
+@dataclass(frozen=True, slots=True)
+class ServoSettings:
+    """What a servo told of itself.
+
+    Attributes:
+        model_number: A key of `MOTORS`.
+        sign: Of the robot's forward direction, in what the servo calls positive.
+        operating_mode: `VELOCITY_MODE` or another, which must be changed.
+        velocity_limit_raw: Of its goal velocity.
+        temperature_limit_c: Where it shuts down.
+    """
+
+    model_number: int
+    sign: int
+    operating_mode: int
+    velocity_limit_raw: int
+    temperature_limit_c: int
+
+
+def read_settings(bus: DynamixelBus, device: int, name: str, is_mirrored: bool, limit_s: float) -> ServoSettings:
+    """What a servo is set to.
+
+    Args:
+        bus: That it is on.
+        device: Its id.
+        name: What to call it in messages.
+        is_mirrored: Whether it is mounted the other way round, so that the factory has set it to reverse.
+        limit_s: Longest time for each half of it.
+
+    Raises:
+        LineError: The line is gone.
+        DeviceSilentError: It does not answer.
+        WrongDeviceError: It is no servo that can be driven, or set to what cannot be driven; says what to change.
+    """
+    bus.begin(limit_s)
+    model_number, firmware = bus.ping(device)
+    # What came before may have been an answer to another session.
+    bus.settle(device)
+    if model_number not in MOTORS:
+        known = ", ".join(f"{motor.name} ({number})" for number, motor in sorted(MOTORS.items()))
+        raise WrongDeviceError(f"{name} is of model {model_number}; what can be driven is {known}")
+    if firmware < servo.WATCHDOG_FIRMWARE:
+        raise WrongDeviceError(
+            f"{name} has firmware {firmware}, without a bus watchdog; update it to {servo.WATCHDOG_FIRMWARE} or later"
+        )
+
+    def number(address: int, length: int) -> int:
+        return int.from_bytes(bus.read(device, address, length).data, "little")
+
+    drive_mode = number(servo.DRIVE_MODE, 1)
+    if drive_mode & ~servo.REVERSE:
+        raise WrongDeviceError(
+            f"{name} has drive mode {drive_mode}: a time-based profile, or torque that a goal switches on; "
+            f"set address {servo.DRIVE_MODE} to {drive_mode & servo.REVERSE}"
+        )
+    bus.begin(limit_s)
+    shutdown = number(servo.SHUTDOWN, 1)
+    if shutdown & _SHUTDOWN != _SHUTDOWN:
+        raise WrongDeviceError(
+            f"{name} would not protect itself when overloaded or hot (shutdown {shutdown}); "
+            f"set address {servo.SHUTDOWN} to {_SHUTDOWN}"
+        )
+    is_reversed = bool(drive_mode & servo.REVERSE)
+    return ServoSettings(
+        model_number,
+        1 if is_reversed == is_mirrored else -1,
+        number(servo.OPERATING_MODE, 1),
+        number(servo.VELOCITY_LIMIT, 4),
+        number(servo.TEMPERATURE_LIMIT, 1),
+    )

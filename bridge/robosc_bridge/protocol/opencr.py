@@ -1,0 +1,124 @@
+"""The control table of an OpenCR board with TurtleBot3's ROS 2 firmware: what its bytes mean.
+
+Source: ROBOTIS-GIT/OpenCR 1.5.3, `turtlebot3_ros2`. Where turtlebot3_node 2.3.6 takes another type for a register, the
+firmware's counts: illumination is two bytes (not a float), infrared four bytes (not a float), battery unsigned.
+"""
+
+import math
+import struct
+from dataclasses import dataclass
+
+DEVICE = 200
+MODEL_NUMBER = 0x5000
+FIRMWARE = 5
+
+MODEL_INFORMATION = 2
+DEVICE_STATUS = 18
+HEARTBEAT = 19
+CALIBRATE_GYRO = 59
+MOTORS_CONNECTED = 148
+TORQUE = 149
+COMMAND = 150
+
+BLOCK_ADDRESS = 10
+BLOCK_LENGTH = 172
+
+_BLOCK = struct.Struct(
+    "<I"  # 10: milliseconds since the start
+    "4xbB6x"  # 18: device status, heartbeat
+    "4?"  # 26: buttons, bumpers
+    "H2xIf"  # 30: illumination, infrared, sonar
+    "II"  # 42: battery
+    "10x13f"  # 60: motion
+    "8x2i2i2i"  # 120: currents, velocities, positions
+    "4x2?"  # 148: motors connected, torque
+    "i16xi"  # 150: command
+    "8x"  # 174: profile accelerations
+)
+_COMMAND = struct.Struct("<i16xi")
+_MOTION = tuple(
+    f"{quantity}_{axis}"
+    for quantity, axes in (
+        ("angular_velocity", "xyz"),
+        ("linear_acceleration", "xyz"),
+        ("magnetic_field", "xyz"),
+        ("orientation", "wxyz"),
+    )
+    for axis in axes
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """The registers from 10 to 181.
+
+    Attributes:
+        uptime_ms: Since the board started, modulo 2**32; it and all that is measured is refreshed every 20 ms.
+        device_status: 0: it runs; -1: it found no motors when it started.
+        heartbeat: That it was given last.
+        buttons: Whether each is pressed.
+        illumination: Raw.
+        infrared: Raw.
+        sonar_m: 0 in the stock firmware.
+        battery_v: Of the battery.
+        battery_share: 0 to 1; no longer refreshed below 10.5 V.
+        motion: Measurements of the inertial sensor, by name; those that are no numbers are left out.
+        velocities_raw: Of the left and the right wheel.
+        ticks: Of the left and the right wheel.
+        has_motors: Whether it found them when it started.
+        is_torque_on: Of both motors.
+        command: Linear and angular velocity, as they were written.
+    """
+
+    uptime_ms: int
+    device_status: int
+    heartbeat: int
+    buttons: dict[str, bool]
+    illumination: int
+    infrared: int
+    sonar_m: float
+    battery_v: float
+    battery_share: float
+    motion: dict[str, float]
+    velocities_raw: tuple[int, int]
+    ticks: tuple[int, int]
+    has_motors: bool
+    is_torque_on: bool
+    command: tuple[int, int]
+
+
+def decode_block(data: bytes) -> Block:
+    """What `BLOCK_LENGTH` bytes from `BLOCK_ADDRESS` on say."""
+    (
+        uptime_ms, device_status, heartbeat, button_1, button_2, bumper_1, bumper_2, illumination, infrared, sonar_cm,
+        battery_cv, battery_bp, *rest,
+    ) = _BLOCK.unpack(data)  # fmt: skip
+    motion = rest[: len(_MOTION)]
+    _, _, left_raw, right_raw, left, right, has_motors, is_torque_on, linear, angular = rest[len(_MOTION) :]
+    return Block(
+        uptime_ms=uptime_ms,
+        device_status=device_status,
+        heartbeat=heartbeat,
+        buttons={"button_1": button_1, "button_2": button_2, "bumper_1": bumper_1, "bumper_2": bumper_2},
+        illumination=illumination,
+        infrared=infrared,
+        sonar_m=sonar_cm / 100,
+        battery_v=battery_cv / 100,
+        battery_share=max(0.0, min(1.0, battery_bp / 10_000)),
+        motion={name: value for name, value in zip(_MOTION, motion, strict=True) if math.isfinite(value)},
+        velocities_raw=(left_raw, right_raw),
+        ticks=(left, right),
+        has_motors=has_motors,
+        is_torque_on=is_torque_on,
+        command=(linear, angular),
+    )
+
+
+def encode_command(linear: int, angular: int) -> bytes:
+    """What is written at `COMMAND`.
+
+    Args:
+        linear: Hundredths of a metre per second.
+        angular: Hundredths of a radian per second, counter-clockwise.
+    """
+    return _COMMAND.pack(linear, angular)

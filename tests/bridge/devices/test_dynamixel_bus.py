@@ -1,0 +1,282 @@
+"""Requests and answers over a real pseudo-terminal, and every way in which an answer can be wrong."""
+
+import resource
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+
+from robosc_bridge.devices.dynamixel_bus import DynamixelBus, RefusedError
+from robosc_bridge.errors import DeviceSilentError, LineLostError
+from robosc_bridge.transport.serial_line import SerialLine
+from support.peer import Answers, Peer, asked, packet, status
+
+LIMIT_S = 0.1
+
+
+@contextmanager
+def _bus(peer: Peer, limit_s: float = LIMIT_S) -> Iterator[DynamixelBus]:
+    with SerialLine(peer.path, 1_000_000) as line:
+        bus = DynamixelBus(line, lambda device: f"device {device}", limit_s)
+        bus.begin(10.0)
+        yield bus
+
+
+def _memory(request: bytes) -> bytes:
+    """An answer that tells what was asked for: as many bytes as wanted, each its own address."""
+    device, instruction, address, length = asked(request)
+    match instruction:
+        case 1:
+            return status(device, b"\x24\x04\x2d")
+        case 2:
+            return status(device, bytes((address + index) % 256 for index in range(length)))
+        case _:
+            return status(device)
+
+
+class _Scripted:
+    """Answers as `_memory`, but as it is told for the next requests."""
+
+    def __init__(self, *script: Answers) -> None:
+        self._script = list(script)
+
+    def __call__(self, request: bytes) -> Answers:
+        return self._script.pop(0) if self._script else [_memory(request)]
+
+
+def test_ping_read_write_and_reboot_are_as_worked() -> None:
+    with Peer(lambda request: [_memory(request)]) as peer, _bus(peer) as bus:
+        assert bus.ping(1) == (1060, 45)
+        assert bus.read(1, 132, 4).data == bytes((132, 133, 134, 135))
+        bus.write(1, 64, b"\1")
+        bus.reboot(1)
+        bus.sync_write(104, {1: (76).to_bytes(4, "little"), 2: (177).to_bytes(4, "little")})
+        bus.sync_write(98, {1: b"\x19", 2: b"\x19"})
+        bus.read(1, 70, 1)
+    assert [request.hex(" ") for request in peer.requests] == [
+        "ff ff fd 00 01 03 00 01 19 4e",
+        "ff ff fd 00 01 07 00 02 84 00 04 00 1d 15",
+        "ff ff fd 00 01 06 00 03 40 00 01 db 66",
+        "ff ff fd 00 01 03 00 08 2f 4e",
+        "ff ff fd 00 fe 11 00 83 68 00 04 00 01 4c 00 00 00 02 b1 00 00 00 54 b6",
+        "ff ff fd 00 fe 0b 00 83 62 00 01 00 01 19 02 19 b4 c5",
+        "ff ff fd 00 01 07 00 02 46 00 01 00 3c a3",
+    ]
+
+
+def test_a_synchronised_read_keeps_what_each_device_told() -> None:
+    def both(request: bytes) -> Answers:
+        return [status(1, b"a" * 21), status(2, b"b" * 21, 0x80)]
+
+    with Peer(both) as peer, _bus(peer) as bus:
+        found = bus.sync_read(126, 21, (1, 2))
+    assert peer.requests[0].hex(" ") == "ff ff fd 00 fe 09 00 82 7e 00 15 00 01 02 3e 1e"
+    assert (found[1].data, found[1].is_alert) == (b"a" * 21, False)
+    assert (found[2].data, found[2].is_alert) == (b"b" * 21, True)
+
+
+def test_a_missing_device_does_not_hide_what_comes_behind_it() -> None:
+    def second(request: bytes) -> Answers:
+        return [status(2, b"b", 0x80)] if request[7] == 0x82 else [_memory(request)]
+
+    with Peer(second) as peer, _bus(peer) as bus:
+        found = bus.sync_read(64, 1, (1, 2))
+        assert set(found) == {2}
+        assert found[2].is_alert
+        assert bus.counters.repeated == 1
+
+
+@pytest.mark.parametrize(
+    "noise",
+    [
+        bytes(range(256)),
+        b"\xff\xff\xfd",
+        b"\xff" * 40,
+        packet(1, bytes((2, 132, 0, 4, 0))),
+        status(7, b"1234"),
+        status(1, b"12345"),
+        status(1),
+    ],
+    ids=["garbage", "half a header", "0xff", "echo", "another device", "too long", "too short"],
+)
+def test_what_comes_before_the_answer_is_passed_over(noise: bytes) -> None:
+    with Peer(_Scripted([noise, status(1, b"good")])) as peer, _bus(peer) as bus:
+        assert bus.read(1, 132, 4).data == b"good"
+        assert bus.counters.repeated == 0
+    assert len(peer.requests) == 1
+
+
+def test_an_answer_in_single_bytes_is_put_together() -> None:
+    pieces: list[bytes | float] = []
+    for byte in status(1, b"good"):
+        pieces += [bytes((byte,)), 0.001]
+    with Peer(_Scripted(pieces)) as peer, _bus(peer) as bus:
+        assert bus.read(1, 132, 4).data == b"good"
+
+
+@pytest.mark.parametrize(
+    ("first", "is_damaged"),
+    [
+        ([], False),
+        ([status(1, b"bad!")[:-1] + b"\0"], True),
+        ([status(1, b"bad!")[:9]], True),
+        ([status(7, b"bad!")], False),
+        ([status(1, b"", 3)], False),
+    ],
+    ids=["silence", "wrong checksum", "half a packet", "another id", "request came damaged"],
+)
+def test_a_request_is_made_again_once(first: Answers, is_damaged: bool) -> None:
+    with Peer(_Scripted(first)) as peer, _bus(peer) as bus:
+        assert bus.read(1, 132, 4).data == bytes((132, 133, 134, 135))
+        assert bus.counters.repeated == 1
+        assert (bus.counters.damaged > 0) == is_damaged
+
+
+def test_silence_is_told_in_time_and_names_who_answers_instead() -> None:
+    with Peer(lambda request: [status(7, b"1234")]) as peer, _bus(peer) as bus:
+        begin_s = time.monotonic()
+        with pytest.raises(DeviceSilentError, match="device 1 does not answer, but device 7 does"):
+            bus.read(1, 132, 4)
+        assert LIMIT_S < time.monotonic() - begin_s < 5 * LIMIT_S
+        # The next device is not held up: the port is not busy, and nothing waits.
+        assert bus.read(7, 132, 4).data == b"1234"
+
+
+def test_all_requests_of_a_cycle_end_with_it() -> None:
+    with Peer(lambda request: []) as peer, _bus(peer) as bus:
+        begin_s = time.monotonic()
+        bus.begin(1.5 * LIMIT_S, repeats=5)
+        with pytest.raises(DeviceSilentError):
+            bus.read(1, 132, 4)
+        with pytest.raises(DeviceSilentError, match="no time is left"):
+            bus.write(1, 64, b"\1")
+        assert 1.4 * LIMIT_S < time.monotonic() - begin_s < 3 * LIMIT_S
+
+
+def test_waiting_costs_nothing() -> None:
+    with Peer(lambda request: []) as peer, _bus(peer, 0.5) as bus:
+        bus.begin(0.5, repeats=0)
+        begin = resource.getrusage(resource.RUSAGE_THREAD)
+        with pytest.raises(DeviceSilentError):
+            bus.ping(1)
+        end = resource.getrusage(resource.RUSAGE_THREAD)
+    assert end.ru_utime + end.ru_stime - begin.ru_utime - begin.ru_stime < 0.05
+
+
+def test_an_endless_stream_of_foreign_bytes_ends_the_wait_all_the_same() -> None:
+    flood = [status(7, b"1234"), b"\xff\xff\xfd\x00" * 50]
+
+    def babble(request: bytes) -> Answers:
+        end_s = time.monotonic() + 5 * LIMIT_S
+        while time.monotonic() < end_s:
+            yield from flood
+            yield 0.001
+
+    with Peer(babble) as peer, _bus(peer) as bus:
+        bus.begin(1.0, repeats=0)
+        begin_s = time.monotonic()
+        with pytest.raises(DeviceSilentError):
+            bus.ping(1)
+        assert time.monotonic() - begin_s < 3 * LIMIT_S
+
+
+def test_a_late_answer_is_not_taken_for_that_to_the_next_request() -> None:
+    # Of the same shape, and so late that the next request is out already.
+    late: Answers = [1.5 * LIMIT_S, status(1, b"late")]
+    with Peer(_Scripted(late)) as peer, _bus(peer) as bus:
+        bus.begin(10.0, repeats=0)
+        with pytest.raises(DeviceSilentError):
+            bus.read(1, 132, 4)
+        assert bus.read(1, 132, 4).data == bytes((132, 133, 134, 135))
+        assert bus.counters.foreign == 1
+
+
+def test_a_late_answer_to_a_write_confirms_no_other_write() -> None:
+    late: Answers = [1.5 * LIMIT_S, status(1)]
+    with Peer(_Scripted(late, [])) as peer, _bus(peer) as bus:
+        bus.begin(10.0, repeats=0)
+        with pytest.raises(DeviceSilentError):
+            bus.write(1, 64, b"\1")
+        # The peer drops what follows: the late answer is all there is.
+        with pytest.raises(DeviceSilentError):
+            bus.write(1, 64, b"\0")
+
+
+def test_a_late_refusal_refuses_no_other_request() -> None:
+    late: Answers = [1.5 * LIMIT_S, status(1, b"", 7)]
+    with Peer(_Scripted(late)) as peer, _bus(peer) as bus:
+        bus.begin(10.0, repeats=0)
+        with pytest.raises(DeviceSilentError):
+            bus.read(1, 132, 4)
+        assert bus.read(1, 132, 4).data == bytes((132, 133, 134, 135))
+
+
+def test_late_answers_of_a_synchronised_read_are_not_taken_for_the_next() -> None:
+    def both(data: bytes) -> bytes:
+        return status(1, data) + status(2, data)
+
+    class Late:
+        count = 0
+
+        def __call__(self, request: bytes) -> Answers:
+            if request[7] != 0x82:
+                return [_memory(request)]
+            self.count += 1
+            return [1.5 * LIMIT_S, both(b"late")] if self.count == 1 else [both(b"good")]
+
+    with Peer(Late()) as peer, _bus(peer) as bus:
+        bus.begin(10.0, repeats=0)
+        assert bus.sync_read(132, 4, (1, 2)) == {}
+        found = bus.sync_read(132, 4, (1, 2))
+    assert {found[1].data, found[2].data} == {b"good"}
+
+
+@pytest.mark.parametrize("length", [1, 2, 4])
+def test_a_refused_read_is_an_error_and_no_value(length: int) -> None:
+    with Peer(lambda request: [status(1, b"", 0x87)]) as peer, _bus(peer) as bus:
+        with pytest.raises(RefusedError, match=r"device 1 does not let \d bytes at 200 be read: no access") as caught:
+            bus.read(1, 200, length)
+        assert caught.value.number == 7
+    assert len(peer.requests) == 1
+
+
+def test_a_refused_write_is_an_error() -> None:
+    with (
+        Peer(lambda request: [status(1, b"", 6)]) as peer,
+        _bus(peer) as bus,
+        pytest.raises(RefusedError, match="value beyond a limit"),
+    ):
+        bus.write(1, 104, (400).to_bytes(4, "little"))
+
+
+def test_a_write_may_have_a_limit_of_its_own() -> None:
+    with Peer(_Scripted([2.5 * LIMIT_S, status(200)])) as peer, _bus(peer) as bus:
+        bus.write(200, 59, b"\1", 5.0)
+        assert bus.counters.repeated == 0
+
+
+def test_a_line_that_is_gone_is_told_as_such_and_leaves_nothing_busy() -> None:
+    peer = Peer(lambda request: [_memory(request)])
+    with _bus(peer) as bus:
+        bus.ping(1)
+        peer.close()
+        for _ in range(2):
+            with pytest.raises(LineLostError, match=peer.path):
+                bus.ping(1)
+
+
+def test_a_line_that_is_lost_while_waiting_is_told_as_such() -> None:
+    peer = Peer(lambda request: [])
+    with _bus(peer, 5.0) as bus:
+        timer = threading.Timer(0.05, peer.close)
+        timer.start()
+        with pytest.raises(LineLostError):
+            bus.ping(1)
+        timer.join()
+
+
+def test_a_packet_that_the_sdk_does_not_take_is_our_mistake() -> None:
+    with Peer(lambda request: []) as peer, _bus(peer) as bus, pytest.raises(ValueError, match="does not send"):
+        bus.write(1, 0, bytes(1100))

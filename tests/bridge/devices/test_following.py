@@ -1,0 +1,41 @@
+"""Wheels that do not turn as they are told."""
+
+from robosc_bridge.devices.following import FollowingWatch
+
+
+def test_a_wheel_that_is_held_is_found_after_the_limit() -> None:
+    watch = FollowingWatch(0.7)
+    assert [watch.is_blocked((100, 100), (100, 0), time / 10) for time in range(10)] == [False] * 8 + [True] * 2
+
+
+def test_a_wheel_that_turns_by_itself_is_found() -> None:
+    watch = FollowingWatch(0.7)
+    watch.is_blocked((0, 0), (60, 0), 0.0)
+    assert watch.is_blocked((0, 0), (60, 0), 0.8)
+
+
+def test_a_wheel_that_catches_up_in_time_is_none() -> None:
+    watch = FollowingWatch(0.7)
+    assert not any(
+        watch.is_blocked((200, 200), (speed, speed), time)
+        for time, speed in ((0.0, 0), (0.5, 50), (0.6, 120), (0.9, 30), (1.5, 180))
+    )
+
+
+def test_it_is_each_wheel_that_must_be_away_for_so_long() -> None:
+    watch = FollowingWatch(0.7)
+    watch.is_blocked((100, 100), (0, 100), 0.0)
+    assert not watch.is_blocked((100, 100), (100, 0), 0.8)
+
+
+def test_what_was_before_can_be_forgotten() -> None:
+    watch = FollowingWatch(0.7)
+    watch.is_blocked((100, 100), (0, 0), 0.0)
+    watch.forget()
+    assert not watch.is_blocked((100, 100), (0, 0), 1.0)
+
+
+def test_slow_goals_and_small_differences_do_not_count() -> None:
+    watch = FollowingWatch(0.7)
+    watch.is_blocked((20, -20), (0, 0), 0.0)
+    assert not watch.is_blocked((20, -20), (0, 0), 5.0)

@@ -1,0 +1,274 @@
+"""A stock TurtleBot3 through its OpenCR: what it is told byte for byte, and what can be wrong with it."""
+
+import itertools
+import struct
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from robosc_bridge.devices.interface import MotorFault, Velocity
+from robosc_bridge.devices.opencr import OpenCrBase
+from robosc_bridge.devices.robots import BURGER, WAFFLE
+from robosc_bridge.errors import DeviceError, DeviceFaultError, DeviceSilentError, WrongDeviceError
+from robosc_bridge.simulated import OpenCr
+from support.drive import PATIENT_S, Rig, rig
+from support.peer import Answers, Peer, asked, status
+from support.wire import Host, wait_until
+
+PING = "ff ff fd 00 c8 03 00 01 3b fa"
+STATUS = "ff ff fd 00 c8 07 00 02 12 00 01 00 ba 21"
+BLOCK = "ff ff fd 00 c8 07 00 02 0a 00 ac 00 b6 2f"
+ZERO = "ff ff fd 00 c8 1d 00 03 96 00" + 24 * " 00" + " 06 a0"
+WORKED = "ff ff fd 00 c8 1d 00 03 96 00 0a 00 00 00" + 16 * " 00" + " 32 00 00 00 4d 37"
+TORQUE_ON = "ff ff fd 00 c8 06 00 03 95 00 01 4c 2d"
+CALIBRATE = "ff ff fd 00 c8 06 00 03 3b 00 01 17 a5"
+HEARTBEATS = ("ff ff fd 00 c8 06 00 03 13 00 00 32 27", "ff ff fd 00 c8 06 00 03 13 00 01 37 a7")
+_HEARTBEAT = "ff ff fd 00 c8 06 00 03 13 00 "
+
+
+@pytest.fixture
+def bench() -> Iterator[Rig]:
+    with rig("opencr") as found:
+        yield found
+
+
+def _board(bench: Rig) -> OpenCr:
+    assert bench.robot.opencr is not None
+    return bench.robot.opencr
+
+
+def test_it_begins_with_a_ping_and_reads_the_status_before_anything_moves(bench: Rig) -> None:
+    bench.base.open()
+    packets = bench.tap.packets
+    assert packets[0] == PING
+    assert STATUS in packets
+    begin = packets.index(STATUS)
+    assert all(packet.split()[7] in ("01", "02") for packet in packets[: begin + 2])
+    assert ZERO in packets[begin:]
+    assert TORQUE_ON not in packets
+
+
+def test_torque_is_switched_on_as_worked_after_a_command_of_zero(bench: Rig) -> None:
+    bench.base.open()
+    bench.tap.packets.clear()
+    bench.base.set_torque(True)
+    packets = bench.tap.packets
+    assert packets.count(TORQUE_ON) == 1
+    assert ZERO in packets[: packets.index(TORQUE_ON)]
+
+
+def test_an_exchange_commands_then_changes_the_heartbeat_then_reads(bench: Rig) -> None:
+    bench.start()
+    bench.tap.packets.clear()
+    bench.base.exchange(Velocity(0.10, 0.50))
+    command, heartbeat, block = bench.tap.packets
+    assert command == WORKED
+    assert heartbeat.startswith(_HEARTBEAT)
+    assert block == BLOCK
+
+
+def test_the_heartbeat_is_another_one_every_time(bench: Rig) -> None:
+    bench.base.open()
+    for _ in range(300):
+        bench.base.exchange(Velocity())
+    beats = [packet for packet in bench.tap.packets if packet.startswith(_HEARTBEAT)]
+    assert all(one != other for one, other in itertools.pairwise(beats))
+    assert set(HEARTBEATS) <= set(beats)
+    assert _board(bench).is_connected
+
+
+def test_the_first_heartbeat_is_another_than_the_board_has(bench: Rig) -> None:
+    bench.base.open()
+    last = [packet for packet in bench.tap.packets if packet.startswith(_HEARTBEAT)][-1]
+    bench.base.close()
+    bench.tap.packets.clear()
+    bench.base.open()
+    assert next(packet for packet in bench.tap.packets if packet.startswith(_HEARTBEAT)) != last
+
+
+def test_with_torque_off_no_velocity_is_sent(bench: Rig) -> None:
+    bench.base.open()
+    bench.tap.packets.clear()
+    bench.base.exchange(Velocity(0.1, 0.5))
+    assert [packet.split()[7] for packet in bench.tap.packets] == ["03", "02"]
+    assert WORKED not in bench.tap.packets
+
+
+@pytest.mark.parametrize("velocity", [Velocity(0.22), Velocity(0.21), Velocity(0.2097), Velocity(0.2, 2.8)])
+def test_a_burger_obeys_at_any_speed(bench: Rig, velocity: Velocity) -> None:
+    # Beyond 265 its servos refuse the whole value and keep their last speed.
+    bench.start()
+    bench.drive(Velocity(0.05), 0.1)
+    reading = bench.drive(velocity, 0.3)
+    assert reading.wheels_m_s[1] > 0.19
+    assert max(abs(speed) for speed in reading.wheels_m_s) <= 265 * BURGER.raw_m_s + 1e-6
+
+
+def test_buttons_bumpers_battery_and_sensors_are_told(bench: Rig) -> None:
+    bench.base.open()
+    _board(bench).press(button_2=True, bumper_1=True)
+    _board(bench).set_battery(11.4)
+    reading = bench.drive_until(lambda reading: reading.buttons["button_2"] and reading.battery_v == 11.4)
+    assert reading.buttons == {"button_1": False, "button_2": True, "bumper_1": True, "bumper_2": False}
+    assert reading.battery_share == pytest.approx(0.5)
+    assert reading.temperature_c is None
+    assert reading.imu["linear_acceleration_z"] == pytest.approx(9.80665)
+    assert reading.imu["orientation_w"] == pytest.approx(1.0)
+
+
+def test_a_battery_below_what_the_share_is_told_of_is_empty(bench: Rig) -> None:
+    bench.base.open()
+    _board(bench).set_battery(10.4)
+    assert bench.drive_until(lambda reading: reading.battery_v == 10.4).battery_share == 0.0
+
+
+def test_the_gyroscope_sees_the_turn(bench: Rig) -> None:
+    bench.start()
+    reading = bench.drive(Velocity(0.0, 1.0), 0.3)
+    assert reading.imu["angular_velocity_z"] == pytest.approx(1.0, abs=0.02)
+
+
+def test_the_gyroscope_is_calibrated_at_rest_if_asked_to() -> None:
+    with rig("opencr", calibration_s=0.8) as bench:
+        bench.base = OpenCrBase(bench.robot.base_path, BURGER, calibrates_gyro=True, answer_limit_s=PATIENT_S)
+        begin_s = time.monotonic()
+        bench.base.open()
+        assert time.monotonic() - begin_s >= 0.8
+        packets = bench.tap.packets
+        assert packets.count(CALIBRATE) == 1
+        assert ZERO in packets[: packets.index(CALIBRATE)]
+        assert bench.drive().faults == frozenset()
+        bench.base.close()
+
+
+def test_a_late_answer_to_another_programs_calibration_is_none_of_ours() -> None:
+    with rig("opencr", answer_limit_s=0.1, calibration_s=0.8) as bench:
+        with Host(bench.robot.base_path) as host:
+            # Somebody calibrates and leaves; the board is silent until it is done, and answers all of it then.
+            host.send(CALIBRATE)
+            wait_until(lambda: CALIBRATE in bench.tap.packets)
+        with pytest.raises(DeviceSilentError):
+            bench.base.open()
+        end_s = time.monotonic() + 5.0
+        while True:
+            try:
+                bench.base.open()
+            except DeviceSilentError:
+                assert time.monotonic() < end_s
+                continue
+            break
+        bench.base.set_torque(True)
+        assert bench.drive(Velocity(0.1), 0.2).velocity.linear_m_s == pytest.approx(0.1, abs=0.002)
+
+
+def test_it_does_not_start_without_motors() -> None:
+    with rig("opencr", has_motors=False) as bench:
+        with pytest.raises(DeviceFaultError, match=r"found no wheel motors.*check their cables"):
+            bench.base.open()
+        assert all(packet.split()[7] in ("01", "02") for packet in bench.tap.packets)
+
+
+def test_another_robots_board_is_refused(bench: Rig) -> None:
+    bench.base = OpenCrBase(bench.robot.base_path, WAFFLE, answer_limit_s=PATIENT_S)
+    with pytest.raises(WrongDeviceError, match="firmware is for another robot than 'waffle'"):
+        bench.base.open()
+
+
+def _answers(model: int, firmware: int, registers: dict[int, bytes]) -> object:
+    def answer(request: bytes) -> Answers:
+        device, instruction, address, length = asked(request)
+        if instruction == 1:
+            return [status(device, struct.pack("<HB", model, firmware))]
+        if instruction == 2:
+            return [status(device, registers.get(address, b"").ljust(length, b"\0")[:length])]
+        return [status(device)]
+
+    return answer
+
+
+@pytest.mark.parametrize(
+    ("model", "firmware", "registers", "problem"),
+    [
+        (1060, 45, {}, "this is device model 1060, not an OpenCR"),
+        (0x5000, 4, {}, "firmware version 4 instead of 5; load"),
+        (0x5000, 5, {2: b"\1", 18: b"\xff", 148: b"\1"}, "found no wheel motors"),
+        (0x5000, 5, {2: b"\1", 18: b"\0", 148: b"\0"}, "found no wheel motors"),
+    ],
+)
+def test_what_is_no_sound_turtlebot_is_refused(
+    model: int, firmware: int, registers: dict[int, bytes], problem: str
+) -> None:
+    with Peer(_answers(model, firmware, registers)) as peer:  # type: ignore[arg-type]
+        base = OpenCrBase(peer.path, BURGER, answer_limit_s=PATIENT_S)
+        with pytest.raises(DeviceError, match=problem):
+            base.open()
+        assert all(request[7] in (1, 2) for request in peer.requests)
+
+
+def test_torque_that_is_gone_is_a_fault_that_stays_until_torque_is_switched_on_anew(bench: Rig) -> None:
+    bench.start()
+    bench.drive(Velocity(0.1), 0.2)
+    bench.robot.left.overload()
+    begin_s = time.monotonic()
+    reading = bench.drive_until(lambda reading: MotorFault.TORQUE_LOST in reading.faults, Velocity(0.1))
+    assert time.monotonic() - begin_s < 0.2
+    assert not reading.is_torque_on
+    assert bench.stops_within(0.1)
+    # Whatever is wanted then, nothing moves.
+    reading = bench.drive(Velocity(0.1), 0.2)
+    assert reading.faults == {MotorFault.TORQUE_LOST}
+    assert bench.goals_rad_s() == (0.0, 0.0)
+    with pytest.raises(DeviceFaultError, match="a wheel motor does not hold; switch the robot off and on"):
+        bench.base.set_torque(True)
+    assert not bench.robot.right.table["torque enable"]
+    with pytest.raises(DeviceFaultError, match="does not hold"):
+        bench.base.reset()
+
+
+def test_motors_that_were_without_power_can_be_used_again_and_have_not_jumped(bench: Rig) -> None:
+    bench.start()
+    bench.robot.left.set_position(40_000)
+    bench.robot.right.set_position(-90_000)
+    bench.base.open()
+    bench.base.set_torque(True)
+    bench.drive(Velocity(0.1), 0.3)
+    before = bench.robot.world.pose[0]
+    _board(bench).set_battery(4.0)
+    reading = bench.drive_until(lambda reading: bool(reading.faults), Velocity(0.1))
+    assert MotorFault.TORQUE_LOST in reading.faults
+    _board(bench).set_battery(12.0)
+    bench.drive(Velocity(0.1), 0.6)
+    assert bench.goals_rad_s() == (0.0, 0.0)
+    bench.base.reset()
+    reading = bench.drive()
+    assert (reading.faults, reading.is_torque_on) == (frozenset(), False)
+    assert reading.pose.x_m == pytest.approx(before, abs=0.02)
+    bench.base.set_torque(True)
+    bench.drive(Velocity(0.1), 0.2)
+    assert bench.goals_rad_s() != (0.0, 0.0)
+
+
+def test_a_board_that_has_started_anew_must_be_opened_again(bench: Rig) -> None:
+    bench.start()
+    bench.drive(Velocity(0.1), 0.2)
+    _board(bench)._began_s = bench.robot.time.now_s()
+    time.sleep(0.05)
+    for _ in range(2):
+        with pytest.raises(DeviceError, match="OpenCR has started anew; it must be opened again"):
+            bench.base.exchange(Velocity(0.1))
+    bench.base.open()
+    assert not bench.drive().is_torque_on
+
+
+def test_torque_is_not_switched_on_while_the_wheels_turn(bench: Rig) -> None:
+    bench.base.open()
+    # Somebody pushes it, whatever its motor does.
+    bench.robot.left._drive = lambda: None  # type: ignore[method-assign]
+    wheel = bench.robot.world.left
+    wheel.is_driven = True
+    wheel.goal_rad_s = 2.0
+    wait_until(lambda: bool(bench.robot.world.pose) and wheel.speed_rad_s == 2.0)
+    with pytest.raises(DeviceError, match="the wheels still turn"):
+        bench.base.set_torque(True)
+    assert TORQUE_ON not in bench.tap.packets

@@ -1,0 +1,137 @@
+"""Drive bases on simulated robots, with what goes over their line kept."""
+
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+from robosc_bridge.devices.dynamixel import DynamixelBase
+from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, exchange_limit_s
+from robosc_bridge.devices.interface import STANDSTILL, DriveReading, Velocity
+from robosc_bridge.devices.opencr import OpenCrBase
+from robosc_bridge.devices.robots import ROBOTS
+from robosc_bridge.simulated import SimulatedTurtleBot3
+from robosc_bridge.simulated.line import Device, Sending
+
+# The simulator is a thread of this process, on a machine that may be busy; time-outs are for the tests of time-outs.
+PATIENT_S = 0.5
+PERIOD_S = 0.01
+
+
+@dataclass
+class Tap:
+    """A device, and the packets that its host has sent.
+
+    Attributes:
+        device: The real one.
+        packets: In order.
+    """
+
+    device: Device
+    packets: list[str] = field(default_factory=list)
+    _rest: bytes = b""
+
+    @property
+    def baud(self) -> int | None:
+        return self.device.baud
+
+    def receive(self, data: bytes, baud: int) -> Iterable[Sending]:
+        self._rest += data
+        while len(self._rest) >= 7 and len(self._rest) >= (length := 7 + int.from_bytes(self._rest[5:7], "little")):
+            self.packets.append(self._rest[:length].hex(" "))
+            self._rest = self._rest[length:]
+        return self.device.receive(data, baud)
+
+    def live(self) -> Iterable[Sending]:
+        return self.device.live()
+
+    def due_s(self) -> float:
+        return self.device.due_s()
+
+    def plug_in(self) -> None:
+        self._rest = b""
+        self.device.plug_in()
+
+
+@dataclass
+class Rig:
+    """A simulated robot and the driver of its base.
+
+    Attributes:
+        robot: The simulated one.
+        base: Its driver, of the kind `kind`.
+        kind: `opencr` or `dynamixel`.
+        tap: On its line.
+    """
+
+    robot: SimulatedTurtleBot3
+    base: OpenCrBase | DynamixelBase
+    kind: str
+    tap: Tap
+
+    def start(self) -> None:
+        """Open it and switch torque on."""
+        self.base.open()
+        self.base.set_torque(True)
+
+    def hurry(self) -> None:
+        """From now on, time-outs as on a robot."""
+        bus = self.base._bus
+        assert bus is not None
+        bus._port.answer_limit_s = ANSWER_LIMIT_S
+        self.base._exchange_limit_s = exchange_limit_s(ANSWER_LIMIT_S)
+
+    def drive(self, velocity: Velocity = STANDSTILL, seconds: float = 0.0) -> DriveReading:
+        """Exchange for so long; the last reading."""
+        end_s = time.monotonic() + seconds
+        while True:
+            reading = self.base.exchange(velocity)
+            if time.monotonic() >= end_s:
+                return reading
+            time.sleep(PERIOD_S)
+
+    def drive_until(
+        self, is_so: Callable[[DriveReading], bool], velocity: Velocity = STANDSTILL, limit_s: float = 5.0
+    ) -> DriveReading:
+        """Exchange until a reading is as awaited; that reading."""
+        end_s = time.monotonic() + limit_s
+        while not is_so(reading := self.base.exchange(velocity)):
+            assert time.monotonic() < end_s, f"not within {limit_s} s; the last reading is {reading}"
+            time.sleep(PERIOD_S)
+        return reading
+
+    def goals_rad_s(self) -> tuple[float, float]:
+        """What the wheels' motors are told to do, forward positive; 0 without torque."""
+        wheels = (self.robot.world.left, self.robot.world.right)
+        left, right = (wheel.goal_rad_s if wheel.is_driven else 0.0 for wheel in wheels)
+        return left, right
+
+    def stops_within(self, seconds: float) -> bool:
+        """Whether the motors are told to stand still in time, without anything being exchanged."""
+        end_s = time.monotonic() + seconds
+        while self.goals_rad_s() != (0.0, 0.0):
+            if time.monotonic() > end_s:
+                return False
+            time.sleep(0.002)
+        return True
+
+
+@contextmanager
+def rig(kind: str, robot: str = "burger", answer_limit_s: float = PATIENT_S, **arguments: object) -> Iterator[Rig]:
+    """A simulated robot and its driver, not opened.
+
+    Args:
+        kind: `opencr` or `dynamixel`.
+        robot: Its name.
+        answer_limit_s: Of the driver.
+        arguments: Further ones of the simulated robot.
+    """
+    with SimulatedTurtleBot3(robot, kind, **arguments) as simulated:  # type: ignore[arg-type]
+        tap = Tap(simulated.base_line.device)
+        simulated.base_line.device = tap
+        driver = OpenCrBase if kind == "opencr" else DynamixelBase
+        base = driver(simulated.base_path, ROBOTS[robot], answer_limit_s=answer_limit_s)
+        try:
+            yield Rig(simulated, base, kind, tap)
+        finally:
+            base.close()

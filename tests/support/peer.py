@@ -1,0 +1,105 @@
+"""A device that answers as a test says, on a real pseudo-terminal."""
+
+import contextlib
+import os
+import select
+import threading
+import time
+import tty
+from collections.abc import Callable, Iterable
+from types import TracebackType
+from typing import Self
+
+Answers = Iterable[bytes | float]
+"""What to send, in order; a number is a pause in seconds."""
+
+
+class Peer:
+    """The far end of a line, served by a thread until it is closed.
+
+    Args:
+        answer: Called with every whole request of protocol 2.0.
+
+    Attributes:
+        path: Of the near end.
+        requests: That have come.
+    """
+
+    def __init__(self, answer: Callable[[bytes], Answers]) -> None:
+        self.requests: list[bytes] = []
+        self._answer = answer
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.path = os.ttyname(self._slave)
+        self._woken, self._waker = os.pipe()
+        self._thread = threading.Thread(target=self._serve)
+        self._thread.start()
+
+    def _serve(self) -> None:
+        heard = b""
+        while True:
+            ready, _, _ = select.select([self._master, self._woken], [], [])
+            if self._woken in ready:
+                return
+            with contextlib.suppress(OSError):
+                heard += os.read(self._master, 4096)
+            while len(heard) >= 7 and len(heard) >= (length := 7 + int.from_bytes(heard[5:7], "little")):
+                request, heard = heard[:length], heard[length:]
+                self.requests.append(request)
+                for sending in self._answer(request):
+                    if isinstance(sending, bytes):
+                        self.send(sending)
+                    else:
+                        time.sleep(sending)
+
+    def send(self, data: bytes) -> None:
+        """Send something; what does not fit into the buffer of the line is lost."""
+        with contextlib.suppress(BlockingIOError):
+            os.write(self._master, data)
+
+    def close(self) -> None:
+        os.write(self._waker, b"\0")
+        self._thread.join()
+        for file in (self._master, self._slave, self._woken, self._waker):
+            os.close(file)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def crc(data: bytes) -> int:
+    """CRC-16 of protocol 2.0, bit by bit: the twin of the table that the SDK has."""
+    found = 0
+    for byte in data:
+        found ^= byte << 8
+        for _ in range(8):
+            found = (found << 1 ^ 0x8005 if found & 0x8000 else found << 1) & 0xFFFF
+    return found
+
+
+def packet(device: int, body: bytes) -> bytes:
+    """A packet around an instruction and its parameters, stuffed."""
+    body = body.replace(b"\xff\xff\xfd", b"\xff\xff\xfd\xfd")
+    head = b"\xff\xff\xfd\x00" + bytes((device,)) + (len(body) + 2).to_bytes(2, "little") + body
+    return head + crc(head).to_bytes(2, "little")
+
+
+def status(device: int, data: bytes = b"", error: int = 0) -> bytes:
+    """A status packet."""
+    return packet(device, bytes((0x55, error)) + data)
+
+
+def asked(request: bytes) -> tuple[int, int, int, int]:
+    """Device, instruction, address and length of a request to read; zeros where it has none."""
+    return (
+        request[4],
+        request[7],
+        int.from_bytes(request[8:10], "little") if len(request) > 11 else 0,
+        int.from_bytes(request[10:12], "little") if len(request) > 13 else 0,
+    )

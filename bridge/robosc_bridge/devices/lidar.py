@@ -219,9 +219,9 @@ class Lidar[Frame]:
         """The newest turn that these bytes complete."""
         if now_s - self._heard_s > self._model.stale_after_s:
             self._forget(now_s)
-        self._heard_s = now_s
         newest = None
         for frame in self._decoder.feed(data):
+            self._heard_s = now_s
             turn = self._turns.add(self._model.points(frame))
             if turn:
                 self.counters.scans += 1

@@ -265,6 +265,25 @@ def test_halves_on_both_sides_of_a_silence_are_no_scan(rig: Rig) -> None:
     assert len(rig.scans(turn[1:] + turn[:1])) == 1
 
 
+def test_noise_does_not_bridge_a_silence(rig: Rig) -> None:
+    turn = rig.kit.turn(1000)
+    half = len(turn) // 2
+    assert rig.scans(turn[:half]) == []
+    for _ in range(5):
+        rig.clock.skip(rig.kit.model.stale_after_s / 4)
+        rig.pty.send(bytes(100))
+        assert rig.lidar.receive(0.01) is None
+    assert rig.scans(turn[half:] + turn[:1]) == []
+
+
+def test_frames_are_found_in_the_midst_of_lasting_noise(rig: Rig) -> None:
+    for _ in range(12):
+        rig.clock.skip(rig.kit.model.stale_after_s / 4)
+        rig.pty.send(bytes(100))
+        assert rig.lidar.receive(0.01) is None
+    assert rig.whole_scan()
+
+
 def test_halves_of_a_frame_on_both_sides_of_a_silence_are_no_frame(rig: Rig) -> None:
     first, second = rig.kit.turn(1000)[1:3]
     rig.pty.send(first[:11])

@@ -116,7 +116,7 @@ def test_a_covered_one_tells_scans_without_a_range(name: str) -> None:
 @each_lidar
 def test_a_slow_motor_tells_it(name: str) -> None:
     with scene(name) as seen:
-        seen.robot.scanner.speed_share = 0.5
+        seen.robot.scanner.turn_at(0.5)
         seen.open()
         scans = seen.scans(1.0)
         assert {round(scan.turns_per_s / seen.robot.scanner.nominal_hz, 2) for scan in scans} == {0.5}

@@ -1,0 +1,30 @@
+"""How long to wait before something that failed is tried again: twice as long each time, up to a limit."""
+
+
+class Backoff:
+    """Waits that grow.
+
+    Args:
+        first_s: After the first failure.
+        limit_s: The longest.
+    """
+
+    def __init__(self, first_s: float = 0.25, limit_s: float = 4.0) -> None:
+        self._first_s = first_s
+        self._limit_s = limit_s
+        self._failures = 0
+
+    @property
+    def is_fresh(self) -> bool:
+        """Whether nothing has failed since the last success."""
+        return self._failures == 0
+
+    def failed(self) -> float:
+        """It has failed: how long to wait now."""
+        wait_s = min(self._first_s * 2.0 ** min(self._failures, 32), self._limit_s)
+        self._failures += 1
+        return wait_s
+
+    def succeeded(self) -> None:
+        """It has worked."""
+        self._failures = 0

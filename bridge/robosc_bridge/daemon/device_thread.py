@@ -1,0 +1,65 @@
+"""The thread in which a worker takes its steps."""
+
+import threading
+from collections.abc import Callable
+
+from robosc_bridge.daemon.workers import Worker
+
+
+class DeviceThread:
+    """Takes a worker's steps when they are due, or at once when told to hurry.
+
+    Args:
+        worker: What steps.
+        clock: What the time is, in seconds: that of `time.monotonic`, which waiting goes by.
+    """
+
+    def __init__(self, worker: Worker, clock: Callable[[], float]) -> None:
+        self._worker = worker
+        self._clock = clock
+        self._condition = threading.Condition()
+        self._is_hurried = False
+        self._is_over = False
+        # A daemon thread: a driver that hangs for ever must not keep the process from ending.
+        self._thread = threading.Thread(target=self._run, name=worker.name, daemon=True)
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether it still steps."""
+        return self._thread.is_alive()
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def hurry(self) -> None:
+        """Take the next step now: something has changed that must not wait for a period."""
+        with self._condition:
+            self._is_hurried = True
+            self._condition.notify()
+
+    def stop(self, limit_s: float) -> bool:
+        """End after the step under way, with the worker closed; whether that was done in time."""
+        with self._condition:
+            self._is_over = True
+            self._condition.notify()
+        self._worker.wake()
+        if self._thread.ident is not None:
+            self._thread.join(limit_s)
+        return not self._thread.is_alive()
+
+    def _run(self) -> None:
+        try:
+            due_s = self._clock()
+            while self._waited(due_s):
+                due_s = self._worker.step(self._clock())
+        finally:
+            self._worker.close()
+
+    def _waited(self, due_s: float) -> bool:
+        """Wait for the next step; False: there is none."""
+        with self._condition:
+            while not self._is_over and not self._is_hurried and (left_s := due_s - self._clock()) > 0.0:
+                self._condition.wait(left_s)
+            self._is_hurried = False
+            return not self._is_over

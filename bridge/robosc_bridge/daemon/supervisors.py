@@ -1,0 +1,171 @@
+"""Where the supervisor comes from, and why it is trusted.
+
+It is made here, by this machine's synthesizer, or it is foreign: a file, or what a synthesis server sends. A foreign
+one is untrusted input, whatever digest it carries: it is validated, and executed only if the independent verifier
+passes it against the texts of the model. What a server made last for the same texts is kept, so that the robot starts
+without a network, too; it is checked again like any other file.
+"""
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from robosc.errors import LanguageError, RoboscError
+from robosc.language import load_bundle
+from robosc.model.structure import Deployment
+from robosc.source import Bundle
+from robosc.supervisor import Supervisor, decode, make_supervisor
+from robosc.supervisor.codec import MAXIMUM_BYTES
+from robosc.supervisor.recheck import recheck
+from robosc.verification import DEFAULT_STATES, Limits
+from robosc_bridge.errors import BridgeError
+from robosc_client import Client, ClientError, ServerUnavailableError, SynthesisStatus
+
+MODEL_SUFFIX, SUPERVISOR_SUFFIX = ".rscd", ".rsup"
+_SERVER_LIMIT_S = 120.0
+
+
+class NoSupervisorError(BridgeError):
+    """There is none that can be trusted; says why."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """What to execute.
+
+    Attributes:
+        file: The model (`.rscd`), or a supervisor (`.rsup`) with its model's text beside it, called alike.
+        deployment: Where the supervisor is to stand.
+        server: HOST:PORT of a synthesis server that makes it of the model; None: it is made here.
+        kept: Folder for what a server made last.
+    """
+
+    file: Path
+    deployment: Deployment
+    server: str | None = None
+    kept: Path | None = None
+
+
+def obtain(source: Source, tell: Callable[[str], None] = lambda text: None) -> Supervisor:
+    """The supervisor, verified.
+
+    Args:
+        source: Where it comes from.
+        tell: Told where the work is and what is worth knowing, one line each.
+
+    Raises:
+        NoSupervisorError: There is none that can be trusted.
+    """
+    if source.file.suffix == SUPERVISOR_SUFFIX:
+        model = source.file.with_suffix(MODEL_SUFFIX)
+        if not model.is_file():
+            raise NoSupervisorError(f"{source.file}: the model that it is checked against is missing: no {model}")
+        return _checked(_bytes(source.file), str(source.file), _bundle(model), source.deployment, tell)
+    if source.file.suffix != MODEL_SUFFIX:
+        raise NoSupervisorError(
+            f"{source.file}: neither a model ({MODEL_SUFFIX}) nor a supervisor ({SUPERVISOR_SUFFIX})"
+        )
+    bundle = _bundle(source.file)
+    if source.server is None:
+        return _made(bundle, source.deployment, tell)
+    return _served(bundle, source.server, source, tell)
+
+
+def _bundle(model: Path) -> Bundle:
+    try:
+        return load_bundle(model)
+    except LanguageError as error:
+        raise NoSupervisorError(str(error.diagnostics[0])) from error
+    except (OSError, UnicodeError) as error:
+        raise NoSupervisorError(f"{model}: {error}") from error
+
+
+def _bytes(file: Path) -> bytes:
+    try:
+        with file.open("rb") as stream:
+            data = stream.read(MAXIMUM_BYTES + 1)
+    except OSError as error:
+        raise NoSupervisorError(f"{file}: {error.strerror or error}") from error
+    if len(data) > MAXIMUM_BYTES:
+        raise NoSupervisorError(f"{file}: larger than any supervisor may be ({MAXIMUM_BYTES} bytes)")
+    return data
+
+
+def _made(bundle: Bundle, deployment: Deployment, tell: Callable[[str], None]) -> Supervisor:
+    tell(f"{bundle.main.name}: synthesis")
+    try:
+        made = make_supervisor(bundle, deployment=deployment)
+    except RoboscError as error:
+        raise NoSupervisorError(f"{bundle.main.name}: {error}") from error
+    if made.supervisor is None:
+        raise NoSupervisorError(made.reason or str(made.diagnostics[0]))
+    return made.supervisor
+
+
+def _checked(
+    data: bytes, place: str, bundle: Bundle, deployment: Deployment, tell: Callable[[str], None]
+) -> Supervisor:
+    """A foreign supervisor, if it is right."""
+    tell(f"{place}: verification against {bundle.main.name}")
+    try:
+        supervisor = decode(data)
+        if supervisor.deployment is not deployment:
+            raise NoSupervisorError(f"{place}: made for the deployment {supervisor.deployment}, not {deployment}")
+        found = recheck(supervisor, bundle, Limits.of(DEFAULT_STATES), deployment=deployment)
+    except RoboscError as error:
+        raise NoSupervisorError(f"{place}: {error}") from error
+    if found.diagnostics:
+        raise NoSupervisorError(str(found.diagnostics[0]))
+    if not found.has_passed:
+        why = found.faults[0].message if found.faults else f"not checked: {', '.join(found.unchecked())}"
+        raise NoSupervisorError(f"{place}: not a supervisor of {bundle.main.name} that can be trusted: {why}")
+    return supervisor
+
+
+def _served(bundle: Bundle, server: str, source: Source, tell: Callable[[str], None]) -> Supervisor:
+    """What the server makes, or else what it made last."""
+    kept = source.kept / f"{bundle.digest}-{source.deployment}{SUPERVISOR_SUFFIX}" if source.kept else None
+    tell(f"{bundle.main.name}: synthesis at {server}")
+    try:
+        with Client(server) as client:
+            answer = client.synthesize(bundle, deployment=source.deployment, deadline_s=_SERVER_LIMIT_S)
+    except (ServerUnavailableError, TimeoutError) as error:
+        if kept is None or not kept.is_file():
+            raise NoSupervisorError(f"{error}, and none is kept of an earlier start") from error
+        tell(f"{error}: what it made last is taken")
+        return _checked(_bytes(kept), str(kept), bundle, source.deployment, tell)
+    except ClientError as error:
+        raise NoSupervisorError(str(error)) from error
+    if answer.status is not SynthesisStatus.SUPERVISOR:
+        raise NoSupervisorError(f"{server}: {answer.reason or answer.diagnostics[0]}")
+    supervisor = _checked(answer.supervisor, server, bundle, source.deployment, tell)
+    if kept is not None:
+        try:
+            _keep(kept, answer.supervisor)
+        except OSError as error:
+            tell(f"{kept}: cannot be kept for a start without network: {error.strerror or error}")
+    return supervisor
+
+
+def _keep(file: Path, data: bytes) -> None:
+    """Replace a file at once: whoever reads it finds the old or the new one, also after a power cut."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    number, name = tempfile.mkstemp(dir=file.parent, prefix=".", suffix=SUPERVISOR_SUFFIX)
+    try:
+        with os.fdopen(number, "wb") as stream:
+            stream.write(data)
+            stream.flush()
+            os.fsync(stream.fileno())
+        Path(name).replace(file)
+        folder = os.open(file.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            Path(name).unlink()
+        raise

@@ -1,0 +1,359 @@
+"""The devices' workers, step by step: what goes out, what is reported, and what follows a failure."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import pytest
+
+from robosc_bridge.daemon.backoff import Backoff
+from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone
+from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
+from robosc_bridge.devices.interface import (
+    BINS,
+    STANDSTILL,
+    DriveLimits,
+    DriveReading,
+    Pose,
+    RawScan,
+    Scan,
+    ScannerCounters,
+    Velocity,
+)
+from robosc_bridge.errors import DeviceFaultError, DeviceSilentError, LineLostError, LineMissingError
+
+PERIOD_S = 0.02
+FORWARD = Velocity(0.1, 0.0)
+
+
+class Clock:
+    """The time, which tests set."""
+
+    def __init__(self) -> None:
+        self.now_s = 100.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+@dataclass(frozen=True)
+class Output:
+    velocity: Velocity
+    is_torque_wanted: bool
+
+
+class Gate:
+    """A safety layer that lets through what a test says."""
+
+    def __init__(self) -> None:
+        self.next = Output(STANDSTILL, False)
+        self.asked: list[float] = []
+        self.readings: list[DriveReading] = []
+        self.failures = 0
+        self.scans: list[float] = []
+
+    def output(self, now_s: float) -> Output:
+        self.asked.append(now_s)
+        return self.next
+
+    def saw_drive(self, reading: DriveReading) -> None:
+        self.readings.append(reading)
+
+    def drive_failed(self) -> None:
+        self.failures += 1
+
+    def saw_scan(self, now_s: float) -> None:
+        self.scans.append(now_s)
+
+
+class Base:
+    """A drive base that remembers what it is told, and fails where a test says."""
+
+    limits = DriveLimits(0.2, 2.0, 0.2)
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self.calls: list[object] = []
+        self.failing: dict[str, Exception] = {}
+        self.torque_takes_s = 0.0
+
+    def _called(self, name: str, *arguments: object) -> None:
+        self.calls.append((name, *arguments) if arguments else name)
+        if name in self.failing:
+            raise self.failing[name]
+
+    def open(self) -> None:
+        self._called("open")
+
+    def set_torque(self, is_on: bool) -> None:
+        self._clock.now_s += self.torque_takes_s
+        self._called("torque", is_on)
+
+    def exchange(self, velocity: Velocity) -> DriveReading:
+        self._called("exchange", velocity)
+        return DriveReading(self._clock.now_s, Pose(), velocity, (0.0, 0.0), True)
+
+    def reset(self) -> None:
+        self._called("reset")
+
+    def close(self) -> None:
+        self.calls.append("close")
+
+
+class Scene:
+    """A drive base's worker with everything around it."""
+
+    def __init__(self) -> None:
+        self.clock = Clock()
+        self.gate = Gate()
+        self.base = Base(self.clock)
+        self.reports: list[Report] = []
+        self.worker = DriveWorker(
+            self.base, self.gate, self.reports.append, PERIOD_S, self.clock, Backoff(first_s=0.5, limit_s=1.5)
+        )
+
+    def step(self) -> float:
+        """One step; in how many seconds the next is due."""
+        return self.worker.step(self.clock.now_s) - self.clock.now_s
+
+    def taken(self) -> list[object]:
+        calls, self.base.calls = self.base.calls, []
+        return calls
+
+    def up(self) -> None:
+        assert self.step() == 0.0
+        assert self.taken() == ["open"]
+        assert self.reports == [DeviceUp(Device.DRIVE)]
+        self.reports.clear()
+
+
+@pytest.fixture
+def scene() -> Scene:
+    return Scene()
+
+
+def test_it_is_opened_and_rests_until_it_is_let(scene: Scene) -> None:
+    scene.up()
+    assert scene.step() == pytest.approx(PERIOD_S)
+    assert scene.taken() == [("exchange", STANDSTILL)]
+    assert scene.gate.readings == scene.reports != []
+
+
+def test_torque_comes_before_motion_and_goes_after_it(scene: Scene) -> None:
+    scene.up()
+    scene.gate.next = Output(FORWARD, True)
+    scene.base.torque_takes_s = 0.7
+    scene.step()
+    assert scene.taken() == [("torque", True), ("exchange", FORWARD)]
+    # What is let through is asked again after so long.
+    assert scene.gate.asked == [100.0, 100.7]
+    scene.step()
+    assert scene.taken() == [("exchange", FORWARD)]
+    scene.gate.next = Output(STANDSTILL, False)
+    scene.step()
+    assert scene.taken() == [("torque", False), ("exchange", STANDSTILL)]
+
+
+def test_cycles_keep_their_places_in_time_and_late_ones_are_left_out(scene: Scene) -> None:
+    scene.up()
+    assert scene.step() == pytest.approx(PERIOD_S)
+    scene.clock.now_s += PERIOD_S + 0.003
+    assert scene.step() == pytest.approx(PERIOD_S - 0.003)
+    scene.clock.now_s += 10 * PERIOD_S
+    assert scene.step() == pytest.approx(PERIOD_S)
+
+
+def test_a_port_that_is_missing_is_tried_again_with_longer_pauses(scene: Scene) -> None:
+    scene.base.failing["open"] = LineMissingError("/dev/x", "there is no such port")
+    pauses = [scene.step() for _ in range(4)]
+    assert pauses == pytest.approx([0.5, 1.0, 1.5, 1.5])
+    problem = "/dev/x: there is no such port"
+    assert scene.reports == [
+        DeviceDown(Device.DRIVE, problem, retry_s, is_first=number == 0)
+        for number, retry_s in enumerate((0.5, 1.0, 1.5, 1.5))
+    ]
+    del scene.base.failing["open"]
+    scene.reports.clear()
+    scene.taken()
+    scene.up()
+    # From the shortest again.
+    scene.base.failing["exchange"] = LineLostError("/dev/x", "the line is gone")
+    assert scene.step() == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    "error", [LineLostError("/dev/x", "gone"), DeviceSilentError("no answer"), ZeroDivisionError("a bug")]
+)
+def test_whatever_breaks_it_is_closed_and_opened_anew_with_torque_off(scene: Scene, error: Exception) -> None:
+    scene.up()
+    scene.gate.next = Output(FORWARD, True)
+    scene.step()
+    scene.taken()
+    scene.reports.clear()
+    scene.base.failing["exchange"] = error
+    assert scene.step() == pytest.approx(0.5)
+    assert scene.taken() == [("exchange", FORWARD), "close"]
+    assert scene.gate.failures == 1
+    (report,) = scene.reports
+    assert isinstance(report, DeviceDown)
+    assert str(error) in report.problem
+    scene.base.failing.clear()
+    scene.reports.clear()
+    scene.up()
+    scene.step()
+    assert scene.taken() == [("torque", True), ("exchange", FORWARD)]
+
+
+def test_motors_that_do_not_hold_are_a_failure(scene: Scene) -> None:
+    scene.up()
+    scene.gate.next = Output(FORWARD, True)
+    scene.base.failing["torque"] = DeviceFaultError("a motor does not hold")
+    scene.step()
+    assert scene.taken() == [("torque", True), "close"]
+    assert scene.gate.failures == 1
+
+
+def test_a_reset_is_done_once_before_the_next_exchange(scene: Scene) -> None:
+    scene.up()
+    scene.gate.next = Output(STANDSTILL, True)
+    scene.step()
+    scene.taken()
+    scene.reports.clear()
+    scene.worker.reset()
+    scene.step()
+    assert scene.taken() == ["reset", ("torque", True), ("exchange", STANDSTILL)]
+    assert scene.reports[0] == ResetDone()
+    scene.step()
+    assert scene.taken() == [("exchange", STANDSTILL)]
+
+
+def test_a_reset_that_fails_is_told_with_its_reason(scene: Scene) -> None:
+    scene.up()
+    scene.worker.reset()
+    scene.base.failing["reset"] = DeviceFaultError("still too hot")
+    scene.step()
+    assert scene.reports[0] == ResetDone("still too hot")
+    assert scene.taken() == ["reset", "close"]
+
+
+def test_closing_closes_the_base(scene: Scene) -> None:
+    scene.up()
+    scene.worker.wake()
+    scene.worker.close()
+    assert scene.taken() == ["close"]
+
+
+# The scanner.
+
+
+class Scanner:
+    """A scanner that gives what a test has put into it."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self.counters = ScannerCounters()
+        self.coming: list[Scan | Exception] = []
+        self.calls: list[str] = []
+        self.opening: Callable[[], None] = lambda: None
+
+    def open(self) -> None:
+        self.calls.append("open")
+        self.opening()
+
+    def receive(self, limit_s: float) -> Scan | None:
+        if not self.coming:
+            self._clock.now_s += limit_s
+            return None
+        item = self.coming.pop(0)
+        if isinstance(item, Exception):
+            raise item
+        return item
+
+    def wake(self) -> None:
+        self.calls.append("wake")
+
+    def restart(self) -> None:
+        self.calls.append("restart")
+
+    def close(self) -> None:
+        self.calls.append("close")
+
+
+def scan(time_s: float) -> Scan:
+    return Scan(time_s, (1.0,) * BINS, RawScan((), (), ()), 5.0)
+
+
+class ScannerScene:
+    """A scanner's worker with everything around it."""
+
+    def __init__(self) -> None:
+        self.clock = Clock()
+        self.gate = Gate()
+        self.scanner = Scanner(self.clock)
+        self.reports: list[Report] = []
+        self.worker = ScannerWorker(
+            self.scanner, self.gate, self.reports.append, 1.0, self.clock, Backoff(first_s=0.5, limit_s=1.5)
+        )
+
+    def step(self) -> float:
+        return self.worker.step(self.clock.now_s) - self.clock.now_s
+
+    def up(self) -> None:
+        self.step()
+        assert self.scanner.calls == ["open"]
+        assert self.reports == [DeviceUp(Device.SCANNER)]
+        self.scanner.calls.clear()
+        self.reports.clear()
+
+
+@pytest.fixture
+def turning() -> ScannerScene:
+    made = ScannerScene()
+    made.up()
+    return made
+
+
+def test_each_turn_is_reported_with_its_own_time(turning: ScannerScene) -> None:
+    turning.scanner.coming = [scan(100.1), scan(100.3)]
+    turning.step()
+    turning.step()
+    assert turning.reports == [scan(100.1), scan(100.3)]
+    assert turning.gate.scans == [100.1, 100.3]
+
+
+def test_a_motor_that_falls_silent_is_restarted_again_and_again(turning: ScannerScene) -> None:
+    for _ in range(4):
+        turning.step()
+    assert turning.scanner.calls == []
+    turning.step()
+    assert turning.scanner.calls == ["restart"]
+    for _ in range(5):
+        turning.step()
+    assert turning.scanner.calls == ["restart", "restart"]
+    # A turn ends that.
+    turning.scanner.coming = [scan(turning.clock.now_s)]
+    for _ in range(5):
+        turning.step()
+    assert turning.scanner.calls == ["restart", "restart"]
+
+
+@pytest.mark.parametrize("error", [LineLostError("/dev/y", "gone"), ZeroDivisionError("a bug")])
+def test_a_scanner_that_is_unplugged_is_opened_again(turning: ScannerScene, error: Exception) -> None:
+    turning.scanner.coming = [error]
+    assert turning.step() == pytest.approx(0.5)
+    (report,) = turning.reports
+    assert isinstance(report, DeviceDown)
+    assert report.device is Device.SCANNER
+    assert report.is_first
+    assert turning.scanner.calls == ["close"]
+    turning.scanner.calls.clear()
+    turning.reports.clear()
+    turning.up()
+    # It was opened, but has not turned yet: the pauses go on growing.
+    turning.scanner.coming = [error]
+    assert turning.step() == pytest.approx(1.0)
+
+
+def test_waking_and_closing_reach_the_scanner(turning: ScannerScene) -> None:
+    turning.worker.wake()
+    turning.worker.close()
+    assert turning.scanner.calls == ["wake", "close"]

@@ -1,0 +1,80 @@
+"""What the robot is wanted to do with its wheels: keep a velocity, turn by an angle, or stand still.
+
+A velocity that the supervisor asked for holds until it asks for something else, as on any drive base; whether it still
+may, its releases decide (semantics 3.6). It is told to the safety layer anew at every turn of the loop, so that it ends
+with the loop.
+"""
+
+from collections.abc import Callable
+
+from robosc_bridge.devices.interface import STANDSTILL, DriveReading, Velocity
+from robosc_bridge.skills import Rotate, RotateState
+
+
+class Motion:
+    """One wish at a time; the last one counts.
+
+    Args:
+        rotate: The skill that turns.
+        command: Takes a velocity for the safety layer, and the time.
+    """
+
+    def __init__(self, rotate: Rotate, command: Callable[[Velocity, float], None]) -> None:
+        self._rotate = rotate
+        self._command = command
+        self._wish = STANDSTILL
+
+    @property
+    def is_turning(self) -> bool:
+        """Whether a turn by an angle is under way."""
+        return self._rotate.is_turning
+
+    @property
+    def remaining_rad(self) -> float:
+        """What is left of a turn, counter-clockwise above zero."""
+        return self._rotate.remaining_rad
+
+    @property
+    def reason(self) -> str:
+        """Why the last turn failed; empty: it did not."""
+        return self._rotate.reason
+
+    def drive(self, velocity: Velocity, now_s: float) -> None:
+        """Keep a velocity from now on; a turn under way has failed."""
+        self._rotate.cancel("another motion was asked for")
+        self._pass(velocity, now_s)
+
+    def stop(self, now_s: float, reason: str = "the robot was told to stop") -> None:
+        """Stand still from now on; a turn under way has failed."""
+        self._rotate.cancel(reason)
+        self._pass(STANDSTILL, now_s)
+
+    def turn(self, angle_rad: float, now_s: float) -> bool:
+        """Begin a turn, counter-clockwise above zero; False: another one is under way and goes on."""
+        if not self._rotate.start(angle_rad, now_s):
+            return False
+        self._pass(STANDSTILL, now_s)
+        return True
+
+    def saw(self, reading: DriveReading) -> None:
+        """The drive base told where it is: a turn goes on."""
+        if self._rotate.is_turning:
+            self._pass(self._rotate.update(reading.pose.heading_rad, reading.time_s), reading.time_s)
+
+    def refresh(self, now_s: float) -> None:
+        """The loop is at its turn: what was wanted is still wanted."""
+        if self._rotate.is_turning:
+            # For its time limit only: without a new heading nobody knows how far it is.
+            self._rotate.update(None, now_s)
+            if not self._rotate.is_turning:
+                self._wish = STANDSTILL
+        self._pass(self._wish, now_s)
+
+    @property
+    def has_arrived(self) -> bool:
+        """Whether the last turn has come to its end."""
+        return self._rotate.state is RotateState.DONE
+
+    def _pass(self, velocity: Velocity, now_s: float) -> None:
+        self._wish = velocity
+        self._command(velocity, now_s)

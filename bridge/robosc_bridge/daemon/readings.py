@@ -1,0 +1,73 @@
+"""What the devices tell, as the data of the channels: what a ROS message of the same meaning would hold."""
+
+import math
+from typing import Any
+
+from robosc.expressions import NoneType, ObjectType
+from robosc.model.structure import Communication
+from robosc_bridge.devices.interface import BINS, DriveReading, Pose, Scan
+
+_STEP_RAD = math.tau / BINS
+_PRESENT_V = 7.0
+"""Below this voltage there is no battery, but only a cable."""
+
+
+def scan_data(scan: Scan) -> dict[str, Any]:
+    """As sensor_msgs/LaserScan: 360 ranges, counter-clockwise from the front."""
+    known = [value for value in scan.raw.ranges_m if not math.isnan(value)]
+    return {
+        "ranges": list(scan.ranges_m),
+        "angle_min": 0.0,
+        "angle_max": math.tau - _STEP_RAD,
+        "angle_increment": _STEP_RAD,
+        "scan_time": 1.0 / scan.turns_per_s if scan.turns_per_s > 0.0 else math.nan,
+        "range_min": min(known, default=0.0),
+        "range_max": max(known, default=0.0),
+    }
+
+
+def odometry_data(reading: DriveReading) -> dict[str, Any]:
+    """As nav_msgs/Odometry."""
+    pose, velocity = reading.pose, reading.velocity
+    position = {"x": pose.x_m, "y": pose.y_m, "z": 0.0}
+    return {
+        "pose": {"pose": {"position": position, "orientation": _orientation(pose)}},
+        "twist": {
+            "twist": {
+                "linear": {"x": velocity.linear_m_s, "y": 0.0, "z": 0.0},
+                "angular": {"x": 0.0, "y": 0.0, "z": velocity.angular_rad_s},
+            }
+        },
+    }
+
+
+def _orientation(pose: Pose) -> dict[str, float]:
+    half = pose.heading_rad / 2.0
+    return {"x": 0.0, "y": 0.0, "z": math.sin(half), "w": math.cos(half)}
+
+
+def imu_data(reading: DriveReading) -> dict[str, Any]:
+    """As sensor_msgs/Imu; what the drive base does not measure is NaN."""
+    found = {
+        name: {axis: reading.imu.get(f"{name}_{axis}", math.nan) for axis in "xyz"}
+        for name in ("angular_velocity", "linear_acceleration")
+    }
+    found["orientation"] = {axis: reading.imu.get(f"orientation_{axis}", math.nan) for axis in "xyzw"}
+    return found
+
+
+def battery_data(reading: DriveReading, *, is_percent: bool) -> dict[str, Any]:
+    """As sensor_msgs/BatteryState; unknown parts are NaN."""
+    share = math.nan if reading.battery_share is None else reading.battery_share
+    volts = math.nan if reading.battery_v is None else reading.battery_v
+    return {"voltage": volts, "percentage": share * 100.0 if is_percent else share, "present": volts > _PRESENT_V}
+
+
+def shaped(communication: Communication, value: Any) -> Any:
+    """A single value as the model reads it: by itself, as the field `data` of a message, or as nothing at all."""
+    match communication.response:
+        case ObjectType():
+            return {"data": value}
+        case None | NoneType():
+            return None
+    return value

@@ -1,0 +1,250 @@
+"""The layer itself: one lock, one `output` for each exchange with the drive base."""
+
+import math
+import threading
+from dataclasses import dataclass
+
+from robosc_bridge.devices.interface import STANDSTILL, DriveReading, MotorFault, Velocity
+from robosc_bridge.safety.limits import SafetyLimits
+from robosc_bridge.safety.motion import ramped, wheels, within
+from robosc_bridge.safety.reasons import LATCHING, TORQUE_OFF, Caution, Reason
+from robosc_bridge.safety.watches import BatteryWatch, Freshness, WheelWatch
+
+# The supply's bit alone does not switch a motor off; how much is left in the battery has a rule of its own.
+_HARMLESS = frozenset({MotorFault.VOLTAGE})
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """What the drive base is to do in its next exchange.
+
+    Attributes:
+        velocity: Standstill whenever there is a reason.
+        is_torque_wanted: Whether the motors are to hold.
+        reasons: Why it may not move, in the order of `Reason`.
+        warnings: What a person should know, in the order of `Caution`.
+    """
+
+    velocity: Velocity
+    is_torque_wanted: bool
+    reasons: tuple[Reason, ...]
+    warnings: tuple[Caution, ...]
+
+
+class SafetyLayer:
+    """Lets velocities pass that are safe, and zero otherwise; in standby until it is enabled.
+
+    The thread of the drive base calls `output`, switches torque as it says, exchanges the velocity, and reports with
+    `saw_drive` or `drive_failed`; the others may be called from any thread, also from a signal handler. All times are
+    those of one monotonic clock, in seconds. Nothing raises, and nothing waits but for the lock, which is held for
+    some microseconds.
+
+    A command counts only if it was given after an `output` without reasons, or ends the silence of commands: what was
+    said before or during a stop never moves the robot afterwards. Motion begins with the ramp from standstill.
+
+    Args:
+        limits: What may pass, and for how long.
+    """
+
+    def __init__(self, limits: SafetyLimits) -> None:
+        self._limits = limits
+        self._torque_off = (*TORQUE_OFF, *([Reason.OPERATOR_STOP] * limits.is_torque_off_on_operator_stop))
+        # A signal handler may call while its own thread is inside.
+        self._lock = threading.RLock()
+        self._now_s = 0.0
+        self._is_enabled = False
+        self._latched: set[Reason] = set()
+        # What is commanded, within the limits, and what was put out last.
+        self._wanted = self._velocity = STANDSTILL
+        self._is_refused = False
+        # Whether what was commanded up to the next output came too early to count.
+        self._is_held = True
+        # As put out last.
+        self._reasons: tuple[Reason, ...] = ()
+        self._commands = Freshness(limits.command_timeout_s)
+        self._scans = Freshness(limits.scan_timeout_s)
+        self._readings = Freshness(limits.motor_timeout_s)
+        self._loop = Freshness(limits.loop_timeout_s)
+        self._operator = Freshness(limits.operator_timeout_s)
+        self._failures = 0
+        self._faults: frozenset[MotorFault] = frozenset()
+        self._battery = BatteryWatch(limits)
+        self._wheels = WheelWatch(limits)
+        # When torque began to be wanted, None: it is not; whether the motors told since then that they hold.
+        self._torque_since_s: float | None = None
+        self._is_torque_seen = False
+        # Since when torque is to go off; when the last reading was taken, if the wheels stood still in it.
+        self._letting_go_s: float | None = None
+        self._still_s = -math.inf
+
+    def enable(self) -> None:
+        """Leave standby; what was commanded before does not count."""
+        with self._lock:
+            self._is_enabled = True
+            self._is_held = True
+
+    def disable(self) -> None:
+        """Go to standby: velocity zero, and torque off once the wheels stand still."""
+        with self._lock:
+            self._is_enabled = False
+            self._is_held = True
+
+    def command(self, velocity: Velocity, now_s: float) -> None:
+        """Ask for a velocity.
+
+        Args:
+            velocity: What is beyond a limit is brought into it; what is not finite is refused and counts as a stop.
+            now_s: When it was asked for; a time that is not finite refuses it, too.
+        """
+        numbers = (velocity.linear_m_s, velocity.angular_rad_s, now_s)
+        with self._lock:
+            # Comparing takes integers of any size, too.
+            self._is_refused = not all(-math.inf < number < math.inf for number in numbers)
+            if self._is_refused:
+                self._wanted = STANDSTILL
+            else:
+                self._wanted = within(velocity, self._limits)
+                self._commands.hear(now_s)
+
+    def saw_scan(self, now_s: float) -> None:
+        """A full scan was complete then."""
+        with self._lock:
+            self._scans.hear(now_s)
+
+    def saw_drive(self, reading: DriveReading) -> None:
+        """The drive base has answered."""
+        with self._lock:
+            self._failures = 0
+            self._readings.hear(reading.time_s)
+            self._faults = reading.faults
+            if reading.faults - _HARMLESS:
+                self._latched.add(Reason.MOTOR_FAULT)
+            self._battery.hear(reading.battery_v, reading.time_s)
+            if self._battery.is_empty:
+                self._latched.add(Reason.BATTERY_LOW)
+            is_still = all(abs(speed) <= self._limits.standstill_m_s for speed in reading.wheels_m_s)
+            self._still_s = reading.time_s if is_still else -math.inf
+            if self._torque_since_s is not None and reading.time_s > self._torque_since_s:
+                self._judge_wheels(reading)
+
+    def _judge_wheels(self, reading: DriveReading) -> None:
+        if not reading.is_torque_on:
+            if self._is_torque_seen:
+                self._latched.add(Reason.TORQUE_LOST)
+            return
+        self._is_torque_seen = True
+        if self._wheels.is_astray(wheels(self._velocity, self._limits), reading.wheels_m_s, reading.time_s):
+            self._latched.add(Reason.WHEEL_ASTRAY)
+
+    def drive_failed(self) -> None:
+        """An exchange with the drive base has failed."""
+        with self._lock:
+            self._failures += 1
+
+    def loop_turned(self, now_s: float) -> None:
+        """The supervisor's loop was at its turn then."""
+        with self._lock:
+            self._loop.hear(now_s)
+
+    def supervisor_fault(self) -> None:
+        """The supervisor, or what runs it, has failed."""
+        with self._lock:
+            self._latched.add(Reason.SUPERVISOR_FAULT)
+
+    def operator_stop(self) -> None:
+        """An operator wants the robot to stop: always possible, and stronger than everything else."""
+        with self._lock:
+            self._latched.add(Reason.OPERATOR_STOP)
+
+    def operator_seen(self, now_s: float) -> None:
+        """There was a sign of the operator then."""
+        with self._lock:
+            self._operator.hear(now_s)
+
+    def reset(self) -> tuple[Reason, ...]:
+        """Forget what has latched, when an operator says so; the robot is in standby afterwards.
+
+        Returns:
+            The reasons that forbid it; nothing was forgotten then. Each must have been put out once, torque must be off
+            where a reason wants it off, the motors must tell of no fault, and the battery must not be empty. No reason:
+            it is done.
+        """
+        with self._lock:
+            remaining = tuple(reason for reason in LATCHING if reason in self._latched and self._holds(reason))
+            if not remaining:
+                self._latched.clear()
+                self._is_enabled = False
+                self._is_held = True
+            return remaining
+
+    def _holds(self, reason: Reason) -> bool:
+        """Whether a latched reason has not had its effect yet, or its cause still holds."""
+        if reason not in self._reasons:
+            return True
+        if reason is Reason.MOTOR_FAULT and self._faults - _HARMLESS:
+            return True
+        if reason is Reason.BATTERY_LOW and self._battery.is_empty:
+            return True
+        return reason in self._torque_off and self._torque_since_s is not None
+
+    def output(self, now_s: float) -> Output:
+        """What the drive base is to do now.
+
+        Args:
+            now_s: Not before that of the last call; where it is, or is no time, this call gives standstill.
+        """
+        with self._lock:
+            is_clock_wrong = not self._now_s <= now_s < math.inf
+            # For a time in which nothing was read there is no acceleration.
+            step_s = min(now_s - self._now_s, self._limits.motor_timeout_s)
+            if math.isfinite(now_s):
+                self._now_s = now_s
+            self._switch_torque()
+            if self._is_held:
+                self._wanted = STANDSTILL
+            self._reasons = self._find_reasons(is_clock_wrong)
+            self._is_held = any(reason is not Reason.COMMAND_SILENT for reason in self._reasons)
+            if self._reasons or self._wanted == STANDSTILL:
+                self._velocity = STANDSTILL
+            else:
+                self._velocity = ramped(self._velocity, self._wanted, self._limits, step_s)
+            return Output(self._velocity, self._torque_since_s is not None, self._reasons, self._find_warnings())
+
+    def _switch_torque(self) -> None:
+        """Let torque be wanted or not; where the clock went back, times begin anew."""
+        if self._torque_since_s is not None:
+            self._torque_since_s = min(self._torque_since_s, self._now_s)
+            if not self._is_torque_seen and self._now_s - self._torque_since_s > self._limits.torque_on_s:
+                self._latched.add(Reason.TORQUE_LOST)
+        if self._is_enabled and self._latched.isdisjoint(self._torque_off):
+            self._letting_go_s = None
+            if self._torque_since_s is None:
+                self._torque_since_s = self._now_s
+                self._is_torque_seen = False
+                self._wheels.forget()
+        elif self._torque_since_s is not None:
+            self._letting_go_s = self._now_s if self._letting_go_s is None else min(self._letting_go_s, self._now_s)
+            self._still_s = min(self._still_s, self._now_s)
+            if self._still_s > self._letting_go_s or self._now_s - self._letting_go_s >= self._limits.torque_off_s:
+                self._torque_since_s = self._letting_go_s = None
+
+    def _find_reasons(self, is_clock_wrong: bool) -> tuple[Reason, ...]:
+        holds = {
+            Reason.STANDBY: not self._is_enabled,
+            Reason.CLOCK: is_clock_wrong,
+            Reason.TORQUE_AWAITED: self._torque_since_s is not None and not self._is_torque_seen,
+            Reason.COMMAND_SILENT: self._wanted != STANDSTILL and self._commands.is_stale(self._now_s),
+            Reason.SCAN_STALE: self._scans.is_stale(self._now_s),
+            Reason.MOTOR_SILENT: self._readings.is_stale(self._now_s) or self._failures >= self._limits.motor_failures,
+            Reason.LOOP_OVERRUN: self._loop.is_stale(self._now_s),
+            Reason.OPERATOR_LOST: self._operator.is_stale(self._now_s),
+        }
+        return tuple(reason for reason in Reason if reason in self._latched or holds.get(reason))
+
+    def _find_warnings(self) -> tuple[Caution, ...]:
+        holds = {
+            Caution.BATTERY: self._battery.is_near_empty,
+            Caution.MOTOR_VOLTAGE: MotorFault.VOLTAGE in self._faults,
+            Caution.COMMAND_REFUSED: self._is_refused,
+        }
+        return tuple(caution for caution, is_so in holds.items() if is_so)

@@ -1,0 +1,110 @@
+"""The numbers of the safety layer."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from types import MappingProxyType
+
+SCAN_TIMEOUTS_S: Mapping[str, float] = MappingProxyType({"lds01": 0.6, "lds02": 0.5, "lds03": 0.3})
+"""After how long a scanner counts as silent: three turns, by its driver's name."""
+
+# A time that was meant in milliseconds, or is as long as a journey, must not switch a rule off.
+_LONGEST_S = {
+    "command_timeout_s": 1.0,
+    "scan_timeout_s": 2.0,
+    "motor_timeout_s": 1.0,
+    "loop_timeout_s": 2.0,
+    "operator_timeout_s": 10.0,
+    "battery_mean_s": 10.0,
+    "astray_s": 5.0,
+    "torque_on_s": 10.0,
+    "torque_off_s": 5.0,
+}
+_NOT_BELOW = (
+    ("linear_deceleration_m_s2", "linear_acceleration_m_s2"),
+    ("angular_deceleration_rad_s2", "angular_acceleration_rad_s2"),
+    ("battery_warn_v", "battery_stop_v"),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SafetyLimits:
+    """What the safety layer lets pass, and after how long it stops the robot.
+
+    Attributes:
+        linear_m_s: Fastest forward and backward.
+        angular_rad_s: Fastest turn.
+        wheel_m_s: Fastest wheel; where one would be faster, both are slowed alike, so that the curvature stays.
+        separation_m: Between the wheels' middles.
+        scan_timeout_s: Longest time without a full scan (`SCAN_TIMEOUTS_S`); None: no scanner is needed. It has no
+            default, so that nobody forgets the scanner.
+        linear_acceleration_m_s2: Away from standstill.
+        linear_deceleration_m_s2: Towards standstill. A command of zero passes at once.
+        angular_acceleration_rad_s2: Away from standstill.
+        angular_deceleration_rad_s2: Towards standstill.
+        command_timeout_s: How long a command to move holds.
+        motor_timeout_s: Longest time without a reading of the drive base.
+        motor_failures: So many failed exchanges in a row count as silence, too.
+        loop_timeout_s: Longest time between two turns of the supervisor's loop.
+        operator_timeout_s: Longest time without a sign of the operator; None: none is needed.
+        battery_warn_v: Warn at this mean voltage and below.
+        battery_stop_v: Stop at this mean voltage and below.
+        battery_mean_s: Time that a mean is made of, so that a dip stops nothing.
+        astray_m_s: A wheel is astray if it is off its goal by more than this and by more than half of the goal.
+        astray_s: How long a wheel may be astray.
+        torque_on_s: Longest time that the motors take to hold.
+        torque_off_s: Longest wait for the wheels to stand still before torque goes off.
+        standstill_m_s: A wheel that is not faster stands still.
+        is_torque_off_on_operator_stop: Whether an operator's stop wants torque off, too.
+
+    Raises:
+        ValueError: A number is not finite, not above 0 or inconsistent with another one; all of them are listed.
+    """
+
+    linear_m_s: float
+    angular_rad_s: float
+    wheel_m_s: float
+    separation_m: float
+    scan_timeout_s: float | None
+    linear_acceleration_m_s2: float = 1.0
+    linear_deceleration_m_s2: float = 2.5
+    angular_acceleration_rad_s2: float = 4.0
+    angular_deceleration_rad_s2: float = 10.0
+    command_timeout_s: float = 0.3
+    motor_timeout_s: float = 0.2
+    motor_failures: int = 3
+    loop_timeout_s: float = 0.2
+    operator_timeout_s: float | None = None
+    battery_warn_v: float = 11.5
+    battery_stop_v: float = 11.1
+    battery_mean_s: float = 2.0
+    astray_m_s: float = 0.02
+    astray_s: float = 0.8
+    torque_on_s: float = 2.0
+    torque_off_s: float = 1.0
+    standstill_m_s: float = 0.01
+    is_torque_off_on_operator_stop: bool = False
+
+    def __post_init__(self) -> None:
+        values = {each.name: getattr(self, each.name) for each in fields(self)}
+        del values["is_torque_off_on_operator_stop"]
+        for name in ("scan_timeout_s", "operator_timeout_s"):
+            if values[name] is None:
+                del values[name]
+        problems = [
+            f"{name} must be finite and above 0, not {value}"
+            for name, value in values.items()
+            if not (math.isfinite(value) and value > 0)
+        ]
+        problems += [
+            f"{name} must be at most {longest} s, not {values[name]}"
+            for name, longest in _LONGEST_S.items()
+            if name in values and values[name] > longest
+        ]
+        problems += [
+            f"{name} ({values[name]}) must not be below {other} ({values[other]})"
+            for name, other in _NOT_BELOW
+            if values[name] < values[other]
+        ]
+        if problems:
+            raise ValueError("; ".join(problems))

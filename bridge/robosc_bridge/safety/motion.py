@@ -1,0 +1,70 @@
+"""Velocities within their limits: pure functions.
+
+The limits are applied in the order of the drive bases: the body's velocity is clamped; where a wheel would be too fast,
+both parts are slowed by the same factor, which keeps the curvature.
+"""
+
+from robosc_bridge.devices.interface import Velocity
+from robosc_bridge.safety.limits import SafetyLimits
+
+
+def within(velocity: Velocity, limits: SafetyLimits) -> Velocity:
+    """The velocity, no part and no wheel of it beyond its limit.
+
+    Args:
+        velocity: Of numbers, however large.
+        limits: That it is brought into.
+    """
+    linear_m_s = _clamped(velocity.linear_m_s, limits.linear_m_s)
+    angular_rad_s = _clamped(velocity.angular_rad_s, limits.angular_rad_s)
+    fastest_m_s = abs(linear_m_s) + abs(angular_rad_s) * limits.separation_m / 2
+    if fastest_m_s > limits.wheel_m_s:
+        linear_m_s *= limits.wheel_m_s / fastest_m_s
+        angular_rad_s *= limits.wheel_m_s / fastest_m_s
+    return Velocity(linear_m_s, angular_rad_s)
+
+
+def wheels(velocity: Velocity, limits: SafetyLimits) -> tuple[float, float]:
+    """Speeds of the left and the right wheel, in metres per second."""
+    turn_m_s = velocity.angular_rad_s * limits.separation_m / 2
+    return velocity.linear_m_s - turn_m_s, velocity.linear_m_s + turn_m_s
+
+
+def ramped(present: Velocity, wanted: Velocity, limits: SafetyLimits, step_s: float) -> Velocity:
+    """The velocity after one step from the present towards the wanted one.
+
+    Each part goes its own way, so that braking never waits for the other part. That may lead through velocities that
+    one wheel cannot do: these are slowed, as `within` does.
+
+    Args:
+        present: Within the limits.
+        wanted: Within the limits.
+        limits: Of acceleration and deceleration.
+        step_s: Not negative.
+    """
+    linear_m_s = _stepped(
+        present.linear_m_s,
+        wanted.linear_m_s,
+        limits.linear_acceleration_m_s2 * step_s,
+        limits.linear_deceleration_m_s2 * step_s,
+    )
+    angular_rad_s = _stepped(
+        present.angular_rad_s,
+        wanted.angular_rad_s,
+        limits.angular_acceleration_rad_s2 * step_s,
+        limits.angular_deceleration_rad_s2 * step_s,
+    )
+    return within(Velocity(linear_m_s, angular_rad_s), limits)
+
+
+def _clamped(value: float, limit: float) -> float:
+    return max(-limit, min(limit, value))
+
+
+def _stepped(present: float, wanted: float, faster: float, slower: float) -> float:
+    """One part after a step; a change of direction passes standstill, and has no more than one step to it."""
+    if present < 0 or (present == 0 and wanted < 0):
+        return -_stepped(-present, -wanted, faster, slower)
+    if wanted >= present:
+        return min(wanted, present + faster)
+    return max(wanted, present - slower, 0.0)

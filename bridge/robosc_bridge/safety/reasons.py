@@ -1,0 +1,50 @@
+"""Why the robot may not move, and what a person should know though it may."""
+
+from enum import StrEnum
+
+
+class Reason(StrEnum):
+    """Why the wheels are told to stand still, as a sentence for a person.
+
+    Most end by themselves when their cause ends; those in `LATCHING` hold until an operator resets them.
+    """
+
+    STANDBY = "The robot is in standby."
+    CLOCK = "The clock went backwards."
+    OPERATOR_STOP = "An operator has stopped the robot."
+    SUPERVISOR_FAULT = "The supervisor has failed."
+    MOTOR_FAULT = "A motor tells of a fault."
+    TORQUE_LOST = "A motor does not hold, or has let go by itself."
+    WHEEL_ASTRAY = "A wheel does not turn as it is told: it is blocked, or does not stop."
+    BATTERY_LOW = "The battery is empty."
+    TORQUE_AWAITED = "The motors do not hold yet."
+    COMMAND_SILENT = "No command came for too long."
+    SCAN_STALE = "The scanner has made no full turn for too long."
+    MOTOR_SILENT = "The motors have not answered for too long."
+    LOOP_OVERRUN = "The supervisor's loop has not turned for too long."
+    OPERATOR_LOST = "The link to the operator is lost."
+
+
+LATCHING = (
+    Reason.OPERATOR_STOP,
+    Reason.SUPERVISOR_FAULT,
+    Reason.MOTOR_FAULT,
+    Reason.TORQUE_LOST,
+    Reason.WHEEL_ASTRAY,
+    Reason.BATTERY_LOW,
+)
+"""They hold until `SafetyLayer.reset`."""
+
+TORQUE_OFF = (Reason.MOTOR_FAULT, Reason.TORQUE_LOST, Reason.WHEEL_ASTRAY)
+"""They want torque off, too, once the wheels stand still or the time for that is over; so does standby.
+
+`Reason.OPERATOR_STOP` joins them if `SafetyLimits.is_torque_off_on_operator_stop`.
+"""
+
+
+class Caution(StrEnum):
+    """What does not stop the robot, as a sentence for a person."""
+
+    BATTERY = "The battery will soon be empty."
+    MOTOR_VOLTAGE = "A motor tells that its supply is out of range."
+    COMMAND_REFUSED = "A command was no number and counts as a stop."

@@ -1,0 +1,49 @@
+"""The page about the safety layer tells of every reason, as it is."""
+
+import re
+from pathlib import Path
+
+from robosc_bridge.safety import LATCHING, SCAN_TIMEOUTS_S, TORQUE_OFF, Caution, Reason
+from support.safety import LIMITS
+
+PAGE = (Path(__file__).parents[3] / "docs" / "bridge-safety.md").read_text(encoding="utf-8")
+ROWS = {
+    cells[0].strip("`"): cells[1:]
+    for cells in (
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in re.findall(r"^\| `[A-Z].*$", PAGE, re.MULTILINE)
+    )
+}
+
+
+def test_every_reason_has_its_row_in_order() -> None:
+    assert list(ROWS) == [reason.name for reason in Reason]
+    assert all(f"`{caution.name}`" in PAGE for caution in Caution)
+
+
+def test_how_each_ends_and_whether_torque_goes() -> None:
+    for reason in Reason:
+        _, zero, torque, end = ROWS[reason.name]
+        assert end.startswith("reset") is (reason in LATCHING), reason
+        assert torque.startswith("once") is (reason in TORQUE_OFF or reason is Reason.STANDBY), reason
+        assert zero.startswith(("at once", "timeout and one call"))
+
+
+def test_its_numbers_are_the_defaults() -> None:
+    told = {
+        Reason.COMMAND_SILENT: LIMITS.command_timeout_s,
+        Reason.MOTOR_SILENT: LIMITS.motor_timeout_s,
+        Reason.LOOP_OVERRUN: LIMITS.loop_timeout_s,
+        Reason.WHEEL_ASTRAY: LIMITS.astray_s,
+    }
+    for reason, time_s in told.items():
+        assert f"more than {time_s} s" in ROWS[reason.name][0]
+    for scanner, time_s in SCAN_TIMEOUTS_S.items():
+        assert f"{time_s} s ({scanner[:3].upper()}-{scanner[3:]})" in ROWS["SCAN_STALE"][0]
+    assert f"within {LIMITS.torque_on_s:g} s" in ROWS["TORQUE_LOST"][0]
+    assert f"the mean of {LIMITS.battery_mean_s:g} s is at most {LIMITS.battery_stop_v} V" in ROWS["BATTERY_LOW"][0]
+    assert f"{2 * LIMITS.battery_mean_s:g} s and two readings" in ROWS["BATTERY_LOW"][1]
+    assert f"mean of at most {LIMITS.battery_warn_v} V" in PAGE
+    assert f"faster than {LIMITS.standstill_m_s} m/s; {LIMITS.torque_off_s:g} s" in PAGE
+    assert f"more than {LIMITS.astray_m_s} m/s" in ROWS["WHEEL_ASTRAY"][0]
+    assert LIMITS.motor_failures == 3

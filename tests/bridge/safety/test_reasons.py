@@ -1,0 +1,381 @@
+"""Every reason is provoked: it stops the robot in its time, and ends as it should."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from robosc_bridge.devices.interface import STANDSTILL, MotorFault, Velocity
+from robosc_bridge.safety import LATCHING, TORQUE_OFF, Caution, Reason
+from support.safety import STEP_S, Bench, near, reading
+
+END_BY_THEMSELVES = {
+    "scan": (Reason.SCAN_STALE, 0.6),
+    "drive": (Reason.MOTOR_SILENT, 0.2),
+    "loop": (Reason.LOOP_OVERRUN, 0.2),
+    "operator": (Reason.OPERATOR_LOST, 5.0),
+    "command": (Reason.COMMAND_SILENT, 0.3),
+}
+
+
+def fault(bench: Bench) -> None:
+    bench.layer.saw_drive(reading(bench.now_s, faults=frozenset({MotorFault.OVERLOAD})))
+
+
+def lose_torque(bench: Bench) -> None:
+    bench.holds = False
+    bench.cycle()
+    bench.holds = None
+
+
+LATCHED: dict[Reason, Callable[[Bench], object]] = {
+    Reason.OPERATOR_STOP: lambda bench: bench.layer.operator_stop(),
+    Reason.SUPERVISOR_FAULT: lambda bench: bench.layer.supervisor_fault(),
+    Reason.MOTOR_FAULT: fault,
+    Reason.TORQUE_LOST: lose_torque,
+}
+
+
+def restart(bench: Bench) -> None:
+    """What an operator does after a stop."""
+    bench.cycles(2.0)  # torque goes off
+    assert bench.layer.reset() == ()
+    assert bench.cycle().reasons == (Reason.STANDBY,)
+    bench.drive(0.05)
+
+
+def test_every_reason_is_a_sentence_and_either_latches_or_not() -> None:
+    told = {*LATCHED, Reason.WHEEL_ASTRAY, Reason.BATTERY_LOW}
+    assert set(LATCHING) == told
+    others = {reason for reason, _ in END_BY_THEMSELVES.values()}
+    assert told | others | {Reason.STANDBY, Reason.CLOCK, Reason.TORQUE_AWAITED} == set(Reason)
+    assert all(text.endswith(".") and text[0].isupper() for text in [*Reason, *Caution])
+
+
+def test_it_moves_when_nothing_is_wrong() -> None:
+    bench = Bench()
+    bench.drive(0.1, 0.5)
+    assert bench.cycles(10.0) == bench.last
+    assert bench.last.velocity == Velocity(0.1, 0.5)
+    assert (bench.last.is_torque_wanted, bench.last.reasons, bench.last.warnings) == (True, (), ())
+
+
+@pytest.mark.parametrize(("fact", "reason", "timeout_s"), [(f, *v) for f, v in END_BY_THEMSELVES.items()])
+def test_silence_stops_it_in_time_and_ends_by_itself(fact: str, reason: Reason, timeout_s: float) -> None:
+    bench = Bench()
+    bench.drive()
+    bench.silent.add(fact)
+    time_s, found = bench.until_still(timeout_s + 2 * STEP_S)
+    assert found is reason
+    assert timeout_s - STEP_S <= time_s <= timeout_s + STEP_S + 1e-9
+    for _ in range(50):
+        assert bench.cycle().velocity == STANDSTILL
+        if fact == "command":
+            break
+        assert bench.last.reasons == (reason,)
+    # The motors hold, and nobody needs to be asked.
+    assert bench.last.is_torque_wanted
+    bench.silent.clear()
+    seen = [bench.cycle() for _ in range(3)]
+    moving = [each.velocity.linear_m_s for each in seen if each.velocity != STANDSTILL]
+    # From standstill, and with a command that was given after the end of the reason: at the first output without it
+    # there is none yet.
+    assert moving == pytest.approx([0.02, 0.04] if fact != "command" else [0.02, 0.04, 0.06])
+    assert seen[0].reasons == ()
+
+
+def test_a_command_that_was_not_repeated_never_comes_back() -> None:
+    bench = Bench()
+    bench.drive()
+    bench.silent.add("command")
+    bench.until_still(0.4)
+    for _ in range(50):
+        assert bench.cycle().velocity == STANDSTILL
+    assert bench.last.reasons == (Reason.COMMAND_SILENT,)
+    # Another reason meanwhile drops it for good.
+    bench.layer.disable()
+    bench.cycle()
+    bench.layer.enable()
+    assert bench.cycles(1.0).velocity == STANDSTILL
+    assert bench.cycle().reasons == ()
+
+
+def test_silence_after_a_command_to_stand_still_is_no_reason() -> None:
+    bench = Bench()
+    bench.drive()
+    bench.wanted = STANDSTILL
+    bench.cycle()
+    bench.silent.add("command")
+    assert bench.cycles(1.0).reasons == ()
+
+
+@pytest.mark.parametrize("reason", LATCHED)
+def test_what_latches_stops_at_once_until_reset(reason: Reason) -> None:
+    bench = Bench()
+    bench.drive()
+    LATCHED[reason](bench)
+    assert bench.cycle().velocity == STANDSTILL
+    assert bench.last.reasons == (reason,)
+    for _ in range(100):
+        assert bench.cycle().velocity == STANDSTILL
+        assert reason in bench.last.reasons
+    assert bench.last.is_torque_wanted is (reason not in TORQUE_OFF)
+    bench.layer.enable()
+    assert bench.cycles(1.0).reasons == (reason,)
+    restart(bench)
+
+
+@pytest.mark.parametrize("motor_fault", MotorFault)
+def test_every_fault_of_a_motor_but_its_voltage_stops(motor_fault: MotorFault) -> None:
+    bench = Bench()
+    bench.drive()
+    bench.layer.saw_drive(reading(bench.now_s, faults=frozenset({motor_fault, MotorFault.VOLTAGE})))
+    found = bench.layer.output(bench.now_s)
+    assert (found.velocity == STANDSTILL) is (motor_fault is not MotorFault.VOLTAGE)
+    assert found.reasons == ((Reason.MOTOR_FAULT,) if motor_fault is not MotorFault.VOLTAGE else ())
+    assert found.warnings == (Caution.MOTOR_VOLTAGE,)
+    assert bench.cycle().warnings == ()
+
+
+def test_a_fault_that_remains_forbids_the_reset() -> None:
+    bench = Bench()
+    bench.drive()
+    fault(bench)
+    assert bench.layer.reset() == (Reason.MOTOR_FAULT,)
+    bench.silent.add("drive")
+    bench.cycles(2.0)
+    assert not bench.last.is_torque_wanted
+    assert bench.layer.reset() == (Reason.MOTOR_FAULT,)
+    # The supply's bit alone does not.
+    bench.layer.saw_drive(reading(bench.now_s, faults=frozenset({MotorFault.VOLTAGE}), is_torque_on=False))
+    assert bench.layer.reset() == ()
+
+
+def test_a_fault_without_torque_wanted_latches_and_leaves_torque_off() -> None:
+    bench = Bench()
+    fault(bench)
+    bench.layer.enable()
+    assert bench.cycle().reasons[0] is Reason.MOTOR_FAULT
+    assert not bench.cycles(1.0).is_torque_wanted
+
+
+@pytest.mark.parametrize("wheels_m_s", [(0.0, 0.0), (0.1, 0.0), (0.0, 0.1), (-0.1, -0.1), (0.1, math.nan)])
+def test_a_wheel_that_does_not_turn_as_told_stops_everything(wheels_m_s: tuple[float, float]) -> None:
+    bench = Bench()
+    bench.drive()
+    bench.wheels_m_s = wheels_m_s
+    time_s, reason = bench.until_still(1.0)
+    assert reason is Reason.WHEEL_ASTRAY
+    assert 0.8 <= time_s <= 0.8 + 2 * STEP_S
+    bench.wheels_m_s = (0.0, 0.0)
+    assert not bench.cycles(0.06).is_torque_wanted
+    bench.wheels_m_s = None
+    restart(bench)
+
+
+def test_a_wheel_that_does_not_stop_loses_its_torque() -> None:
+    bench = Bench()
+    bench.drive()
+    bench.wheels_m_s = (0.1, 0.1)
+    bench.wanted = STANDSTILL
+    assert bench.cycles(0.8).reasons == ()
+    assert bench.cycles(0.06).reasons == (Reason.WHEEL_ASTRAY,)
+    assert bench.cycles(0.9).is_torque_wanted
+    assert bench.layer.reset() == (Reason.WHEEL_ASTRAY,)
+    assert not bench.cycles(0.14).is_torque_wanted
+
+
+def test_wheels_are_judged_anew_when_torque_comes_on() -> None:
+    bench = Bench()
+    bench.drive()
+    bench.wheels_m_s = (0.0, 0.0)
+    bench.cycles(0.7)
+    bench.layer.disable()
+    bench.cycles(0.1)
+    assert not bench.last.is_torque_wanted
+    bench.wheels_m_s = (0.5, 0.5)  # pushed by hand
+    bench.cycles(3.0)
+    assert bench.last.reasons == (Reason.STANDBY,)
+    bench.layer.enable()
+    assert bench.cycles(0.7).reasons == ()
+
+
+def test_torque_that_does_not_come_is_lost() -> None:
+    bench = Bench()
+    bench.holds = False
+    bench.layer.enable()
+    bench.wanted = Velocity(0.1)
+    bench.cycles(2.0)
+    assert bench.last.reasons == (Reason.TORQUE_AWAITED,)
+    assert bench.last.is_torque_wanted
+    assert bench.cycles(0.06).reasons == (Reason.TORQUE_LOST,)
+    assert not bench.last.is_torque_wanted
+    bench.holds = None
+    restart(bench)
+
+
+def test_torque_is_late_only_beyond_its_time() -> None:
+    bench = Bench(torque_on_s=0.5, operator_timeout_s=None, scan_timeout_s=None, motor_timeout_s=1.0, loop_timeout_s=2)
+    layer = bench.layer
+    layer.enable()
+    layer.saw_drive(reading(64.0, is_torque_on=False))
+    layer.loop_turned(64.0)
+    assert layer.output(64.0).reasons == (Reason.TORQUE_AWAITED,)
+    assert layer.output(64.5).reasons == (Reason.TORQUE_AWAITED,)
+    assert layer.output(math.nextafter(64.5, 65)).reasons == (Reason.TORQUE_LOST, Reason.TORQUE_AWAITED)
+
+
+def test_a_reading_from_before_tells_nothing_about_torque() -> None:
+    bench = Bench()
+    bench.layer.enable()
+    bench.report()
+    now_s = bench.now_s
+    assert Reason.TORQUE_AWAITED in bench.layer.output(now_s).reasons
+    for time_s in (now_s - 0.1, now_s, math.nan):
+        bench.layer.saw_drive(reading(time_s, is_torque_on=True))
+        assert Reason.TORQUE_AWAITED in bench.layer.output(now_s).reasons
+    bench.layer.saw_drive(reading(math.nextafter(now_s, math.inf), is_torque_on=True))
+    assert bench.layer.output(now_s).reasons == ()
+    # It was on then; a late reading from before does not tell that it is off.
+    bench.layer.saw_drive(reading(now_s, is_torque_on=False))
+    assert bench.layer.output(now_s).reasons == ()
+
+
+def test_an_empty_battery_stops_it_until_another_one_is_in() -> None:
+    bench = Bench()
+    bench.drive()
+    bench.battery_v = 11.4
+    assert bench.cycles(4.1).warnings == (Caution.BATTERY,)
+    assert bench.last.velocity == Velocity(0.1)
+    bench.battery_v = 11.0
+    time_s, reason = bench.until_still(4.1)
+    assert reason is Reason.BATTERY_LOW
+    assert time_s >= 2.0
+    assert bench.cycles(2.0).is_torque_wanted
+    assert bench.layer.reset() == (Reason.BATTERY_LOW,)
+    bench.battery_v = 12.0
+    bench.cycles(4.1)
+    assert bench.last.reasons == (Reason.BATTERY_LOW,)
+    assert bench.last.warnings == ()
+    restart(bench)
+
+
+def test_a_base_without_a_voltage_drives() -> None:
+    bench = Bench()
+    bench.battery_v = None
+    bench.drive()
+    assert bench.cycles(5.0).warnings == ()
+
+
+def test_failed_exchanges_count_as_silence() -> None:
+    bench = Bench()
+    bench.drive()
+    bench.silent.add("drive")
+    for failures in range(1, 5):
+        bench.layer.drive_failed()
+        assert bench.cycle().reasons == (() if failures < 3 else (Reason.MOTOR_SILENT,))
+    bench.silent.clear()
+    assert bench.cycle().reasons == ()
+    # One answer begins the count anew.
+    bench.layer.drive_failed()
+    assert bench.cycle().reasons == ()
+    bench.layer.drive_failed()
+    bench.layer.drive_failed()
+    assert bench.layer.output(bench.now_s).reasons == ()
+    bench.layer.drive_failed()
+    assert bench.layer.output(bench.now_s).reasons == (Reason.MOTOR_SILENT,)
+
+
+@pytest.mark.parametrize("now_s", [math.nan, math.inf, -math.inf, 0.0, -5.0, 500.0])
+def test_a_clock_that_is_wrong_stops_it_and_begins_anew(now_s: float) -> None:
+    bench = Bench()
+    bench.drive()
+    bench.silent |= {"scan", "loop", "operator"}
+    found = bench.layer.output(now_s)
+    assert found.velocity == STANDSTILL
+    assert found.reasons == (Reason.CLOCK,)
+    assert found.is_torque_wanted
+    bench.silent.clear()
+    if math.isfinite(now_s):
+        bench.now_s = now_s
+    assert bench.cycle().velocity == STANDSTILL
+    assert bench.last.reasons == ()
+    assert bench.cycle().velocity == near(0.02)
+    # Facts from the time before do not stay fresh for ever.
+    bench.silent |= {"scan"}
+    assert bench.until_still(0.7)[1] is Reason.SCAN_STALE
+
+
+def test_the_clock_may_stand_still() -> None:
+    bench = Bench()
+    bench.drive()
+    assert bench.layer.output(bench.now_s).velocity == Velocity(0.1)
+    assert bench.layer.output(math.nextafter(bench.now_s, 0)).reasons == (Reason.CLOCK,)
+
+
+def test_when_the_clock_goes_back_torque_still_comes_and_goes_in_time() -> None:
+    bench = Bench()
+    bench.holds = False
+    bench.layer.enable()
+    bench.cycles(1.0)
+    bench.now_s = 500.0
+    assert Reason.CLOCK in bench.cycle().reasons
+    assert bench.cycles(1.98).reasons == (Reason.TORQUE_AWAITED,)
+    assert bench.cycles(0.06).reasons == (Reason.TORQUE_LOST,)
+    bench = Bench()
+    bench.drive()
+    bench.wheels_m_s = (0.1, 0.1)
+    bench.layer.disable()
+    bench.cycles(0.5)
+    bench.now_s = 500.0
+    bench.cycle()
+    assert bench.cycles(0.96).is_torque_wanted
+    assert not bench.cycles(0.06).is_torque_wanted
+
+
+def test_several_reasons_are_told_together_in_their_order() -> None:
+    bench = Bench()
+    assert bench.layer.output(1000.0).reasons == (
+        Reason.STANDBY,
+        Reason.SCAN_STALE,
+        Reason.MOTOR_SILENT,
+        Reason.LOOP_OVERRUN,
+        Reason.OPERATOR_LOST,
+    )
+    bench.drive()
+    bench.layer.supervisor_fault()
+    bench.layer.operator_stop()
+    bench.silent |= {"scan"}
+    assert bench.cycles(1.0).reasons == (Reason.OPERATOR_STOP, Reason.SUPERVISOR_FAULT, Reason.SCAN_STALE)
+
+
+def test_without_scanner_and_operator_none_is_missed() -> None:
+    bench = Bench(scan_timeout_s=None, operator_timeout_s=None)
+    bench.silent |= {"scan", "operator"}
+    bench.drive()
+    assert bench.cycles(10.0).velocity == Velocity(0.1)
+
+
+@pytest.mark.parametrize("is_off", [True, False])
+def test_an_operators_stop_may_want_torque_off(is_off: bool) -> None:
+    bench = Bench(is_torque_off_on_operator_stop=is_off)
+    bench.drive()
+    bench.layer.operator_stop()
+    assert bench.cycle().is_torque_wanted
+    assert bench.layer.reset() == ((Reason.OPERATOR_STOP,) if is_off else ())
+    assert bench.cycles(0.1).is_torque_wanted is False  # after a reset: standby
+    bench = Bench(is_torque_off_on_operator_stop=is_off)
+    bench.drive()
+    bench.layer.operator_stop()
+    assert bench.cycles(2.0).is_torque_wanted is not is_off
+
+
+def test_limits_decide_the_times() -> None:
+    bench = Bench(command_timeout_s=0.5, motor_failures=1)
+    bench.drive()
+    bench.silent.add("command")
+    assert bench.until_still(1.0)[0] >= 0.5
+    assert replace(bench.limits, motor_failures=1) == bench.limits
+    bench.layer.drive_failed()
+    assert Reason.MOTOR_SILENT in bench.layer.output(bench.now_s).reasons

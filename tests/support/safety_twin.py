@@ -1,0 +1,290 @@
+"""The safety layer again, slow and obvious: it keeps everything that ever happened and looks it all up each time."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+from robosc_bridge.devices.interface import STANDSTILL, DriveReading, MotorFault, Velocity
+from robosc_bridge.safety import LATCHING, Output, Reason, SafetyLimits
+
+_FACTS = {"scan": Reason.SCAN_STALE, "loop": Reason.LOOP_OVERRUN, "operator": Reason.OPERATOR_LOST}
+
+
+@dataclass
+class Past:
+    """One output of the past, or None of these values for anything else that happened."""
+
+    name: str
+    value: Any = None
+    time_s: float = 0.0
+    # Of an output: the clock, what it gave, and since when torque was wanted or to go.
+    now_s: float = 0.0
+    reasons: frozenset[Reason] = frozenset()
+    velocity: Velocity = STANDSTILL
+    torque_since_s: float | None = None
+    letting_go_s: float | None = None
+    latched: frozenset[Reason] = field(default_factory=frozenset)
+
+
+class SafetyTwin:
+    """Says what a safety layer should put out.
+
+    Args:
+        limits: Of the layer.
+    """
+
+    def __init__(self, limits: SafetyLimits) -> None:
+        self.limits = limits
+        self.past: list[Past] = []
+
+    def happens(self, name: str, value: Any = None, time_s: float = 0.0) -> None:
+        """Something was told to the layer."""
+        self.past.append(Past(name, value, time_s))
+
+    def _since_last(self, *names: str) -> list[Past]:
+        """What has happened after the last of these, and it first; all if there was none."""
+        for index in reversed(range(len(self.past))):
+            if self.past[index].name in names:
+                return self.past[index:]
+        return self.past
+
+    def _last(self, name: str) -> Past | None:
+        return next((each for each in reversed(self.past) if each.name == name), None)
+
+    def _is_stale(self, name: str, timeout_s: float | None, now_s: float) -> bool:
+        if timeout_s is None:
+            return False
+        for index in reversed(range(len(self.past))):
+            if self.past[index].name == name and math.isfinite(self.past[index].time_s):
+                looked_s = [each.now_s for each in self.past[index:] if each.name == "output"]
+                return now_s - min([self.past[index].time_s, *looked_s, now_s]) > timeout_s
+        return True
+
+    def past_now_s(self) -> float:
+        """The clock at the last output."""
+        last = self._last("output")
+        return 0.0 if last is None else last.now_s
+
+    def _readings(self) -> list[DriveReading]:
+        return [each.value for each in self.past if each.name == "drive"]
+
+    def mean_v(self) -> float:
+        """Of the last time that was long enough."""
+        mean_v, window = math.inf, list[tuple[float, float]]()
+        for reading in self._readings():
+            if reading.battery_v is None or not math.isfinite(reading.battery_v + reading.time_s):
+                continue
+            if window and reading.time_s < window[0][1]:
+                window = []
+            window.append((reading.battery_v, reading.time_s))
+            if reading.time_s - window[0][1] >= self.limits.battery_mean_s:
+                mean_v, window = sum(voltage for voltage, _ in window) / len(window), []
+        return mean_v
+
+    def _torque_story(self) -> tuple[bool, bool, float | None]:
+        """Whether the motors told that they hold, whether they let go since, and for how long a wheel is off."""
+        began = [each for each in self.past if each.name in ("output", "drive")]
+        for index in reversed(range(len(began))):
+            if began[index].name == "output" and began[index].torque_since_s is None:
+                began = began[index + 1 :]
+                break
+        is_seen = is_lost = False
+        off: list[float] = []
+        since_s: float | None = None
+        velocity = STANDSTILL
+        longest_s: float | None = None
+        for each in began:
+            if each.name == "output":
+                since_s, velocity = each.torque_since_s, each.velocity
+            elif since_s is not None and each.value.time_s > since_s:
+                is_seen, is_lost = (
+                    is_seen or each.value.is_torque_on,
+                    is_lost or (is_seen and not each.value.is_torque_on),
+                )
+                if not each.value.is_torque_on:
+                    continue
+                turn = velocity.angular_rad_s * self.limits.separation_m / 2
+                goals = (velocity.linear_m_s - turn, velocity.linear_m_s + turn)
+                errors = [abs(goal - speed) for goal, speed in zip(goals, each.value.wheels_m_s, strict=True)]
+                allowed = [max(self.limits.astray_m_s, abs(goal) / 2) for goal in goals]
+                off = [*off, each.value.time_s] if any(not a <= b for a, b in zip(errors, allowed, strict=True)) else []
+                if off and each.value.time_s - min(off) > self.limits.astray_s:
+                    longest_s = each.value.time_s - min(off)
+        return is_seen, is_lost, longest_s
+
+    def latched(self) -> set[Reason]:
+        """What has happened since the last reset that was allowed, and holds until the next."""
+        found = set[Reason]()
+        begin = 0
+        for index, each in enumerate(self.past):
+            if each.name == "reset" and each.value:
+                begin, found = index, set()
+            found |= each.latched
+        for each in self.past[begin:]:
+            found |= {"stop": {Reason.OPERATOR_STOP}, "fault": {Reason.SUPERVISOR_FAULT}}.get(each.name, set())
+            if each.name == "drive" and each.value.faults - {MotorFault.VOLTAGE}:
+                found.add(Reason.MOTOR_FAULT)
+        return found
+
+    def tells(self, reading: DriveReading) -> None:
+        """The drive base has answered; what latches of it is noted at once."""
+        self.happens("drive", reading, reading.time_s)
+        _, is_lost, off_s = self._torque_story()
+        latched = {
+            Reason.BATTERY_LOW: self.mean_v() <= self.limits.battery_stop_v,
+            Reason.TORQUE_LOST: is_lost and self._is_wanted(),
+            Reason.WHEEL_ASTRAY: off_s is not None and self._is_wanted(),
+        }
+        self.past[-1].latched = frozenset(reason for reason, is_so in latched.items() if is_so)
+
+    def _is_wanted(self) -> bool:
+        last = self._last("output")
+        return last is not None and last.torque_since_s is not None
+
+    def _torque_off(self) -> set[Reason]:
+        found = {Reason.MOTOR_FAULT, Reason.TORQUE_LOST, Reason.WHEEL_ASTRAY}
+        return found | ({Reason.OPERATOR_STOP} if self.limits.is_torque_off_on_operator_stop else set())
+
+    def reset(self) -> tuple[Reason, ...]:
+        """What forbids it."""
+        last, readings = self._last("output"), self._readings()
+        remaining = set[Reason]()
+        for reason in self.latched():
+            if last is None or reason not in last.reasons:
+                remaining.add(reason)
+            if reason is Reason.MOTOR_FAULT and readings[-1].faults - {MotorFault.VOLTAGE}:
+                remaining.add(reason)
+            if reason is Reason.BATTERY_LOW and self.mean_v() <= self.limits.battery_stop_v:
+                remaining.add(reason)
+            if reason in self._torque_off() and self._is_wanted():
+                remaining.add(reason)
+        self.happens("reset", not remaining)
+        return tuple(reason for reason in LATCHING if reason in remaining)
+
+    def _is_enabled(self) -> bool:
+        switches = [
+            each for each in self.past if each.name in ("enable", "disable") or (each.name == "reset" and each.value)
+        ]
+        return bool(switches) and switches[-1].name == "enable"
+
+    def _command(self) -> Velocity:
+        """That counts: given after the last output that had a reason, and after the last change."""
+        for each in reversed(self.past):
+            if each.name == "command":
+                numbers = (each.value.linear_m_s, each.value.angular_rad_s, each.time_s)
+                if not all(math.isfinite(number) for number in numbers):
+                    return STANDSTILL
+                return self._limited(*numbers[:2])
+            if each.name in ("enable", "disable") or (each.name == "reset" and each.value):
+                return STANDSTILL
+            if each.name == "output" and each.reasons - {Reason.COMMAND_SILENT}:
+                return STANDSTILL
+        return STANDSTILL
+
+    def _is_held(self) -> bool:
+        """Whether there was a change or a reason since, or at, the last output."""
+        since = self._since_last("output")
+        if not since or since[0].name != "output" or since[0].reasons - {Reason.COMMAND_SILENT}:
+            return True
+        return any(each.name in ("enable", "disable") or (each.name == "reset" and each.value) for each in since)
+
+    def _limited(self, linear_m_s: float, angular_rad_s: float) -> Velocity:
+        linear_m_s = sorted((-self.limits.linear_m_s, linear_m_s, self.limits.linear_m_s))[1]
+        angular_rad_s = sorted((-self.limits.angular_rad_s, angular_rad_s, self.limits.angular_rad_s))[1]
+        turn = angular_rad_s * self.limits.separation_m / 2
+        factor = min(1.0, self.limits.wheel_m_s / (max(abs(linear_m_s - turn), abs(linear_m_s + turn)) or 1.0))
+        return Velocity(linear_m_s * factor, angular_rad_s * factor)
+
+    @staticmethod
+    def _moved(present: float, wanted: float, up: float, down: float) -> float:
+        if present * wanted < 0:
+            aim, most = 0.0, down
+        elif abs(wanted) < abs(present):
+            aim, most = wanted, down
+        else:
+            aim, most = wanted, up
+        return aim if abs(aim - present) <= most else present + math.copysign(most, aim - present)
+
+    def output(self, now_s: float) -> Output:
+        """What the layer should put out; its warnings are not told."""
+        limits = self.limits
+        last = self._last("output") or Past("output")
+        is_clock_wrong = not (math.isfinite(now_s) and now_s >= last.now_s)
+        step_s = min(now_s - last.now_s, limits.motor_timeout_s)
+        now_s = now_s if math.isfinite(now_s) else last.now_s
+        is_seen, _, _ = self._torque_story()
+        noted = set[Reason]()
+        since_s = None if last.torque_since_s is None else min(last.torque_since_s, now_s)
+        if since_s is not None and not is_seen and now_s - since_s > limits.torque_on_s:
+            noted.add(Reason.TORQUE_LOST)
+        latched = self.latched() | noted
+        letting_go_s = None
+        if self._is_enabled() and not latched & self._torque_off():
+            if since_s is None:
+                since_s, is_seen = now_s, False
+        elif since_s is not None:
+            letting_go_s = now_s if last.letting_go_s is None else min(last.letting_go_s, now_s)
+            if self._is_still_since(letting_go_s, now_s) or now_s - letting_go_s >= limits.torque_off_s:
+                since_s = letting_go_s = None
+        wanted = STANDSTILL if self._is_held() else self._command()
+        failures = [each.name for each in self._since_last("drive") if each.name == "failure"]
+        reasons = latched | {
+            reason
+            for name, reason in _FACTS.items()
+            if self._is_stale(name, getattr(limits, f"{name}_timeout_s"), now_s)
+        }
+        if not self._is_enabled():
+            reasons.add(Reason.STANDBY)
+        if is_clock_wrong:
+            reasons.add(Reason.CLOCK)
+        if since_s is not None and not is_seen:
+            reasons.add(Reason.TORQUE_AWAITED)
+        if wanted != STANDSTILL and self._is_command_stale(now_s):
+            reasons.add(Reason.COMMAND_SILENT)
+        if self._is_stale("drive", limits.motor_timeout_s, now_s) or len(failures) >= limits.motor_failures:
+            reasons.add(Reason.MOTOR_SILENT)
+        velocity = STANDSTILL
+        if not reasons and wanted != STANDSTILL:
+            velocity = self._limited(
+                self._moved(
+                    last.velocity.linear_m_s,
+                    wanted.linear_m_s,
+                    limits.linear_acceleration_m_s2 * step_s,
+                    limits.linear_deceleration_m_s2 * step_s,
+                ),
+                self._moved(
+                    last.velocity.angular_rad_s,
+                    wanted.angular_rad_s,
+                    limits.angular_acceleration_rad_s2 * step_s,
+                    limits.angular_deceleration_rad_s2 * step_s,
+                ),
+            )
+        self.past.append(
+            Past("output", None, 0.0, now_s, frozenset(reasons), velocity, since_s, letting_go_s, frozenset(noted))
+        )
+        return Output(velocity, since_s is not None, tuple(reason for reason in Reason if reason in reasons), ())
+
+    def _is_command_stale(self, now_s: float) -> bool:
+        # A command that was refused is no sign of life.
+        heard = self._last("command")
+        assert heard is not None
+        index = next(i for i, each in enumerate(self.past) if each is heard)
+        looked_s = [now_s]
+        if not self._is_held():
+            looked_s += [
+                each.now_s
+                for each in self.past[index:]
+                if each.name == "output" and (each.velocity != STANDSTILL or Reason.COMMAND_SILENT in each.reasons)
+            ]
+        return now_s - min(heard.time_s, *looked_s) > self.limits.command_timeout_s
+
+    def _is_still_since(self, time_s: float, now_s: float) -> bool:
+        readings = [index for index, each in enumerate(self.past) if each.name == "drive"]
+        if not readings:
+            return False
+        reading: DriveReading = self.past[readings[-1]].value
+        looked_s = [
+            each.now_s for each in self.past[readings[-1] :] if each.name == "output" and each.letting_go_s is not None
+        ]
+        is_still = all(abs(speed) <= self.limits.standstill_m_s for speed in reading.wheels_m_s)
+        return is_still and min([reading.time_s, now_s, *looked_s]) > time_s

@@ -67,6 +67,7 @@ class Job:
         settings: Of the executor.
         needs_scanner: Whether a LiDAR must be there before it starts.
         starts_itself: Whether it starts as soon as the devices are there; else it stays in standby.
+        stays_after_fault: Whether it waits for somebody to start it again after a fault; else it ends.
     """
 
     supervisor: Supervisor
@@ -74,6 +75,7 @@ class Job:
     settings: Settings
     needs_scanner: bool
     starts_itself: bool
+    stays_after_fault: bool = False
 
 
 class Daemon:
@@ -89,7 +91,7 @@ class Daemon:
 
     Attributes:
         state: What it is doing.
-        problem: Why it is in the state `FAULT`; empty otherwise.
+        problem: The fault that has stopped it; empty: none.
         overruns: How many decisions came too late by a whole period, and were left out.
     """
 
@@ -111,12 +113,14 @@ class Daemon:
         self._log = log
         self._inbox: queue.SimpleQueue[Report | Command | Key] = queue.SimpleQueue()
         self._motion = Motion(rotate, self._command)
-        self._robot = Robot(job.ties, self._motion, emergency_stop, self._operator_stop, clock.monotonic)
+        self._robot = Robot(
+            job.ties, self._motion, emergency_stop, self._operator_stop, self._operator_resume, clock.monotonic
+        )
         self._executor: Executor | None = None
         self._due_s = clock.monotonic()
         self._wish = Velocity()
         self._is_up = {Device.DRIVE: False, Device.SCANNER: not job.needs_scanner}
-        self._has_scanned = not job.needs_scanner
+        self._scan: Scan | None = None
         self._has_torque = False
         self._stop_end_s = 0.0
         self._after_stop = State.STANDBY
@@ -183,7 +187,7 @@ class Daemon:
                 if self._executor is not None:
                     self._robot.saw_drive(item, self._executor)
             case Scan():
-                self._has_scanned = True
+                self._scan = item
                 if self._executor is not None:
                     self._robot.saw_scan(item, self._executor)
             case DeviceUp(device):
@@ -213,7 +217,7 @@ class Daemon:
         if report.is_first:
             _log.error("%s: %s", report.device, report.problem)
         if report.device is Device.SCANNER:
-            self._has_scanned = False
+            self._scan = None
         else:
             self._has_torque = False
         if self._executor is None:
@@ -238,7 +242,7 @@ class Daemon:
     def _reset(self) -> None:
         remaining = self._safety.reset()
         if remaining:
-            _log.error("reset: %s", "; ".join(str(reason) for reason in remaining))
+            _log.error("reset: %s", " ".join(remaining))
             return
         self._reset_drive()
         if self.state in (State.RUNNING, State.FAULT):
@@ -252,6 +256,9 @@ class Daemon:
         self.state = State.RUNNING
         self._safety.enable()
         self._executor.start()
+        if self._scan is not None:
+            # It must not decide on nothing while the last one is at hand.
+            self._robot.saw_scan(self._scan, self._executor)
         _log.info("running")
 
     def _end(self, reason: str, then: State) -> None:
@@ -266,12 +273,12 @@ class Daemon:
 
     def _fault(self, problem: str) -> None:
         _log.error("%s", problem)
-        self._end(problem, State.FAULT)
+        self._end(problem, State.FAULT if self._job.stays_after_fault else State.OVER)
         self.problem = problem
 
     def _look_at_state(self, now_s: float) -> None:
         match self.state:
-            case State.STARTING if all(self._is_up.values()) and self._has_scanned:
+            case State.STARTING if all(self._is_up.values()) and (self._scan or not self._job.needs_scanner):
                 self.state = State.STANDBY
                 _log.info("standby")
                 if self._job.starts_itself:
@@ -295,3 +302,10 @@ class Daemon:
     def _operator_stop(self) -> None:
         self._safety.operator_stop()
         self._hurry()
+
+    def _operator_resume(self) -> None:
+        remaining = self._safety.reset()
+        if remaining:
+            _log.error("the robot cannot go on: %s", " ".join(remaining))
+        elif self.state is State.RUNNING:
+            self._safety.enable()

@@ -64,6 +64,7 @@ class Robot:
         motion: What moves the wheels.
         emergency_stop: The operator's stop.
         on_stop: Called when the operator stops the robot: the safety layer hears of it first.
+        on_resume: Called when the operator lets it go on.
         clock: What the time is, in seconds.
     """
 
@@ -73,12 +74,14 @@ class Robot:
         motion: Motion,
         emergency_stop: EmergencyStop,
         on_stop: Callable[[], None],
+        on_resume: Callable[[], None],
         clock: Callable[[], float],
     ) -> None:
         self._ties = ties
         self._motion = motion
         self._emergency_stop = emergency_stop
         self._on_stop = on_stop
+        self._on_resume = on_resume
         self._clock = clock
         self._by_name = {item.name: item for item in ties.communications}
         self._by_identifier = {item.identifier: item for item in reversed(ties.communications)}
@@ -199,7 +202,8 @@ class Robot:
         """A device is lost, or back again."""
         event = "lost" if is_lost else "back"
         for identifier, channel in self._told((channels.FaultChannel,)):
-            assert isinstance(channel, channels.FaultChannel)
+            if not isinstance(channel, channels.FaultChannel):
+                continue
             if channel.event == event and channel.device in (str(device), "any"):
                 executor.receive(identifier, shaped(self._by_identifier[identifier], text))
         if is_lost and device is Device.DRIVE:
@@ -240,8 +244,8 @@ class Robot:
                         executor.receive(identifier, shaped(item, touched))
 
     def _saw_stop(self, event: StopEvent | None, executor: Supervised) -> None:
-        if event is StopEvent.STOP:
-            self._on_stop()
+        if event is not None:
+            (self._on_stop if event is StopEvent.STOP else self._on_resume)()
         for identifier, channel in self._told((channels.EmergencyStopChannel,)):
             if event is not None and isinstance(channel, channels.EmergencyStopChannel) and channel.event == event:
                 executor.receive(identifier, None)

@@ -1,0 +1,147 @@
+"""From a configuration to a daemon with its devices' threads."""
+
+import math
+from dataclasses import dataclass
+
+from robosc.execution.clock import SystemClock
+from robosc.execution.event_log import EventLog
+from robosc.model.structure import Deployment
+from robosc.supervisor import Supervisor
+from robosc_bridge.configuration.structure import Configuration, Scanner
+from robosc_bridge.configuration.ties import Ties
+from robosc_bridge.daemon.device_thread import DeviceThread
+from robosc_bridge.daemon.loop import Command, Daemon, Job
+from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
+from robosc_bridge.devices.interface import DriveBase, RangeScanner
+from robosc_bridge.devices.registry import make_drive_base, make_range_scanner
+from robosc_bridge.devices.robots import ROBOTS
+from robosc_bridge.errors import BridgeError
+from robosc_bridge.safety import SafetyLayer, SafetyLimits
+from robosc_bridge.skills import EmergencyStop, Rotate
+
+EXCHANGE_S = 0.02
+"""Time between exchanges with the drive base: what OpenCR refreshes its registers at."""
+
+RESTART_S = 3.0
+"""After so long without a full turn a LiDAR's motor is restarted, as its official driver does."""
+
+_THREAD_LIMIT_S = 5.0
+
+
+class AssemblyError(BridgeError):
+    """A configuration asks for what cannot be made; says what."""
+
+
+def safety_limits(configuration: Configuration) -> SafetyLimits:
+    """The numbers of the safety layer; what the configuration leaves to the drive is what the robot can do.
+
+    Raises:
+        AssemblyError: They do not go together.
+    """
+    robot, chosen = ROBOTS[configuration.robot], configuration.safety
+    can = robot.limits(robot.motor.velocity_limit_raw)
+    linear = chosen.linear_acceleration_m_s2
+    angular = chosen.angular_acceleration_rad_s2
+    try:
+        return SafetyLimits(
+            linear_m_s=min(chosen.linear_m_s or math.inf, can.linear_m_s),
+            angular_rad_s=min(chosen.angular_rad_s or math.inf, can.angular_rad_s),
+            wheel_m_s=can.wheel_m_s,
+            separation_m=robot.wheel_separation_m,
+            scan_timeout_s=None if configuration.scanner is None else chosen.scan_timeout_s,
+            linear_acceleration_m_s2=linear,
+            linear_deceleration_m_s2=max(linear, SafetyLimits.linear_deceleration_m_s2),
+            angular_acceleration_rad_s2=angular,
+            angular_deceleration_rad_s2=max(angular, SafetyLimits.angular_deceleration_rad_s2),
+            command_timeout_s=chosen.command_timeout_s,
+            motor_timeout_s=chosen.motor_timeout_s,
+            loop_timeout_s=max(chosen.overrun_s, 2 * configuration.execution.period_s),
+            operator_timeout_s=chosen.operator_link_timeout_s,
+            battery_warn_v=chosen.battery_warning_v,
+            battery_stop_v=chosen.battery_stop_v,
+        )
+    except ValueError as error:
+        raise AssemblyError(f"safety: {error}") from error
+
+
+def drive_base(configuration: Configuration) -> DriveBase:
+    """The drive base, not opened yet.
+
+    Raises:
+        UnknownDriverError: There is no such driver.
+        AssemblyError: It takes no such option.
+    """
+    drive = configuration.drive
+    try:
+        return make_drive_base(
+            drive.driver, **{"path": drive.port, "robot": ROBOTS[configuration.robot], **drive.options}
+        )
+    except (TypeError, ValueError) as error:
+        raise AssemblyError(f"driver '{drive.driver}': {error}") from error
+
+
+def range_scanner(scanner: Scanner) -> RangeScanner:
+    """The LiDAR, not opened yet; raises as `drive_base`."""
+    try:
+        return make_range_scanner(scanner.driver, **{"path": scanner.port, **scanner.options})
+    except (TypeError, ValueError) as error:
+        raise AssemblyError(f"driver '{scanner.driver}': {error}") from error
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A daemon and the threads of its devices.
+
+    Attributes:
+        daemon: The loop, run by whoever calls `run`.
+        drive: The drive base's thread.
+        scanner: The LiDAR's; None: there is none.
+    """
+
+    daemon: Daemon
+    drive: DeviceThread
+    scanner: DeviceThread | None
+
+    def run(self) -> bool:
+        """Start the threads, run the loop to its end, and stop them; whether all gave back their devices in time."""
+        threads = [self.drive, *([self.scanner] if self.scanner else [])]
+        for thread in threads:
+            thread.start()
+        try:
+            self.daemon.run()
+        finally:
+            # The drive base first: whatever else hangs, the wheels stop.
+            ended = [thread.stop(_THREAD_LIMIT_S) for thread in threads]
+        return all(ended)
+
+    def quit(self) -> None:
+        """Let `run` end; from any thread or signal handler."""
+        self.daemon.post(Command.QUIT)
+
+
+def assemble(
+    configuration: Configuration, ties: Ties, supervisor: Supervisor, log: EventLog, *, starts_itself: bool
+) -> Machine:
+    """Make everything; nothing is opened yet.
+
+    Raises:
+        AssemblyError: A device or number does not fit, or the supervisor is for a supervision layer.
+        UnknownDriverError: There is no such driver.
+    """
+    if supervisor.deployment is not Deployment.CONTROLLER:
+        raise AssemblyError("the supervisor is for a supervision layer; the bridge runs controllers")
+    clock = SystemClock()
+    safety = SafetyLayer(safety_limits(configuration))
+    job = Job(
+        supervisor, ties, ties.settings(configuration.execution), configuration.scanner is not None, starts_itself
+    )
+    skills = configuration.skills
+    daemon = Daemon(job, safety, Rotate(skills.rotate), EmergencyStop(skills.emergency_stop), clock, log)
+    worker = DriveWorker(drive_base(configuration), safety, daemon.post, EXCHANGE_S, clock.monotonic)
+    drive = DeviceThread(worker, clock.monotonic)
+    daemon.connect(drive.hurry, worker.reset)
+    scanner = None
+    if configuration.scanner is not None:
+        listener = ScannerWorker(range_scanner(configuration.scanner), safety, daemon.post, RESTART_S, clock.monotonic)
+        scanner = DeviceThread(listener, clock.monotonic)
+    return Machine(daemon, drive, scanner)

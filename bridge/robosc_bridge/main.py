@@ -1,0 +1,157 @@
+"""`robosc-bridge`: run a supervisor on a robot's devices, and what is needed before that."""
+
+import argparse
+import json
+import logging
+import signal
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import get_args
+
+from robosc._version import __version__
+from robosc.errors import LanguageError, RoboscError
+from robosc.execution.event_log import EventLog, NullLog, open_event_log
+from robosc.language import load_bundle
+from robosc.model import check
+from robosc.model.structure import Deployment, Model
+from robosc_bridge.configuration import init, load, schema, tie
+from robosc_bridge.configuration.template import DriveDriver, Robot, ScannerDriver
+from robosc_bridge.daemon.assembly import assemble
+from robosc_bridge.daemon.supervisors import MODEL_SUFFIX, NoSupervisorError, Source, obtain
+from robosc_bridge.devices.registry import Kind, available_drivers
+from robosc_bridge.errors import BridgeError
+
+OK, FAULT, WRONG_USE = 0, 1, 2
+
+_EPILOG = "exit status: 0 all is well, or the bridge was told to end; 1 a fault stopped it; 2 wrong use or files"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command; returns the exit status."""
+    arguments = _parser().parse_args(argv)
+    try:
+        status: int = arguments.run(arguments)
+    except (BridgeError, RoboscError, OSError) as error:
+        for line in str(error).splitlines():
+            sys.stderr.write(f"robosc-bridge: {line}\n")
+        return WRONG_USE
+    return status
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="robosc-bridge", description=__doc__, epilog=_EPILOG)
+    parser.add_argument("--version", action="version", version=f"robosc-bridge {__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    run = commands.add_parser("run", help="execute a supervisor on a robot's devices", epilog=_EPILOG)
+    _model_argument(run, "the model (.rscd), or a supervisor (.rsup) with its model beside it, called alike")
+    _configuration_argument(run)
+    run.add_argument("--server", metavar="HOST:PORT", help="a synthesis server that makes the supervisor of the model")
+    run.add_argument("--keep", metavar="FOLDER", type=Path, help="folder for what the server made last")
+    run.add_argument("--standby", action="store_true", help="do not move before somebody says so")
+    run.add_argument("--verbose", action="store_true", help="tell more")
+    run.set_defaults(run=_run)
+
+    checked = commands.add_parser("check", help="check a configuration against a model", epilog=_EPILOG)
+    _model_argument(checked, "the model (.rscd)")
+    _configuration_argument(checked)
+    checked.set_defaults(run=_check)
+
+    first = commands.add_parser("init", help="write a first configuration for a robot and a model", epilog=_EPILOG)
+    _model_argument(first, "the model (.rscd)")
+    first.add_argument("--robot", choices=get_args(Robot), default="burger")
+    first.add_argument("--drive", choices=get_args(DriveDriver), default="opencr")
+    first.add_argument("--scanner", choices=get_args(ScannerDriver), default="lds02")
+    first.add_argument("-o", "--output", metavar="FILE", type=Path, help="where to; standard output if it is left out")
+    first.set_defaults(run=_init)
+
+    described = commands.add_parser("schema", help="print the JSON schema of configurations")
+    described.set_defaults(run=_schema)
+
+    drivers = commands.add_parser("drivers", help="list the drivers of drive bases and range scanners")
+    drivers.add_argument("--json", action="store_true", help="for programs")
+    drivers.set_defaults(run=_drivers)
+    return parser
+
+
+def _model_argument(parser: argparse.ArgumentParser, text: str) -> None:
+    parser.add_argument("--model", metavar="FILE", type=Path, required=True, help=text)
+
+
+def _configuration_argument(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--config", metavar="FILE", type=Path, required=True, help="the configuration (YAML)")
+
+
+def _model(file: Path) -> Model:
+    """The checked model of a file."""
+    if file.suffix != MODEL_SUFFIX:
+        raise NoSupervisorError(f"{file}: not a model ({MODEL_SUFFIX})")
+    try:
+        checked = check(load_bundle(file))
+    except LanguageError as error:
+        raise NoSupervisorError("\n".join(map(str, error.diagnostics))) from error
+    if checked.model is None:
+        raise NoSupervisorError("\n".join(map(str, checked.diagnostics)) or f"{file}: a library has no robot")
+    return checked.model
+
+
+def _check(arguments: argparse.Namespace) -> int:
+    loaded = load(arguments.config)
+    ties = tie(_model(arguments.model), loaded.configuration, loaded.document)
+    sys.stdout.write(f"{arguments.config}: {len(ties.communications)} communications are tied\n")
+    return OK
+
+
+def _init(arguments: argparse.Namespace) -> int:
+    text = init(arguments.robot, arguments.drive, arguments.scanner, _model(arguments.model))
+    if arguments.output is None:
+        sys.stdout.write(text)
+    else:
+        with arguments.output.open("x", encoding="utf-8") as stream:
+            stream.write(text)
+        sys.stdout.write(f"{arguments.output}\n")
+    return OK
+
+
+def _schema(arguments: argparse.Namespace) -> int:
+    sys.stdout.write(json.dumps(schema(), indent=2) + "\n")
+    return OK
+
+
+def _drivers(arguments: argparse.Namespace) -> int:
+    found = [(kind, info) for kind in Kind for info in available_drivers(kind)]
+    if arguments.json:
+        items = [{"kind": str(kind), "name": info.name, "description": info.description} for kind, info in found]
+        sys.stdout.write(json.dumps(items, indent=2) + "\n")
+    else:
+        for kind, info in found:
+            sys.stdout.write(f"{kind:14} {info.name:14} {info.description}\n")
+    return OK
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    level = logging.DEBUG if arguments.verbose else logging.INFO
+    logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", stream=sys.stderr, level=level)
+    tell = logging.getLogger("robosc_bridge").info
+    loaded = load(arguments.config)
+    configuration = loaded.configuration
+    server = arguments.server or configuration.supervisor.server
+    supervisor = obtain(Source(arguments.model, Deployment.CONTROLLER, server, arguments.keep), tell)
+    ties = tie(supervisor.model, configuration, loaded.document)
+    log: EventLog = NullLog()
+    if configuration.log.folder is not None:
+        log = open_event_log(configuration.log.folder, supervisor.model.name, time.time())
+    try:
+        machine = assemble(configuration, ties, supervisor, log, starts_itself=not arguments.standby)
+        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+            signal.signal(number, lambda *_: machine.quit())
+        have_ended = machine.run()
+    finally:
+        log.close()
+    return OK if have_ended and not machine.daemon.problem else FAULT
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,316 @@
+"""The loop turn by turn, on a clock that the test sets: what the safety layer and the supervisor are told."""
+
+import math
+from typing import Any
+
+import pytest
+
+from robosc.execution.clock import ManualClock
+from robosc.execution.event_log import MemoryLog
+from robosc.supervisor import make_supervisor
+from robosc_bridge.configuration import parse, tie
+from robosc_bridge.daemon.loop import STOP_LIMIT_S, Command, Daemon, Job, Key, State
+from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp
+from robosc_bridge.devices.interface import BINS, STANDSTILL, DriveReading, Pose, RawScan, Scan, Velocity
+from robosc_bridge.safety import Reason, SafetyLayer, SafetyLimits
+from robosc_bridge.skills import EmergencyStop, Rotate
+from support.models import bundle_of
+
+MODEL = """
+robot Patrol {
+    interface twist use Twist from geometry_msgs
+    interface laser use LaserScan from sensor_msgs
+    datatype object Vector { x: double z: double }
+    datatype object Twist { linear: Vector angular: Vector }
+    datatype object Scan { ranges: array(double) }
+    datatype enum Way from Scan to { value.ranges[0] > 0.5 -> free default -> blocked }
+    component Eyes {
+        outgoing message scan with identifier: "/scan", type: Way links laser
+        outgoing message lost with identifier: "/lost", type: string
+        outgoing message stop with identifier: "/stop", type: none
+        outgoing message resume with identifier: "/resume", type: none
+        outgoing message button with identifier: "/button", type: boolean
+        behaviour {
+            variable way: Way = blocked
+            variable pressed: boolean
+            on response from scan do way := value
+            on response from button do pressed := value
+            initial marked state calm { on response from stop goto stopped }
+            marked state stopped { on response from resume goto calm }
+        }
+    }
+    component Wheels {
+        incoming message drive with identifier: "/cmd_vel", type: Twist links twist
+        incoming message turn with identifier: "/turn", type: integer
+        outgoing message turned with identifier: "/turned", type: none
+        behaviour {
+            initial marked state ready {
+                on request to drive
+                on request to turn goto turning
+            }
+            marked state turning { on response from turned goto ready }
+        }
+    }
+    requirement drive needs Eyes.way = free and Eyes.calm and Wheels.ready
+    requirement turn needs Eyes.way = blocked and Eyes.calm and Wheels.ready
+    provide drive with { linear: { x: 0.1 } }
+    provide turn with 90
+}
+"""
+CONFIGURATION = """
+robot: burger
+drive: {driver: opencr, port: /dev/base}
+scanner: {driver: lds01, port: /dev/scanner}
+execution: {period_s: 0.02}
+skills: {emergency_stop: {stop_buttons: [button_1], resume_buttons: [button_2]}}
+channels:
+  /scan: {channel: scanner}
+  /lost: {channel: fault}
+  /stop: {channel: emergency_stop, event: stop}
+  /resume: {channel: emergency_stop, event: resume}
+  /button: {channel: button, name: button_2, on: change}
+  /cmd_vel: {channel: drive}
+  /turn: {channel: rotate, unit: degrees}
+  /turned: {channel: rotated, outcome: any}
+"""
+LIMITS = SafetyLimits(
+    linear_m_s=0.2, angular_rad_s=2.0, wheel_m_s=0.2, separation_m=0.16, scan_timeout_s=0.6, loop_timeout_s=0.2
+)
+PERIOD_S = 0.02
+
+
+class Scene:
+    """A daemon, and devices that a test plays."""
+
+    def __init__(self, *, starts_itself: bool = True, stays: bool = False) -> None:
+        made = make_supervisor(bundle_of(MODEL))
+        assert made.supervisor is not None, made.reason
+        configuration = parse(CONFIGURATION.encode(), "test.yaml").configuration
+        ties = tie(made.supervisor.model, configuration)
+        self.clock = ManualClock(now_s=50.0)
+        self.log = MemoryLog()
+        self.safety = SafetyLayer(LIMITS)
+        job = Job(made.supervisor, ties, ties.settings(configuration.execution), True, starts_itself, stays)
+        stop = EmergencyStop(configuration.skills.emergency_stop)
+        self.daemon = Daemon(job, self.safety, Rotate(configuration.skills.rotate), stop, self.clock, self.log)
+        self.hurries = self.resets = 0
+        self.daemon.connect(self._hurry, self._reset)
+        self.torque = False
+        self.out = STANDSTILL
+        self.heading_rad = 0.0
+        self.buttons = {"button_1": False, "button_2": False}
+
+    def _hurry(self) -> None:
+        self.hurries += 1
+
+    def _reset(self) -> None:
+        self.resets += 1
+
+    def exchange(self) -> None:
+        """What the drive base's thread does: the robot moves as it is told."""
+        output = self.safety.output(self.clock.monotonic())
+        self.torque, self.out = output.is_torque_wanted, output.velocity
+        self.heading_rad = math.remainder(self.heading_rad + self.out.angular_rad_s * PERIOD_S, math.tau)
+        pose, now_s = Pose(0.0, 0.0, self.heading_rad), self.clock.monotonic()
+        wheels = (
+            self.out.linear_m_s - self.out.angular_rad_s * 0.08,
+            self.out.linear_m_s + self.out.angular_rad_s * 0.08,
+        )
+        reading = DriveReading(now_s, pose, self.out, wheels, self.torque, buttons=dict(self.buttons))
+        self.safety.saw_drive(reading)
+        self.daemon.post(reading)
+
+    def scan(self, distance_m: float) -> None:
+        now_s = self.clock.monotonic()
+        self.safety.saw_scan(now_s)
+        self.daemon.post(Scan(now_s, (distance_m,) * BINS, RawScan((), (), ()), 5.0))
+
+    def live(self, seconds: float, distance_m: float | None = None) -> None:
+        """Let time pass, an exchange and a turn each period, a scan every fifth of a second."""
+        for number in range(round(seconds / PERIOD_S)):
+            if distance_m is not None and number % 10 == 0:
+                self.scan(distance_m)
+            self.exchange()
+            self.daemon.turn()
+            self.clock.advance(PERIOD_S)
+
+    def up(self, distance_m: float = 2.0) -> None:
+        self.daemon.post(DeviceUp(Device.SCANNER))
+        self.daemon.post(DeviceUp(Device.DRIVE))
+        self.live(1.0, distance_m)
+
+    def events(self) -> list[str]:
+        return [entry["event"] for entry in self.log.entries if entry["kind"] == "event"]
+
+    def component(self, name: str) -> Any:
+        return self.log.entries[-1]["state"][name]
+
+
+@pytest.fixture
+def scene() -> Scene:
+    return Scene()
+
+
+def test_nothing_moves_before_all_devices_are_there(scene: Scene) -> None:
+    scene.live(1.0)
+    assert scene.daemon.state is State.STARTING
+    scene.daemon.post(DeviceUp(Device.DRIVE))
+    scene.live(1.0)
+    assert (scene.daemon.state, scene.torque) == (State.STARTING, False)
+    scene.daemon.post(DeviceUp(Device.SCANNER))
+    scene.live(0.2)
+    assert scene.daemon.state is State.STARTING
+    scene.live(1.0, 2.0)
+    assert scene.daemon.state is State.RUNNING
+    assert scene.out == Velocity(0.1, 0.0)
+
+
+def test_in_standby_it_waits_with_torque_off_until_somebody_says_start() -> None:
+    scene = Scene(starts_itself=False)
+    scene.up()
+    assert (scene.daemon.state, scene.torque, scene.events()) == (State.STANDBY, False, [])
+    scene.daemon.post(Command.START)
+    scene.live(1.0, 2.0)
+    assert (scene.daemon.state, scene.out) == (State.RUNNING, Velocity(0.1, 0.0))
+    scene.daemon.post(Command.STANDBY)
+    scene.live(0.5, 2.0)
+    assert (scene.daemon.state, scene.torque, scene.out) == (State.STANDBY, False, STANDSTILL)
+
+
+def test_an_obstacle_stops_the_wheels_with_the_very_scan_that_shows_it(scene: Scene) -> None:
+    scene.up()
+    assert scene.out.linear_m_s == 0.1
+    hurries = scene.hurries
+    scene.scan(0.3)
+    scene.daemon.turn()
+    scene.exchange()
+    assert scene.out == STANDSTILL
+    assert scene.hurries > hurries
+
+
+def test_it_turns_by_the_angle_that_is_asked_for_and_tells_when_it_has(scene: Scene) -> None:
+    scene.up(0.3)
+    scene.live(4.0, 0.3)
+    assert scene.events().count("turn.request") >= 1
+    assert "turned.response" in scene.events()
+    scene.live(0.5, 2.0)
+    quarter = math.remainder(scene.heading_rad, math.pi / 2)
+    assert abs(quarter) < 0.05 or scene.daemon.state is State.RUNNING
+
+
+def test_a_silent_scanner_stops_the_wheels_and_they_go_on_when_it_is_back(scene: Scene) -> None:
+    scene.up()
+    scene.live(1.0)
+    assert (scene.out, scene.torque, scene.daemon.state) == (STANDSTILL, True, State.RUNNING)
+    assert Reason.SCAN_STALE in scene.safety.output(scene.clock.monotonic()).reasons
+    scene.live(1.0, 2.0)
+    assert scene.out.linear_m_s == 0.1
+
+
+def test_a_scanner_that_is_unplugged_is_told_to_the_supervisor(scene: Scene) -> None:
+    scene.up()
+    scene.daemon.post(DeviceDown(Device.SCANNER, "/dev/scanner: the line is gone", 0.25, True))
+    scene.live(0.1)
+    assert scene.events()[-1] == "lost.response" or "lost.response" in scene.events()
+
+
+def test_a_drive_base_that_is_lost_ends_the_run_as_a_fault(scene: Scene) -> None:
+    scene.up()
+    scene.daemon.post(DeviceDown(Device.DRIVE, "/dev/base: the line is gone", 0.25, True))
+    scene.daemon.turn()
+    assert scene.daemon.problem == "the drive base is lost: /dev/base: the line is gone"
+    assert scene.daemon.state is State.OVER
+    assert "lost.response" in scene.events()
+
+
+def test_where_somebody_can_start_it_again_it_waits_and_never_moves_by_itself() -> None:
+    scene = Scene(stays=True)
+    scene.up()
+    scene.daemon.post(DeviceDown(Device.DRIVE, "/dev/base: the line is gone", 0.25, True))
+    scene.daemon.turn()
+    assert scene.daemon.state is State.FAULT
+    scene.daemon.post(DeviceUp(Device.DRIVE))
+    scene.live(1.0, 2.0)
+    assert (scene.daemon.state, scene.out, scene.torque) == (State.STANDBY, STANDSTILL, False)
+    scene.daemon.post(Command.START)
+    scene.live(1.0, 2.0)
+    assert scene.out.linear_m_s == 0.1
+
+
+def test_quitting_stops_the_wheels_and_lets_go_first(scene: Scene) -> None:
+    scene.up()
+    scene.daemon.post(Command.QUIT)
+    # The safety layer hears of it at once, without the loop.
+    assert scene.safety.output(scene.clock.monotonic()).velocity == STANDSTILL
+    scene.daemon.turn()
+    assert scene.daemon.state is State.STOPPING
+    scene.live(0.2, 2.0)
+    assert (scene.daemon.state, scene.torque, scene.daemon.problem) == (State.OVER, False, "")
+
+
+def test_quitting_does_not_wait_for_ever_for_motors(scene: Scene) -> None:
+    scene.up()
+    scene.daemon.post(Command.QUIT)
+    scene.daemon.turn()
+    scene.clock.advance(STOP_LIMIT_S)
+    scene.daemon.turn()
+    assert scene.daemon.state is State.OVER
+
+
+def test_an_operators_stop_wins_over_everything_until_he_lets_it_go_on(scene: Scene) -> None:
+    scene.up()
+    scene.daemon.post(Command.STOP)
+    scene.exchange()
+    assert scene.out == STANDSTILL
+    scene.live(1.0, 2.0)
+    assert scene.out == STANDSTILL
+    scene.daemon.post(Command.RESET)
+    scene.live(0.5, 2.0)
+    assert (scene.daemon.state, scene.resets) == (State.STANDBY, 1)
+    scene.daemon.post(Command.START)
+    scene.live(1.0, 2.0)
+    assert scene.out.linear_m_s == 0.1
+
+
+def test_a_stop_button_reaches_safety_layer_and_supervisor(scene: Scene) -> None:
+    scene.up()
+    scene.buttons["button_1"] = True
+    scene.live(0.2, 2.0)
+    assert scene.out == STANDSTILL
+    assert "stop.response" in scene.events()
+    scene.buttons["button_1"] = False
+    scene.live(0.2, 2.0)
+    assert scene.out == STANDSTILL
+    scene.buttons["button_2"] = True
+    scene.live(1.0, 2.0)
+    assert "resume.response" in scene.events()
+    assert scene.events().count("button.response") == 1
+    assert scene.out.linear_m_s == 0.1
+
+
+def test_a_key_stops_and_lets_go_on(scene: Scene) -> None:
+    scene.up()
+    scene.daemon.post(Key("space"))
+    scene.live(0.1, 2.0)
+    assert scene.out == STANDSTILL
+    scene.daemon.post(Key("r"))
+    scene.live(1.0, 2.0)
+    assert scene.out.linear_m_s == 0.1
+
+
+def test_decisions_that_are_late_by_periods_are_left_out_and_counted(scene: Scene) -> None:
+    scene.up()
+    before = len(scene.events())
+    scene.clock.advance(5 * PERIOD_S)
+    scene.daemon.turn()
+    assert scene.daemon.overruns == 5
+    assert len(scene.events()) <= before + 1
+
+
+def test_a_loop_that_hangs_stops_the_wheels(scene: Scene) -> None:
+    scene.up()
+    for _ in range(12):
+        scene.clock.advance(PERIOD_S)
+        scene.exchange()
+    assert scene.out == STANDSTILL
+    assert Reason.LOOP_OVERRUN in scene.safety.output(scene.clock.monotonic()).reasons

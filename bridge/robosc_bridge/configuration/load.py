@@ -1,0 +1,72 @@
+"""From the file to a checked configuration."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+
+from robosc_bridge.configuration.decoding import decode
+from robosc_bridge.configuration.document import Document, parse_document, read_file
+from robosc_bridge.configuration.problems import ConfigurationError, Path, Problem
+from robosc_bridge.configuration.structure import Configuration
+
+
+@dataclass(frozen=True, slots=True)
+class Loaded:
+    """A configuration and the text that it was read from.
+
+    Attributes:
+        configuration: What it says.
+        document: Where each key stands, for messages.
+    """
+
+    configuration: Configuration
+    document: Document
+
+
+def load(path: FilePath) -> Loaded:
+    """Read a configuration file.
+
+    Raises:
+        ConfigurationError: It cannot be read, is no YAML, or is no valid configuration; lists all that is wrong.
+    """
+    return parse(read_file(path), str(path))
+
+
+def parse(data: bytes, name: str) -> Loaded:
+    """Read a configuration.
+
+    Args:
+        data: YAML in UTF-8.
+        name: Of its file, for messages.
+
+    Raises:
+        ConfigurationError: It is no YAML or no valid configuration; lists all that is wrong.
+    """
+    document = parse_document(data, name)
+    configuration = decode(document, Configuration)
+    problems = [Problem(text, path, document.line(path)) for path, text in _contradictions(configuration)]
+    if problems:
+        raise ConfigurationError(name, problems)
+    return Loaded(configuration, document)
+
+
+def _contradictions(configuration: Configuration) -> Iterator[tuple[Path, str]]:
+    """Values that are fine by themselves and not together."""
+    skills, safety = configuration.skills, configuration.safety
+    pairs = (
+        (skills.rotate, ("skills", "rotate"), "slowest_rad_s", "speed_rad_s", True),
+        (skills.line, ("skills", "line"), "top", "bottom", False),
+        (skills.line, ("skills", "line"), "smallest", "largest", False),
+        (safety, ("safety",), "battery_stop_v", "battery_warning_v", True),
+    )
+    for section, path, low, high, may_be_equal in pairs:
+        first, second = getattr(section, low), getattr(section, high)
+        if first > second or (first == second and not may_be_equal):
+            words = "at most" if may_be_equal else "below"
+            yield (*path, low), f"is {first:g}; it must be {words} '{high}', which is {second:g}"
+    stop = skills.emergency_stop
+    for kind in ("keys", "buttons"):
+        for name in sorted({*getattr(stop, f"stop_{kind}")} & {*getattr(stop, f"resume_{kind}")}):
+            yield ("skills", "emergency_stop", f"resume_{kind}"), f"'{name}' stops the robot already"
+    if configuration.execution.priority and configuration.execution.policy != "priority":
+        yield ("execution", "priority"), "means nothing unless 'policy' is priority"

@@ -1,0 +1,132 @@
+"""Shapes of data, and whether the types of a model fit them: the fields that it names must be there."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+from robosc.expressions import (
+    ArrayType,
+    BooleanType,
+    DoubleType,
+    EnumType,
+    IntegerType,
+    NoneType,
+    ObjectType,
+    StringType,
+    Type,
+    type_text,
+)
+from robosc.model.structure import Model
+
+
+class Leaf(StrEnum):
+    """Data without parts."""
+
+    NUMBER = "number"
+    BOOLEAN = "boolean"
+    TEXT = "text"
+    NOTHING = "nothing"
+    ANYTHING = "anything"
+
+
+@dataclass(frozen=True, slots=True)
+class Fields:
+    """Data with named parts."""
+
+    parts: Mapping[str, "Shape"]
+
+
+@dataclass(frozen=True, slots=True)
+class Array:
+    """Any number of the same."""
+
+    element: "Shape"
+
+
+@dataclass(frozen=True, slots=True)
+class OneOf:
+    """Data that can be given in several shapes, the usual one first."""
+
+    shapes: tuple["Shape", ...]
+
+
+Shape = Leaf | Fields | Array | OneOf
+
+
+class Way(StrEnum):
+    """Which way data goes."""
+
+    TO_MODEL = "to the model"
+    TO_ROBOT = "to the robot"
+
+
+def misfits(model: Model, type_: Type, shape: Shape, way: Way) -> tuple[str, ...]:
+    """Why a type does not fit a shape, part by part; empty: it fits.
+
+    Args:
+        model: That the type is of.
+        type_: What the model reads or gives. A message without data can be told by any data, but not the reverse.
+        shape: What the channel has or takes.
+        way: Numbers of the model may be whole ones for the robot; the reverse would cut them.
+    """
+    if way is Way.TO_MODEL and isinstance(type_, NoneType):
+        return ()
+    return tuple(_misfits(model, type_, shape, way, ""))
+
+
+def shape_text(shape: Shape) -> str:
+    """A shape for a person: `{linear: {x: number}}`."""
+    match shape:
+        case Fields(parts=parts):
+            return "{" + ", ".join(f"{name}: {shape_text(part)}" for name, part in parts.items()) + "}"
+        case Array(element=element):
+            return f"array of {shape_text(element)}"
+        case OneOf(shapes=shapes):
+            return " or ".join(map(shape_text, shapes))
+    return str(shape)
+
+
+def _misfits(model: Model, type_: Type, shape: Shape, way: Way, path: str) -> Iterator[str]:
+    if shape is Leaf.ANYTHING:
+        return
+    if isinstance(shape, OneOf):
+        found = [tuple(_misfits(model, type_, item, way, path)) for item in shape.shapes]
+        if all(found):
+            yield from found[0]
+        return
+    match type_, shape:
+        case EnumType(name=name), _ if way is Way.TO_MODEL:
+            yield from _misfits(model, model.enum(name).source, shape, way, path)
+        case ObjectType(name=name), Fields(parts=parts):
+            for item in model.object(name).properties:
+                place = f"{path}.{item.name}" if path else item.name
+                if item.name in parts:
+                    yield from _misfits(model, item.type, parts[item.name], way, place)
+                else:
+                    yield f"has no field '{place}'; there is {', '.join(parts)}"
+        case ArrayType(element=element), Array(element=inner):
+            yield from _misfits(model, element, inner, way, f"{path}[]")
+        case _ if not _is_same(type_, shape, way):
+            place = f"'{path}' is {shape_text(shape)}" if path else f"the data is {shape_text(shape)}"
+            yield f"{place}, not {_text(model, type_)}"
+
+
+def _is_same(type_: Type, shape: Shape, way: Way) -> bool:
+    match type_:
+        case BooleanType():
+            return shape is Leaf.BOOLEAN
+        case IntegerType():
+            return shape is Leaf.NUMBER and way is Way.TO_ROBOT
+        case DoubleType():
+            return shape is Leaf.NUMBER
+        case StringType():
+            return shape is Leaf.TEXT
+        case NoneType():
+            return shape is Leaf.NOTHING
+    return False
+
+
+def _text(model: Model, type_: Type) -> str:
+    if isinstance(type_, ObjectType):
+        return "{" + ", ".join(item.name for item in model.object(type_.name).properties) + "}"
+    return "nothing" if isinstance(type_, NoneType) else type_text(type_)

@@ -1,0 +1,187 @@
+"""What a configuration says: frozen structures that checks, JSON schema and documentation are made from."""
+
+import json
+from typing import Annotated, Any, Literal
+
+import msgspec
+from msgspec import Meta, Struct
+
+from robosc_bridge.configuration.channels import Channel
+from robosc_bridge.skills.settings import EmergencyStopSettings, LineSettings, RotateSettings
+
+_Text = Annotated[str, Meta(min_length=1, max_length=4096)]
+_Name = Annotated[str, Meta(min_length=1, max_length=255)]
+# Where a text ends: Python's `$` takes a line feed after it, and JSON Schema's expressions know no `\Z`.
+_OptionName = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_]{0,39}(?![\s\S])", title="baud or watchdog_s")]
+_Address = Annotated[
+    str, Meta(pattern=r"^(\[[0-9a-fA-F:.]{2,45}\]|[A-Za-z0-9._-]{1,253}):[0-9]{1,5}(?![\s\S])", title="HOST:PORT")
+]
+_Option = bool | int | float | str
+
+
+class _Section(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What all sections have."""
+
+
+class Drive(_Section, frozen=True):
+    """The drive base."""
+
+    driver: Annotated[_Name, Meta(description="`opencr`, `dynamixel`, `mavlink-rover`, or one of a plug-in.")]
+    port: Annotated[_Text, Meta(description="Serial port, best by a stable name below /dev/serial/by-id.")]
+    options: Annotated[
+        dict[_OptionName, _Option | tuple[_Option, ...]], Meta(description="Further arguments of the driver.")
+    ] = {}
+
+
+class Scanner(_Section, frozen=True):
+    """The LiDAR."""
+
+    driver: Annotated[_Name, Meta(description="`lds01`, `lds02`, `lds03`, or one of a plug-in.")]
+    port: Annotated[_Text, Meta(description="Serial port, best by a stable name below /dev/serial/by-id.")]
+    options: Annotated[
+        dict[_OptionName, _Option | tuple[_Option, ...]], Meta(description="Further arguments of the driver.")
+    ] = {}
+
+
+class Execution(_Section, frozen=True):
+    """How the supervisor is executed."""
+
+    period_s: Annotated[float, Meta(ge=0.001, le=10, description="Time between decisions, in seconds.")] = 0.02
+    every: Annotated[
+        Literal["period", "event"], Meta(description="When to decide: each period, or after each message as well.")
+    ] = "period"
+    policy: Annotated[
+        Literal["fair", "priority", "random"], Meta(description="Which request is issued where several may be.")
+    ] = "fair"
+    priority: Annotated[
+        tuple[_Name, ...], Meta(description="Communications, most urgent first, for the policy `priority`.")
+    ] = ()
+    seed: Annotated[int, Meta(ge=0, le=2**31 - 1, description="Seed of the policy `random`.")] = 0
+    release_identifiers: Annotated[
+        tuple[_Text, ...] | None,
+        Meta(description="Identifiers whose last message keeps acting; null: all that are tied to the drive."),
+    ] = None
+    max_age_s: Annotated[
+        dict[_Text, Annotated[float, Meta(gt=0, le=86400)]],
+        Meta(description="By identifier, the seconds after which what the model was told is stale."),
+    ] = {}
+    service_timeout_s: Annotated[
+        Annotated[float, Meta(gt=0, le=86400)] | None,
+        Meta(description="Seconds until a call without an answer has failed; null: never."),
+    ] = 10.0
+    action_timeout_s: Annotated[
+        Annotated[float, Meta(gt=0, le=86400)] | None,
+        Meta(description="Seconds until a goal without a result has failed; null: never."),
+    ] = None
+    on_unknown: Annotated[
+        Literal["default", "keep", "fault"],
+        Meta(description="What happens when data leaves an enum unknown: its default, the value before, or a fault."),
+    ] = "default"
+    command_timeout_s: Annotated[
+        float,
+        Meta(ge=0, le=86400, description="As a layer, seconds of silence after which the last request ends; 0: never."),
+    ] = 1.0
+
+
+class Safety(_Section, frozen=True):
+    """Limits and times of the safety layer; whatever the supervisor asks for stays within them."""
+
+    linear_m_s: Annotated[
+        Annotated[float, Meta(gt=0, le=5)] | None,
+        Meta(description="Fastest forward and backward, in m/s; null: what the drive can do."),
+    ] = None
+    angular_rad_s: Annotated[
+        Annotated[float, Meta(gt=0, le=20)] | None,
+        Meta(description="Fastest turn, in rad/s; null: what the drive can do."),
+    ] = None
+    linear_acceleration_m_s2: Annotated[
+        float, Meta(gt=0, le=50, description="Largest change of speed, in m/s²; stopping for safety ignores it.")
+    ] = 1.0
+    angular_acceleration_rad_s2: Annotated[
+        float, Meta(gt=0, le=200, description="Largest change of the turn rate, in rad/s²; the same holds.")
+    ] = 6.0
+    command_timeout_s: Annotated[
+        float, Meta(ge=0.02, le=10, description="Seconds without a command after which the wheels stop.")
+    ] = 0.5
+    scan_timeout_s: Annotated[
+        float, Meta(ge=0.05, le=10, description="Seconds without a full turn of the LiDAR after which they stop.")
+    ] = 0.6
+    motor_timeout_s: Annotated[
+        float, Meta(ge=0.02, le=10, description="Seconds without an answer of the drive after which it has failed.")
+    ] = 0.2
+    overrun_s: Annotated[
+        float, Meta(ge=0.005, le=10, description="Seconds by which a decision may be late before the wheels stop.")
+    ] = 0.1
+    battery_warning_v: Annotated[float, Meta(ge=0, le=100, description="Voltage below which somebody is warned.")] = (
+        11.5
+    )
+    battery_stop_v: Annotated[float, Meta(ge=0, le=100, description="Voltage below which the robot stops.")] = 11.1
+    operator_link_timeout_s: Annotated[
+        Annotated[float, Meta(ge=0.1, le=3600)] | None,
+        Meta(description="Seconds without the operator after which the robot stops; null: it needs none."),
+    ] = None
+
+
+class Skills(_Section, frozen=True):
+    """Settings of the skills."""
+
+    rotate: Annotated[RotateSettings, Meta(description="Turning by an angle.")] = RotateSettings()
+    line: Annotated[LineSettings, Meta(description="Seeing a line on the floor.")] = LineSettings()
+    emergency_stop: Annotated[EmergencyStopSettings, Meta(description="The operator's stop.")] = EmergencyStopSettings()
+
+
+class Remote(_Section, frozen=True):
+    """How the bridge is reached and watched."""
+
+    grpc_address: Annotated[
+        _Address | None,
+        Meta(description="HOST:PORT to listen on, such as 127.0.0.1:50061; null: none."),
+    ] = None
+    mavlink_url: Annotated[
+        _Text | None,
+        Meta(description="Where the ground station is, such as udpout:192.168.1.2:14550; null: none."),
+    ] = None
+
+
+class SupervisorSource(_Section, frozen=True):
+    """Where the supervisor comes from, besides the file on the command line."""
+
+    server: Annotated[
+        _Address | None,
+        Meta(description="HOST:PORT of the synthesis server; null: none is asked."),
+    ] = None
+
+
+class Log(_Section, frozen=True):
+    """What is written down."""
+
+    folder: Annotated[_Text | None, Meta(description="Folder for logs; null: only the terminal.")] = None
+
+
+class Configuration(_Section, frozen=True):
+    """A robot and what the communications of a model are tied to."""
+
+    robot: Annotated[Literal["burger", "waffle", "waffle_pi"], Meta(description="The TurtleBot3.")]
+    drive: Annotated[Drive, Meta(description="The drive base.")]
+    scanner: Annotated[Scanner | None, Meta(description="The LiDAR; null: there is none.")] = None
+    execution: Annotated[Execution, Meta(description="How the supervisor is executed.")] = Execution()
+    safety: Annotated[Safety, Meta(description="Limits of the safety layer.")] = Safety()
+    skills: Annotated[Skills, Meta(description="Settings of the skills.")] = Skills()
+    remote: Annotated[Remote, Meta(description="How the bridge is reached and watched.")] = Remote()
+    supervisor: Annotated[SupervisorSource, Meta(description="Where the supervisor comes from.")] = SupervisorSource()
+    log: Annotated[Log, Meta(description="What is written down.")] = Log()
+    channels: Annotated[
+        dict[_Text, Channel],
+        Meta(description="By identifier (or name) of each communication of the model, what it is tied to."),
+    ] = {}
+
+
+def schema() -> dict[str, Any]:
+    """The JSON schema of a configuration, for editors and other programs; schema.json beside this file holds it."""
+    made: dict[str, Any] = msgspec.to_builtins(msgspec.json.schema(Configuration))
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "RoboSC bridge", **made}
+
+
+def schema_text() -> str:
+    """The same as it is written into a file."""
+    return json.dumps(schema(), indent=2, sort_keys=True, ensure_ascii=False) + "\n"

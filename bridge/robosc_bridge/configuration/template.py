@@ -1,0 +1,176 @@
+"""A first configuration for a robot and a model: what is plain is tied, the rest is left to be filled in."""
+
+import json
+from collections.abc import Iterator
+from textwrap import wrap
+from typing import Literal
+
+import msgspec
+
+from robosc.expressions import type_text
+from robosc.model.structure import Communication, CommunicationKind, Model
+from robosc_bridge.configuration import channels as kinds
+from robosc_bridge.configuration.channels import CHANNELS, Channel, channel_name
+from robosc_bridge.configuration.reference import default_of, struct_of, summary
+from robosc_bridge.configuration.structure import Configuration, Safety, Scanner
+from robosc_bridge.configuration.ties import PANEL, why_not
+
+Robot = Literal["burger", "waffle", "waffle_pi"]
+DriveDriver = Literal["opencr", "dynamixel"]
+ScannerDriver = Literal["lds01", "lds02", "lds03"]
+
+PORTS: dict[str, str] = {
+    "opencr": "/dev/ttyACM0",
+    "dynamixel": "/dev/ttyUSB1",
+    "lds01": "/dev/ttyUSB0",
+    "lds02": "/dev/ttyUSB0",
+    "lds03": "/dev/ttyUSB0",
+}
+"""Where a device most often is; the LiDAR's adapter is the first of its kind."""
+
+SCAN_TIMEOUTS_S: dict[str, float] = {"lds01": 0.6, "lds02": 0.5, "lds03": 0.3}
+"""Three turns of each LiDAR."""
+
+_WIDTH = 110
+_IN, _OUT = CommunicationKind.INCOMING_MESSAGE, CommunicationKind.OUTGOING_MESSAGE
+_SKILLS = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
+
+
+def init(robot: Robot, drive: DriveDriver, scanner: ScannerDriver, model: Model) -> str:
+    """The text of a configuration, with every setting and what it means.
+
+    What cannot be guessed stands there without a value: such a file cannot be loaded, and the error lists it.
+
+    Args:
+        robot: The TurtleBot3.
+        drive: How its wheels are reached.
+        scanner: Its LiDAR.
+        model: Whose communications are to be tied.
+    """
+    lines = [
+        f"# Configuration of the RoboSC bridge for {model.name}. All settings are shown.",
+        "",
+        f"robot: {robot}",
+        "",
+        *_device("drive", drive),
+        *_device("scanner", scanner),
+        *_sections(scanner),
+        "# What each communication of the model is tied to.",
+        *_channels(model, drive),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def obvious_channel(model: Model, communication: Communication, drive: str) -> Channel | None:
+    """What a communication is meant for, by its identifier and the data that it has; None: it is not plain."""
+    for words, used, channel in _guesses(communication):
+        is_meant = communication.kind in used and _last_words(communication.identifier) in words
+        if is_meant and not why_not(model, communication, type(channel)):
+            needs_panel = isinstance(channel, kinds.ButtonChannel | kinds.BumperChannel | kinds.ImuChannel)
+            return None if needs_panel and drive != "opencr" else channel
+    return None
+
+
+def _last_words(identifier: str) -> str:
+    """The part of an identifier that tells what it is for, without the robot's name before it."""
+    parts = [part for part in identifier.split("/") if part]
+    pair = "/".join(parts[-2:])
+    return pair if parts[-2:-1] in (["line"], ["emergency_stop"]) else "".join(parts[-1:])
+
+
+def _guesses(item: Communication) -> Iterator[tuple[set[str], tuple[CommunicationKind, ...], Channel]]:
+    unit: Literal["degrees", "radians"] = (
+        "degrees" if item.request is not None and type_text(item.request).startswith("integer") else "radians"
+    )
+    yield {"cmd_vel"}, (_IN,), kinds.DriveChannel()
+    yield {"rotate", "rotate_left"}, (_IN, *_SKILLS), kinds.RotateChannel(unit=unit, direction="left")
+    yield {"rotate_right"}, (_IN, *_SKILLS), kinds.RotateChannel(unit=unit, direction="right")
+    yield {"rotate_done", "rotated"}, (_OUT,), kinds.RotatedChannel()
+    yield {"rotate_failed"}, (_OUT,), kinds.RotatedChannel(outcome="failed")
+    yield {"scan"}, (_OUT,), kinds.ScannerChannel()
+    yield {"odom", "odometry"}, (_OUT,), kinds.OdometryChannel()
+    yield {"imu"}, (_OUT,), kinds.ImuChannel()
+    yield {"battery", "battery_state"}, (_OUT,), kinds.BatteryChannel()
+    yield {"bumper"}, (_OUT,), kinds.BumperChannel()
+    is_event = item.response is not None and type_text(item.response) == "none"
+    for name in PANEL[:2]:
+        words = {name, "button"} if name == PANEL[0] else {name}
+        yield words, (_OUT,), kinds.ButtonChannel(name=name, on="press" if is_event else "change")
+    yield {"line/correction"}, (_OUT,), kinds.LineChannel()
+    yield {"line/lost"}, (_OUT,), kinds.LineLostChannel()
+    yield {"emergency_stop/stop"}, (_OUT,), kinds.EmergencyStopChannel(event="stop")
+    yield {"emergency_stop/resume"}, (_OUT,), kinds.EmergencyStopChannel(event="resume")
+
+
+def _device(section: str, driver: str) -> list[str]:
+    return [
+        f"{section}:",
+        f"  driver: {driver}",
+        "  # Best a stable name below /dev/serial/by-id.",
+        f"  port: {PORTS[driver]}",
+        "",
+    ]
+
+
+def _settings(section: type[msgspec.Struct], given: dict[str, float], depth: int = 1) -> Iterator[str]:
+    """Every setting of a section with what it means and its default, or what is given."""
+    indent = "  " * depth
+    for field in msgspec.structs.fields(section):
+        for line in wrap(summary(field.type), _WIDTH - len(indent)):
+            yield f"{indent}# {line}"
+        inner = struct_of(field.type)
+        if inner is None:
+            yield f"{indent}{field.name}: {json.dumps(given.get(field.name, default_of(field)))}"
+        else:
+            yield f"{indent}{field.name}:"
+            yield from _settings(inner, {}, depth + 1)
+
+
+def _sections(scanner: str) -> Iterator[str]:
+    """The sections that have defaults; what the LiDAR decides stands in the one on safety."""
+    for field in msgspec.structs.fields(Configuration):
+        section = struct_of(field.type)
+        if section is not None and not field.required and section is not Scanner:
+            given = {"scan_timeout_s": SCAN_TIMEOUTS_S[scanner]} if section is Safety else {}
+            yield from wrap(summary(field.type), _WIDTH, initial_indent="# ", subsequent_indent="# ")
+            yield f"{field.name}:"
+            yield from _settings(section, given)
+            yield ""
+
+
+def _channels(model: Model, drive: str) -> Iterator[str]:
+    yield "channels:" if model.communications else "channels: {}"
+    by_identifier: dict[str, list[Communication]] = {}
+    for item in model.communications:
+        by_identifier.setdefault(item.identifier, []).append(item)
+    for identifier, items in by_identifier.items():
+        found = [obvious_channel(model, item, drive) for item in items]
+        if all(channel == found[0] for channel in found):
+            yield from _entry(model, identifier, items, found[0])
+        else:
+            for item, channel in zip(items, found, strict=True):
+                yield from _entry(model, item.name, [item], channel)
+
+
+def _entry(model: Model, key: str, items: list[Communication], channel: Channel | None) -> Iterator[str]:
+    for item in items:
+        yield f"  # {item.component}.{item.name}: {item.kind}"
+    if channel is not None:
+        yield f"  {quoted(key)}: {_flow(channel)}"
+        return
+    possible = [channel_name(kind) for kind in CHANNELS if not any(why_not(model, item, kind) for item in items)]
+    yield f"  # To be filled in: {{channel: NAME}} with one of {', '.join(possible)}."
+    yield f"  {quoted(key)}:"
+
+
+def quoted(text: str) -> str:
+    """A text as YAML in double quotes, on one line and printable whatever is in it."""
+    return "".join(
+        item if item.isprintable() else f"\\U{ord(item):08x}" for item in json.dumps(text, ensure_ascii=False)
+    )
+
+
+def _flow(channel: Channel) -> str:
+    """A channel on one line, with all that it can be told."""
+    values = msgspec.to_builtins(channel)
+    return "{" + ", ".join(f"{name}: {value}" for name, value in values.items()) + "}"

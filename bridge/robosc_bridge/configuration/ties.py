@@ -1,0 +1,226 @@
+"""Which channel each communication of a model is tied to, checked as a whole before anything starts."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+import msgspec
+
+from robosc.execution.settings import Settings, settings_from
+from robosc.expressions import Constant, Expression, Type
+from robosc.model.structure import Communication, CommunicationKind, Model, ObjectValue, ProvidedValue
+from robosc_bridge.configuration.channels import (
+    CHANNELS,
+    BumperChannel,
+    ButtonChannel,
+    Channel,
+    ChannelInfo,
+    DriveChannel,
+    FaultChannel,
+    ImuChannel,
+    ScannerChannel,
+    channel_name,
+)
+from robosc_bridge.configuration.document import Document
+from robosc_bridge.configuration.problems import ConfigurationError, Path, Problem, hint
+from robosc_bridge.configuration.shapes import Shape, Way, misfits
+from robosc_bridge.configuration.structure import Configuration, Execution
+
+PANEL = ("button_1", "button_2", "bumper_1", "bumper_2")
+"""Buttons of an OpenCR board: the bumpers are the one in front and the one behind."""
+
+BUTTONS: dict[str, tuple[str, ...]] = {"opencr": PANEL, "dynamixel": (), "mavlink-rover": ()}
+"""Of the built-in drivers of drive bases; what those of others have, only they know."""
+
+_WITHOUT_IMU = ("dynamixel",)
+
+
+@dataclass(frozen=True, slots=True)
+class Ties:
+    """What each communication of a model is tied to.
+
+    Attributes:
+        channels: By name of communication, all of the model, in its order.
+        communications: The same communications.
+    """
+
+    channels: Mapping[str, Channel]
+    communications: tuple[Communication, ...]
+
+    def tied_to(self, channel: type[Channel]) -> tuple[tuple[Communication, Channel], ...]:
+        """The communications that are tied to channels of a kind, in the order of the model."""
+        found = ((item, self.channels[item.name]) for item in self.communications)
+        return tuple((item, tied) for item, tied in found if isinstance(tied, channel))
+
+    def settings(self, execution: Execution) -> Settings:
+        """Settings of the executor; what is tied to the drive keeps acting until it is released, unless told else."""
+        given = msgspec.structs.asdict(execution)
+        if execution.release_identifiers is None:
+            acting = (item.identifier for item, _ in self.tied_to(DriveChannel))
+            given["release_identifiers"] = tuple(dict.fromkeys(acting))
+        return settings_from(given)
+
+
+def tie(model: Model, configuration: Configuration, document: Document | None = None) -> Ties:
+    """Tie every communication of a model.
+
+    Args:
+        model: A checked model.
+        configuration: Its `channels` name identifiers, or single communications.
+        document: That the configuration was read from, for the lines in messages.
+
+    Raises:
+        ConfigurationError: A communication is not tied, or twice, or to a channel that cannot serve it or that the
+            robot does not have; or something is tied that the model does not have. Lists all of it.
+    """
+    found = _Tying(model, configuration)
+    problems = [
+        Problem(message, path, None if document is None else document.line(path)) for path, message in found.problems()
+    ]
+    if problems:
+        raise ConfigurationError("configuration" if document is None else document.name, problems)
+    return Ties(found.channels, model.communications)
+
+
+def why_not(model: Model, communication: Communication, channel: type[Channel]) -> tuple[str, ...]:
+    """Why a communication cannot be tied to channels of a kind; empty: it can."""
+    info = CHANNELS[channel]
+    use = info.uses.get(communication.kind)
+    if use is None:
+        kinds = " or ".join(f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}" for kind in info.uses)
+        return (f"it is for {kinds}",)
+    parts: tuple[tuple[str, Type | None, Shape, Way], ...] = (
+        ("request", communication.request, use.request, Way.TO_ROBOT),
+        ("response", communication.response, use.response, Way.TO_MODEL),
+        ("feedback", communication.feedback, use.feedback, Way.TO_MODEL),
+    )
+    is_message = communication.kind in (CommunicationKind.INCOMING_MESSAGE, CommunicationKind.OUTGOING_MESSAGE)
+    found = [
+        reason if is_message else f"{name}: {reason}"
+        for name, type_, shape, way in parts
+        if type_ is not None
+        for reason in misfits(model, type_, shape, way)
+    ]
+    return (*found, *_unheeded(model, communication, info))
+
+
+def _unheeded(model: Model, communication: Communication, info: ChannelInfo) -> Iterator[str]:
+    """Parts that the model gives and the channel does not go by."""
+    if info.heeded:
+        given = (
+            path
+            for provide in model.provides_for(communication.name)
+            for path, value in _parts(provide.value, ())
+            if not (isinstance(value, Constant) and value.value == 0)
+        )
+        for path in dict.fromkeys(given):
+            if path not in info.heeded:
+                yield f"the model gives '{path}', which it does not go by; it goes by {', '.join(sorted(info.heeded))}"
+
+
+def _parts(value: ProvidedValue, path: tuple[str, ...]) -> Iterator[tuple[str, Expression]]:
+    if isinstance(value, ObjectValue):
+        for name, part in value.properties:
+            yield from _parts(part, (*path, name))
+    else:
+        yield ".".join(path), value
+
+
+class _Tying:
+    def __init__(self, model: Model, configuration: Configuration) -> None:
+        self._model = model
+        self._configuration = configuration
+        self.channels: dict[str, Channel] = {}
+
+    def problems(self) -> list[tuple[Path, str]]:
+        """All that is wrong; fills `channels`."""
+        by_communication: dict[str, list[str]] = {item.name: [] for item in self._model.communications}
+        found: list[tuple[Path, str]] = []
+        for key in self._configuration.channels:
+            meant = self._meant(key)
+            if not meant:
+                found.append((("channels", key), f"the model has no such communication; {hint(key, self._known())}"))
+            for item in meant:
+                by_communication[item.name].append(key)
+        for item in self._model.communications:
+            found.extend(self._tied(item, by_communication[item.name]))
+        found.extend(self._divided())
+        found.extend(self._missing_devices())
+        found.extend(self._unknown_names())
+        return found
+
+    def _meant(self, key: str) -> tuple[Communication, ...]:
+        items = self._model.communications
+        return tuple(item for item in items if item.identifier == key) or tuple(
+            item for item in items if item.name == key
+        )
+
+    def _known(self) -> Iterable[str]:
+        return {item.identifier for item in self._model.communications}
+
+    def _tied(self, item: Communication, keys: list[str]) -> Iterator[tuple[Path, str]]:
+        text = f"{item.kind} '{item.name}' ('{item.identifier}')"
+        if not keys:
+            yield ("channels",), f"{text} is tied to nothing"
+            return
+        for key in keys[1:]:
+            yield ("channels", key), f"{text} is tied here again; it is by '{keys[0]}' already"
+        channel = self.channels[item.name] = self._configuration.channels[keys[0]]
+        for reason in why_not(self._model, item, type(channel)):
+            yield ("channels", keys[0]), f"{text} cannot be tied to '{channel_name(channel)}': {reason}"
+
+    def _divided(self) -> Iterator[tuple[Path, str]]:
+        """Messages that are told on one identifier reach all who listen there: one channel only."""
+        first: dict[str, str] = {}
+        for item in self._model.communications:
+            if item.kind is CommunicationKind.OUTGOING_MESSAGE and item.name in self.channels:
+                other = first.setdefault(item.identifier, item.name)
+                if self.channels[other] != self.channels[item.name]:
+                    text = f"'{other}' and '{item.name}' share the identifier '{item.identifier}' and need one channel"
+                    yield ("channels",), text
+
+    def _missing_devices(self) -> Iterator[tuple[Path, str]]:
+        configuration = self._configuration
+        driver = configuration.drive.driver
+        for key, channel in configuration.channels.items():
+            path = ("channels", key)
+            is_scanner = isinstance(channel, ScannerChannel)
+            if is_scanner or (isinstance(channel, FaultChannel) and channel.device == "scanner"):
+                if configuration.scanner is None:
+                    yield path, "there is no scanner: the section 'scanner' is missing"
+            elif isinstance(channel, ImuChannel) and driver in _WITHOUT_IMU:
+                yield path, f"the drive '{driver}' measures no accelerations and turn rates"
+            elif isinstance(channel, BumperChannel) and not BUTTONS.get(driver, PANEL):
+                yield path, f"the drive '{driver}' has no bumpers"
+            elif isinstance(channel, ButtonChannel):
+                yield from self._missing_buttons((*path, "name"), (channel.name,))
+        stop = configuration.skills.emergency_stop
+        for name in ("stop_buttons", "resume_buttons"):
+            yield from self._missing_buttons(("skills", "emergency_stop", name), getattr(stop, name))
+
+    def _missing_buttons(self, path: Path, names: Iterable[str]) -> Iterator[tuple[Path, str]]:
+        driver = self._configuration.drive.driver
+        there = BUTTONS.get(driver)
+        for name in names:
+            if there is not None and name not in there:
+                yield path, f"the drive '{driver}' has no button '{name}'; {hint(name, there)}"
+
+    def _unknown_names(self) -> Iterator[tuple[Path, str]]:
+        """Settings of the executor that name what the model does not have."""
+        execution, items = self._configuration.execution, self._model.communications
+        told = CommunicationKind.OUTGOING_MESSAGE
+        requests = {item.name for item in items if item.kind is not told}
+        for place, name in enumerate(execution.priority):
+            if name not in requests:
+                yield (
+                    ("execution", "priority", place),
+                    f"'{name}' is not a request of the model; {hint(name, requests)}",
+                )
+        received = {item.identifier for item in items if item.kind is told}
+        for name in execution.max_age_s:
+            if name not in received:
+                yield ("execution", "max_age_s", name), f"the model is told nothing there; {hint(name, received)}"
+        sent = {item.identifier for item in items if item.kind is CommunicationKind.INCOMING_MESSAGE}
+        for place, name in enumerate(execution.release_identifiers or ()):
+            if name not in sent:
+                path = ("execution", "release_identifiers", place)
+                yield path, f"the model sends nothing on '{name}'; {hint(name, sent)}"

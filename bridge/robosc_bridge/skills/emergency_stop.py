@@ -1,0 +1,72 @@
+"""The operator's stop and resume: from buttons, keys and remote calls to two events.
+
+Stopping always wins and needs a level; going on needs an edge: a button that is pressed anew while nothing stops.
+"""
+
+from collections.abc import Collection
+from enum import StrEnum
+
+from robosc_bridge.skills.settings import EmergencyStopSettings
+
+
+class StopEvent(StrEnum):
+    """What the operator did."""
+
+    STOP = "stop"
+    RESUME = "resume"
+
+
+class EmergencyStop:
+    """Whether the operator has stopped the robot.
+
+    Attributes:
+        is_stopped: Since a stop, until the operator lets it go on.
+
+    Args:
+        settings: Which keys and buttons stop, and which let it go on.
+    """
+
+    def __init__(self, settings: EmergencyStopSettings) -> None:
+        self.is_stopped = False
+        self._settings = settings
+        self._stopping: frozenset[str] = frozenset()
+        # Held until shown otherwise: a button that jams before the start lets nothing go on.
+        self._resuming = frozenset(settings.resume_buttons)
+
+    def update(
+        self,
+        held_buttons: Collection[str] | None = None,
+        keys: Collection[str] = (),
+        remote: StopEvent | None = None,
+    ) -> StopEvent | None:
+        """What the model is told now.
+
+        Args:
+            held_buttons: Names of the drive's buttons that are pressed; None: unknown, they count as they were.
+            keys: Keys that were typed since the last call.
+            remote: What came over the network since the last call, the stop if both did.
+
+        Returns:
+            A stop at each new press, also of who has stopped already: it may have been missed. A resume once, when a
+            stop ends.
+        """
+        settings = self._settings
+        stopping, resuming = self._stopping, self._resuming
+        if held_buttons is not None:
+            stopping = frozenset(settings.stop_buttons).intersection(held_buttons)
+            resuming = frozenset(settings.resume_buttons).intersection(held_buttons)
+        is_typed = any(key in settings.stop_keys for key in keys) or remote is StopEvent.STOP
+        is_pressed = is_typed or bool(stopping - self._stopping)
+        is_resumed = (
+            bool(resuming - self._resuming)
+            or any(key in settings.resume_keys for key in keys)
+            or remote is StopEvent.RESUME
+        )
+        self._stopping, self._resuming = stopping, resuming
+        if is_pressed:
+            self.is_stopped = True
+            return StopEvent.STOP
+        if self.is_stopped and is_resumed and not stopping:
+            self.is_stopped = False
+            return StopEvent.RESUME
+        return None

@@ -1,0 +1,110 @@
+"""Finds a line on the floor in pictures of a camera, and tells how to steer along it. Needs OpenCV and numpy."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from robosc_bridge.skills.settings import LineSettings
+
+Picture = NDArray[np.uint8]
+"""Rows of pixels from above: shades of grey, or blue, green and red."""
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """What a picture shows.
+
+    Attributes:
+        correction_rad_s: How to turn to keep on it, counter-clockwise above zero; None: no line is in sight.
+    """
+
+    correction_rad_s: float | None
+
+
+LOST = Line(None)
+
+
+class LineDetector:
+    """Turns pictures into corrections, and silence of the camera into a lost line.
+
+    Args:
+        settings: What counts as a line, and how to steer.
+        time_s: Now.
+    """
+
+    def __init__(self, settings: LineSettings, time_s: float) -> None:
+        self._settings = settings
+        self._seen_s = time_s
+
+    def update(self, picture: Picture | None, time_s: float) -> Line | None:
+        """What the model is told now; None: nothing new.
+
+        Args:
+            picture: That came since the last call; None: there was none.
+            time_s: Now.
+        """
+        if picture is not None:
+            self._seen_s = time_s
+            aside = line_offset(picture, self._settings)
+            return LOST if aside is None else Line(self._correction_rad_s(aside))
+        if time_s - self._seen_s < self._settings.timeout_s:
+            return None
+        # Told again after as long: a model that starts anew learns of it.
+        self._seen_s = time_s
+        return LOST
+
+    def _correction_rad_s(self, aside: float) -> float:
+        limit = self._settings.limit_rad_s
+        return max(-limit, min(limit, self._settings.gain_rad_s * aside))
+
+
+def line_offset(picture: Picture, settings: LineSettings) -> float | None:
+    """How far the line is to the left of the middle, as a share of the width: within -0.5 and 0.5; None: there is none.
+
+    The line is the largest connected patch of its shade within the rows that are looked at, unless it is too small or
+    too large; what counts is its centre of mass.
+
+    Args:
+        picture: Of any size; an empty one, or one that is no picture, shows no line.
+        settings: What counts as a line.
+    """
+    grey = _grey(picture)
+    if grey is None:
+        return None
+    height, width = int(grey.shape[0]), int(grey.shape[1])
+    first = min(int(height * settings.top), height - 1)
+    # At least one row, however small the picture.
+    rows = grey[first : max(first + 1, round(height * settings.bottom))]
+    is_line = rows <= settings.threshold if settings.shade == "dark" else rows > settings.threshold
+    largest = _largest_patch(is_line)
+    if largest is None:
+        return None
+    area, middle = largest
+    if not settings.smallest <= area / rows.size <= settings.largest:
+        return None
+    return 0.5 - (middle + 0.5) / width
+
+
+def _grey(picture: Picture) -> NDArray[Any] | None:
+    if picture.size == 0 or picture.dtype != np.uint8:
+        return None
+    match picture.shape:
+        case (_, _):
+            return picture
+        case (_, _, 1):
+            return picture[:, :, 0]
+        case (_, _, 3):
+            return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))
+    return None
+
+
+def _largest_patch(mask: NDArray[np.bool_]) -> tuple[int, float] | None:
+    """Area and middle column of the largest patch, the pixels of which touch at edges or corners."""
+    count, _, figures, middles = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
+    if count < 2:  # The first one is all that is not line.
+        return None
+    best = 1 + int(figures[1:, cv2.CC_STAT_AREA].argmax())
+    return int(figures[best, cv2.CC_STAT_AREA]), float(middles[best][0])

@@ -1,0 +1,72 @@
+"""Settings of the skills: numbers with units, ranges and what they mean, which the configuration and its page share."""
+
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct
+
+Words = tuple[Annotated[str, Meta(min_length=1, max_length=40)], ...]
+
+
+class RotateSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How the robot turns by an angle."""
+
+    speed_rad_s: Annotated[float, Meta(ge=0.05, le=10, description="Fastest turn, in rad/s.")] = 0.8
+    slowest_rad_s: Annotated[
+        float, Meta(ge=0.01, le=1, description="Slowest turn, in rad/s: below it, wheels may stand still.")
+    ] = 0.08
+    braking_rad_s2: Annotated[
+        float, Meta(ge=0.05, le=50, description="How it slows down towards the end, in rad/s².")
+    ] = 1.5
+    gain_per_s: Annotated[
+        float,
+        Meta(ge=0.1, le=10, description="Speed for what remains, in rad/s per rad; less for slower lines."),
+    ] = 2.0
+    tolerance_rad: Annotated[
+        float, Meta(ge=0.002, le=0.8, description="By how much a finished turn may be off, in rad.")
+    ] = 0.02
+    settle_s: Annotated[
+        float, Meta(ge=0, le=5, description="How long it must stay within the tolerance to be done, in seconds.")
+    ] = 0.3
+    patience_s: Annotated[
+        float,
+        Meta(ge=1, le=60, description="Seconds beyond twice the time at full speed after which a turn has failed."),
+    ] = 5.0
+
+
+class LineSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How a line on the floor is seen."""
+
+    camera: Annotated[
+        str,
+        Meta(min_length=1, max_length=4096, description="Video device, such as /dev/video0; or `simulated`."),
+    ] = "/dev/video0"
+    shade: Annotated[
+        Literal["dark", "light"], Meta(description="Whether the line is darker or lighter than the floor.")
+    ] = "dark"
+    threshold: Annotated[
+        float, Meta(ge=0, le=255, description="Shade that parts line from floor: 0 is black, 255 white.")
+    ] = 100.0
+    top: Annotated[
+        float, Meta(ge=0, le=1, description="Where the rows that are looked at begin, as a share of the height.")
+    ] = 0.6
+    bottom: Annotated[float, Meta(ge=0, le=1, description="Where they end.")] = 1.0
+    smallest: Annotated[
+        float, Meta(ge=0, le=1, description="Smallest share of the pixels in these rows that is a line.")
+    ] = 0.005
+    largest: Annotated[float, Meta(ge=0, le=1, description="Largest share; a dark picture shows no line.")] = 0.6
+    gain_rad_s: Annotated[
+        float, Meta(ge=0, le=100, description="Correction per picture width by which the line is off, in rad/s.")
+    ] = 2.0
+    limit_rad_s: Annotated[float, Meta(ge=0, le=10, description="Largest correction, in rad/s.")] = 1.0
+    timeout_s: Annotated[
+        float, Meta(ge=0.05, le=60, description="Seconds without a picture after which the line is lost.")
+    ] = 0.5
+
+
+class EmergencyStopSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What the operator stops the robot with, and lets it go on with."""
+
+    stop_keys: Annotated[Words, Meta(description="Keys that stop: single characters, or `space`.")] = ("space",)
+    resume_keys: Annotated[Words, Meta(description="Keys that let it go on.")] = ("r",)
+    stop_buttons: Annotated[Words, Meta(description="Buttons of the drive that stop.")] = ()
+    resume_buttons: Annotated[Words, Meta(description="Buttons of the drive that let it go on.")] = ()

@@ -152,17 +152,15 @@ def scene() -> Scene:
 
 
 def test_nothing_moves_before_all_devices_are_there(scene: Scene) -> None:
-    scene.live(1.0)
-    assert scene.daemon.state is State.STARTING
-    scene.daemon.post(DeviceUp(Device.DRIVE))
-    scene.live(1.0)
-    assert (scene.daemon.state, scene.torque) == (State.STARTING, False)
-    scene.daemon.post(DeviceUp(Device.SCANNER))
-    scene.live(0.2)
-    assert scene.daemon.state is State.STARTING
+    states: list[tuple[State, bool]] = []
+    for came in (None, DeviceUp(Device.DRIVE), DeviceUp(Device.SCANNER)):
+        if came is not None:
+            scene.daemon.post(came)
+        scene.live(0.5)
+        states.append((scene.daemon.state, scene.torque))
+    assert states == [(State.STARTING, False)] * 3
     scene.live(1.0, 2.0)
-    assert scene.daemon.state is State.RUNNING
-    assert scene.out == Velocity(0.1, 0.0)
+    assert (scene.daemon.state, scene.out) == (State.RUNNING, Velocity(0.1, 0.0))
 
 
 def test_in_standby_it_waits_with_torque_off_until_somebody_says_start() -> None:

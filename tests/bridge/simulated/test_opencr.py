@@ -5,10 +5,11 @@ import struct
 from collections.abc import Iterator
 
 import pytest
-from dynamixel_sdk import PacketHandler, PortHandler
+from dynamixel_sdk import PacketHandler
 
 from robosc.execution.clock import ManualClock
 from robosc_bridge.simulated import OpenCr, SimulatedTurtleBot3, Walls
+from support.wire import sdk_port
 
 OPEN_SPACE = Walls(())
 
@@ -20,8 +21,7 @@ class Station:
         assert robot.opencr is not None
         self.robot = robot
         self.opencr: OpenCr = robot.opencr
-        self.port = PortHandler(robot.base_path)
-        assert self.port.openPort()
+        self.port = sdk_port(robot.base_path)
         self.handler = PacketHandler(2.0)
         self.beats = 0
 

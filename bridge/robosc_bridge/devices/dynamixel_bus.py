@@ -226,8 +226,10 @@ class DynamixelBus:
                 self.counters.unanswered += 1
                 break
             if status.device in devices and status.device not in found and _fits(status, length):
-                found[status.device] = status
                 self._unsettled.discard(status.device)
+                if status.number == DAMAGED_REQUEST:
+                    break
+                found[status.device] = status
             else:
                 self.counters.foreign += 1
         return found

@@ -202,13 +202,15 @@ def test_a_wrong_voltage_is_told_and_stops_nothing(bench: Rig) -> None:
 
 
 def test_an_overloaded_motor_is_restarted_when_told_to_and_has_not_jumped(bench: Rig) -> None:
-    bench.robot.left.set_position(123_456)
+    bench.robot.left.set_position(4096 + 1000)
     bench.start()
     bench.drive(FORWARD, 0.3)
     bench.robot.left.overload()
     bench.drive_until(lambda reading: MotorFault.OVERLOAD in reading.faults, FORWARD)
     bench.drive(seconds=0.3)
     bench.tap.packets.clear()
+    # As far as a wheel could have turned meanwhile.
+    time.sleep(1.0)
     bench.base.reset()
     assert bench.tap.packets.count(REBOOT) == 1
     reading = bench.drive(FORWARD, 0.1)
@@ -316,6 +318,34 @@ def test_a_motor_that_restarts_in_motion_has_not_jumped_and_stops_both(turns: in
         bench.base.reset()
         bench.base.set_torque(True)
         assert bench.drive(FORWARD, 0.2).velocity.linear_m_s == pytest.approx(0.15, abs=0.001)
+
+
+def test_a_motor_that_was_away_for_long_has_not_jumped(bench: Rig) -> None:
+    bench.robot.left.set_position(4096 + 1000)
+    bench.start()
+    bench.drive(seconds=0.1)
+    bench.hurry()
+    bench.robot.left.brown_out(0.0)
+    with pytest.raises(DeviceSilentError):
+        bench.drive(seconds=1.0)
+    # As far as a wheel could have turned meanwhile.
+    time.sleep(1.2)
+    bench.robot.left.brown_out(12.0)
+    time.sleep(0.4)
+    reading = bench.drive()
+    assert MotorFault.TORQUE_LOST in reading.faults
+    assert (reading.pose.x_m, reading.pose.heading_rad) == (0.0, 0.0)
+
+
+def test_a_jump_without_any_silence_is_looked_into_before_the_next_command(bench: Rig) -> None:
+    bench.robot.left.set_position(50_000)
+    bench.start()
+    bench.drive(Velocity(0.02), 0.2)
+    bench.robot.left._boot()
+    faults = [bench.base.exchange(Velocity(0.02)).faults for _ in range(2)]
+    assert MotorFault.TORQUE_LOST in faults[1]
+    assert bench.goals_rad_s() == (0.0, 0.0)
+    assert bench.base.exchange(Velocity()).pose.x_m == pytest.approx(bench.robot.world.pose[0], abs=0.002)
 
 
 def test_a_restart_while_nothing_is_asked_is_noticed_before_the_wheels_are_commanded(bench: Rig) -> None:

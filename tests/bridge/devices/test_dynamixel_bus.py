@@ -1,5 +1,6 @@
 """Requests and answers over a real pseudo-terminal, and every way in which an answer can be wrong."""
 
+import itertools
 import resource
 import threading
 import time
@@ -155,6 +156,28 @@ def test_all_requests_of_a_cycle_end_with_it() -> None:
         assert 1.4 * LIMIT_S < time.monotonic() - begin_s < 3 * LIMIT_S
 
 
+def test_a_synchronised_read_that_came_damaged_is_made_again() -> None:
+    reads = iter((status(1, b"", 3), status(1, b"a") + status(2, b"b")))
+
+    def answer(request: bytes) -> Answers:
+        return [next(reads)] if request[7] == 0x82 else [_memory(request)]
+
+    with Peer(answer) as peer, _bus(peer) as bus:
+        found = bus.sync_read(64, 1, (1, 2))
+        assert [found[device].data for device in (1, 2)] == [b"a", b"b"]
+        assert bus.counters.repeated == 1
+
+
+def test_a_clock_that_is_set_back_prolongs_no_wait(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(time, "time", itertools.count(1e9, -1.0).__next__)
+    with Peer(lambda request: []) as peer, _bus(peer) as bus:
+        bus.begin(1.0, repeats=0)
+        begin_s = time.monotonic()
+        with pytest.raises(DeviceSilentError):
+            bus.ping(1)
+        assert time.monotonic() - begin_s < 3 * LIMIT_S
+
+
 def test_waiting_costs_nothing() -> None:
     with Peer(lambda request: []) as peer, _bus(peer, 0.5) as bus:
         bus.begin(0.5, repeats=0)
@@ -191,6 +214,13 @@ def test_a_late_answer_is_not_taken_for_that_to_the_next_request() -> None:
             bus.read(1, 132, 4)
         assert bus.read(1, 132, 4).data == bytes((132, 133, 134, 135))
         assert bus.counters.foreign == 1
+
+
+def test_an_answer_that_comes_twice_is_not_taken_for_that_to_the_next_request() -> None:
+    with Peer(_Scripted([status(1, b"good"), 0.01, status(1, b"good")])) as peer, _bus(peer) as bus:
+        assert bus.read(1, 132, 4).data == b"good"
+        time.sleep(0.05)
+        assert bus.read(1, 132, 4).data == bytes((132, 133, 134, 135))
 
 
 def test_a_late_answer_to_a_write_confirms_no_other_write() -> None:

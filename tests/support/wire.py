@@ -6,6 +6,7 @@ from types import TracebackType
 from typing import Self
 
 import serial
+from dynamixel_sdk import PortHandler
 
 
 class Host:
@@ -55,6 +56,20 @@ class Host:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def set_speed(port: PortHandler, baud: int) -> None:
+    """Open the SDK's port anew at a speed."""
+    assert port.setBaudRate(baud)
+    # As it comes it spins while it waits, and a simulator in the same process starves.
+    port.ser.timeout = 0.005
+
+
+def sdk_port(path: str, baud: int = 1_000_000) -> PortHandler:
+    """A port of dynamixel-sdk, open."""
+    port = PortHandler(path)
+    set_speed(port, baud)
+    return port
 
 
 def wait_until(is_so: Callable[[], bool], limit_s: float = 5.0) -> None:

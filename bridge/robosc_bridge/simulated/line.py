@@ -261,7 +261,7 @@ class SimulatedLine:
             self._send(self.device.receive(self._heard_through(data), self._host_baud()))
 
     def _catch_up(self) -> None:
-        """Hear what has come, then live until now: time is about to pass, or has passed."""
+        """Hear what has come, and live until now: time has passed."""
         with self._time.lock:
             if self._master >= 0:
                 self._hear()
@@ -290,8 +290,6 @@ class SimulatedLine:
                 continue
             faults = self.faults
             due_s = time.monotonic() + sending.after_s + faults.delay_s
-            if self._wire:
-                due_s = max(due_s, self._wire[-1][0])
             if faults.split_s is None:
                 self._wire.append((due_s, data))
             else:
@@ -327,6 +325,7 @@ class SimulatedLine:
         return int.from_bytes(fcntl.ioctl(self._slave, termios.FIONREAD, bytes(4)), sys.byteorder)
 
     def _flush(self) -> None:
+        """Pass on what is due; nothing overtakes what came before it."""
         now_s = time.monotonic()
         while self._wire and self._wire[0][0] <= now_s:
             _, data = self._wire.popleft()

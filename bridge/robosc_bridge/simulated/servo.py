@@ -333,8 +333,8 @@ class Servo:
 
     def _position(self) -> int:
         turned = math.floor(self._wheel.angle_rad / (2 * math.pi) * TICKS)
-        position = self._base_ticks + self._sign() * turned
-        return (position + 2**31) % 2**32 - 2**31
+        # Unbounded: the register wraps.
+        return self._base_ticks + self._sign() * turned
 
     def _fall_into_one_turn(self) -> None:
         offset = self.table["homing offset"]

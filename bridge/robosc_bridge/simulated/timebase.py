@@ -60,7 +60,7 @@ class Timebase:
     def advance(self, seconds: float) -> None:
         """Let time pass in small steps; when it returns, all devices have lived it.
 
-        Each hears first what its host has written; what the kernel has not passed on by then counts as written later.
+        What its host has written just before, a device hears in the first of them.
 
         Raises:
             TypeError: The clock moves by itself.
@@ -70,15 +70,11 @@ class Timebase:
             raise TypeError("this clock moves by itself")
         if seconds < 0:
             raise ValueError("time does not go back")
-        self._all_live()
         end_s = self.clock.now_s + seconds
         while (left_s := end_s - self.clock.now_s) > 1e-12:
             with self.lock:
                 self.clock.advance(min(left_s, _STEP_S))
-            self._all_live()
-
-    def _all_live(self) -> None:
-        with self.lock:
-            members = tuple(self._members)
-        for live in members:
-            live()
+                members = tuple(self._members)
+            # Outside the lock of the devices: each takes what it needs, in its own order.
+            for live in members:
+                live()

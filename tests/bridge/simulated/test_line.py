@@ -40,6 +40,15 @@ def test_an_answer_can_be_late(robot: SimulatedTurtleBot3, host: Host) -> None:
     assert 0.14 < time.monotonic() - began_s < 2.0
 
 
+def test_a_late_answer_keeps_its_turn(robot: SimulatedTurtleBot3, host: Host) -> None:
+    robot.base_faults.delay_s = 0.1
+    host.send(PING)
+    wait_until(lambda: robot.base_line.received == 10)
+    robot.base_faults.clear()
+    host.send("ff ff fd 00 fe 03 00 01 31 42")
+    assert [host.packet()[4] for _ in range(3)] == [1, 1, 2]
+
+
 def test_answers_can_be_lost(robot: SimulatedTurtleBot3, host: Host) -> None:
     robot.base_faults.drop_next = 2
     for _ in range(2):

@@ -5,10 +5,11 @@ import struct
 from collections.abc import Iterator
 
 import pytest
-from dynamixel_sdk import PacketHandler, PortHandler
+from dynamixel_sdk import PacketHandler
 
 from robosc.execution.clock import ManualClock
 from robosc_bridge.simulated import OpenCr, SimulatedTurtleBot3, Walls
+from support.wire import sdk_port
 
 OPEN_SPACE = Walls(())
 
@@ -20,8 +21,7 @@ class Station:
         assert robot.opencr is not None
         self.robot = robot
         self.opencr: OpenCr = robot.opencr
-        self.port = PortHandler(robot.base_path)
-        assert self.port.openPort()
+        self.port = sdk_port(robot.base_path)
         self.handler = PacketHandler(2.0)
         self.beats = 0
 
@@ -114,6 +114,16 @@ def test_it_stops_half_a_second_after_the_last_heartbeat(station: Station) -> No
     assert station.wheels() == (126, 126)
 
 
+def test_after_a_change_of_state_the_half_second_begins_anew(station: Station) -> None:
+    station.robot.advance(0.1)
+    station.beat()
+    # One comparison is skipped, in the cycle after it.
+    station.robot.advance(0.51)
+    assert station.opencr.is_connected
+    station.robot.advance(0.05)
+    assert not station.opencr.is_connected
+
+
 def test_the_last_command_holds_for_ever(station: Station) -> None:
     station.live(0.2)
     station.command(5)
@@ -150,12 +160,14 @@ def test_linear_and_angular_are_clamped_apart_and_each_wheel_at_337(waffle: Stat
     # The left one stands: both clamps are the same speed of a wheel.
     # What 77 rpm at 12 V allow is 336 raw.
     assert waffle.wheels() == (0, 336)
+    assert [servo.table["goal velocity"] for servo in (waffle.robot.left, waffle.robot.right)] == [0, 337]
 
 
 def test_what_is_not_registered_reads_as_zero(station: Station) -> None:
     assert station.read(8, "B") == 0
     # A part of an item is none.
     assert station.read(1, "B") == 0
+    assert station.read(42, "H") == 0
     data, result, error = station.handler.readTxRx(station.port, 200, 300, 100)
     assert (bytes(data), result, error) == (bytes(100), 0, 0)
 

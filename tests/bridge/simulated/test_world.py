@@ -5,7 +5,7 @@ from collections import deque
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robosc.execution.clock import ManualClock, SystemClock
@@ -46,6 +46,7 @@ def slow_range(walls: Walls, x: float, y: float, angle: float) -> float:
     return best
 
 
+@settings(deadline=None)
 @given(SEGMENTS, SIZES, SIZES, st.floats(-7, 7))
 def test_rays_agree_with_a_slow_twin(segments: list[tuple[float, float, float, float]], x: float, y: float,
                                      angle: float) -> None:  # fmt: skip
@@ -57,6 +58,7 @@ def test_rays_agree_with_a_slow_twin(segments: list[tuple[float, float, float, f
     assert any(found == pytest.approx(value, rel=1e-3, abs=1e-3) for value in (expected, *ends))
 
 
+@settings(deadline=None)
 @given(SEGMENTS, SIZES, SIZES)
 def test_no_point_of_a_wall_is_nearer_than_told(
     segments: list[tuple[float, float, float, float]], x: float, y: float
@@ -105,6 +107,15 @@ def test_an_arc_comes_back_to_where_it_began() -> None:
     drive(world, 2.0, 4.0, 2 * math.pi / 0.4125)
     assert world.pose[:2] == pytest.approx(start[:2], abs=0.002)
     assert world.pose[2] - start[2] == pytest.approx(2 * math.pi, abs=0.01)
+
+
+def test_a_quarter_of_an_arc() -> None:
+    world = world_of(Walls(()))
+    drive(world, 2.0, 4.0, 0.5)
+    world.place(0.0, 0.0, 0.0)
+    # 0.4125 rad/s: in whole steps of the world.
+    drive(world, 2.0, 4.0, 3.805)
+    assert world.pose == pytest.approx((0.24, 0.24, math.pi / 2), abs=0.002)
 
 
 def test_a_waffle_turns_slower() -> None:
@@ -162,6 +173,7 @@ def test_only_a_manual_clock_is_advanced() -> None:
         Timebase(ManualClock()).advance(-1.0)
 
 
+@settings(deadline=None)
 @given(st.integers(1, 6), st.integers(1, 6), st.integers(0, 50))
 def test_in_a_maze_there_is_one_way_between_any_two_cells(columns: int, rows: int, seed: int) -> None:
     walls = maze(columns, rows, 1.0, seed)

@@ -243,6 +243,35 @@ def test_a_late_refusal_refuses_no_other_request() -> None:
         assert bus.read(1, 132, 4).data == bytes((132, 133, 134, 135))
 
 
+def test_a_line_that_is_always_late_never_seems_to_answer() -> None:
+    # It answers everything, in order, half a second late.
+    delayed: list[tuple[float, bytes]] = []
+    ended = threading.Event()
+
+    def send() -> None:
+        while not ended.wait(0.002):
+            while delayed and delayed[0][0] <= time.monotonic():
+                peer.send(delayed.pop(0)[1])
+
+    def keep(request: bytes) -> Answers:
+        delayed.append((time.monotonic() + 0.5, _memory(request)))
+        return []
+
+    with Peer(keep) as peer, _bus(peer, 0.03) as bus:
+        thread = threading.Thread(target=send)
+        thread.start()
+        try:
+            end_s = time.monotonic() + 1.5
+            while time.monotonic() < end_s:
+                bus.begin(0.1)
+                with pytest.raises(DeviceSilentError):
+                    bus.read(1, 132, 4)
+        finally:
+            ended.set()
+            thread.join()
+        assert bus.counters.foreign > 5
+
+
 def test_late_answers_of_a_synchronised_read_are_not_taken_for_the_next() -> None:
     def both(data: bytes) -> bytes:
         return status(1, data) + status(2, data)

@@ -157,7 +157,7 @@ def test_all_requests_of_a_cycle_end_with_it() -> None:
 
 
 def test_a_synchronised_read_that_came_damaged_is_made_again() -> None:
-    reads = iter((status(1, b"", 3), status(1, b"a") + status(2, b"b")))
+    reads = iter((status(1, b"", 3) + status(2, b"", 3), status(1, b"a") + status(2, b"b")))
 
     def answer(request: bytes) -> Answers:
         return [next(reads)] if request[7] == 0x82 else [_memory(request)]

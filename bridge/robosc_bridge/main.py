@@ -50,7 +50,6 @@ def _parser() -> argparse.ArgumentParser:
     _configuration_argument(run)
     run.add_argument("--server", metavar="HOST:PORT", help="a synthesis server that makes the supervisor of the model")
     run.add_argument("--keep", metavar="FOLDER", type=Path, help="folder for what the server made last")
-    run.add_argument("--standby", action="store_true", help="do not move before somebody says so")
     run.add_argument("--verbose", action="store_true", help="tell more")
     run.set_defaults(run=_run)
 
@@ -144,7 +143,7 @@ def _run(arguments: argparse.Namespace) -> int:
     if configuration.log.folder is not None:
         log = open_event_log(configuration.log.folder, supervisor.model.name, time.time())
     try:
-        machine = assemble(configuration, ties, supervisor, log, starts_itself=not arguments.standby)
+        machine = assemble(configuration, ties, supervisor, log, starts_itself=True)
         for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
             signal.signal(number, lambda *_: machine.quit())
         have_ended = machine.run()

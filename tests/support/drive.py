@@ -74,12 +74,16 @@ class Rig:
         self.base.open()
         self.base.set_torque(True)
 
-    def hurry(self) -> None:
-        """From now on, time-outs as on a robot."""
+    def hurry(self, answer_limit_s: float = ANSWER_LIMIT_S) -> None:
+        """From now on, time-outs as on a robot, or as given."""
         bus = self.base._bus
         assert bus is not None
-        bus._port.answer_limit_s = ANSWER_LIMIT_S
-        self.base._exchange_limit_s = exchange_limit_s(ANSWER_LIMIT_S)
+        bus._port.answer_limit_s = answer_limit_s
+        self.base._exchange_limit_s = exchange_limit_s(answer_limit_s)
+
+    def take_time(self) -> None:
+        """From now on, time-outs that a busy machine does not meet."""
+        self.hurry(PATIENT_S)
 
     def drive(self, velocity: Velocity = STANDSTILL, seconds: float = 0.0) -> DriveReading:
         """Exchange for so long; the last reading."""

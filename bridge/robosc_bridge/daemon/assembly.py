@@ -7,6 +7,7 @@ from robosc.execution.clock import SystemClock
 from robosc.execution.event_log import EventLog
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
+from robosc_bridge.configuration.channels import Channel, GrpcChannel, LineChannel, LineLostChannel, channel_name
 from robosc_bridge.configuration.structure import Configuration, Scanner
 from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.device_thread import DeviceThread
@@ -26,6 +27,7 @@ RESTART_S = 3.0
 """After so long without a full turn a LiDAR's motor is restarted, as its official driver does."""
 
 _THREAD_LIMIT_S = 5.0
+_NOT_SERVED: tuple[type[Channel], ...] = (GrpcChannel, LineChannel, LineLostChannel)
 
 
 class AssemblyError(BridgeError):
@@ -119,6 +121,19 @@ class Machine:
         self.daemon.post(Command.QUIT)
 
 
+def _require_served(configuration: Configuration, ties: Ties) -> None:
+    """What is asked for must be there; all that is not is listed."""
+    missing = [
+        f"'{item.name}' ('{item.identifier}') is tied to '{channel_name(kind)}'"
+        for kind in _NOT_SERVED
+        for item, _ in ties.tied_to(kind)
+    ]
+    remote = configuration.remote
+    missing += [f"'remote.{name}'" for name in ("grpc_address", "mavlink_url") if getattr(remote, name) is not None]
+    if missing:
+        raise AssemblyError(f"not served by this version of the bridge: {'; '.join(missing)}")
+
+
 def assemble(
     configuration: Configuration, ties: Ties, supervisor: Supervisor, log: EventLog, *, starts_itself: bool
 ) -> Machine:
@@ -130,6 +145,7 @@ def assemble(
     """
     if supervisor.deployment is not Deployment.CONTROLLER:
         raise AssemblyError("the supervisor is for a supervision layer; the bridge runs controllers")
+    _require_served(configuration, ties)
     clock = SystemClock()
     safety = SafetyLayer(safety_limits(configuration))
     job = Job(

@@ -12,10 +12,13 @@ from typing import Protocol
 from robosc_bridge.daemon.backoff import Backoff
 from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone
 from robosc_bridge.devices.interface import DriveBase, DriveReading, RangeScanner, Velocity
-from robosc_bridge.errors import BridgeError
+from robosc_bridge.errors import BridgeError, DeviceSilentError
 
 _LISTEN_S = 0.2
 """How long a scanner is listened to at once."""
+
+SILENT_LIMIT = 3
+"""So many exchanges in a row without an answer, and the drive base counts as lost; fewer are noise on the line."""
 
 _log = logging.getLogger(__name__)
 
@@ -95,6 +98,7 @@ class DriveWorker:
         self._is_open = False
         self._has_torque = False
         self._is_reset_wanted = False
+        self._silent = 0
         self._due_s = 0.0
 
     def reset(self) -> None:
@@ -108,6 +112,12 @@ class DriveWorker:
                 self._exchange(now_s)
             else:
                 self._open(now_s)
+        except DeviceSilentError as error:
+            self._silent += 1
+            if not self._is_open or self._silent >= SILENT_LIMIT:
+                return self._failed(str(error))
+            self._gate.drive_failed()
+            return self._clock()
         except BridgeError as error:
             return self._failed(str(error))
         except Exception as error:  # Whatever breaks, the wheels stop: closing does that.
@@ -119,6 +129,7 @@ class DriveWorker:
         self._base.open()
         self._backoff.succeeded()
         self._is_open, self._has_torque = True, False
+        self._silent = 0
         self._due_s = now_s
         self._report(DeviceUp(Device.DRIVE))
 
@@ -133,6 +144,7 @@ class DriveWorker:
             # That took a while: what was to be done then may be wrong now.
             command = self._gate.output(self._clock())
         reading = self._base.exchange(command.velocity)
+        self._silent = 0
         self._gate.saw_drive(reading)
         self._report(reading)
         self._due_s += self._period_s

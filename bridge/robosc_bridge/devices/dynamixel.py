@@ -76,7 +76,7 @@ class DynamixelBase:
         self._answer_limit_s = answer_limit_s
         self._exchange_limit_s = exchange_limit_s(answer_limit_s)
         self._limits = robot.limits(robot.motor.velocity_limit_raw)
-        self._odometry = Odometry(robot.tick_m, robot.wheel_separation_m, self._limits.wheel_m_s)
+        self._odometry = Odometry(robot.tick_m, robot.wheel_separation_m)
         self._following = FollowingWatch(_FOLLOWING_S + ramp_s)
         self._line: SerialLine | None = None
         self._bus: DynamixelBus | None = None
@@ -233,12 +233,16 @@ class DynamixelBase:
                 goals = wheel_goals(velocity, self._limits, self._robot.wheel_separation_m, self._robot.raw_m_s)
             pair.command(goals)
             self._commanded_s = time.monotonic()
-        measured = pair.measure()
+        answers = pair.measure()
         time_s = bus.received_s
-        for motor, (_, is_alert) in zip(pair.motors, measured, strict=True):
+        for motor, (_, is_alert) in zip(pair.motors, answers, strict=True):
             self._look_at(pair, motor, is_alert)
+        measured = [measurement for measurement, _ in answers]
+        if any(self._odometry.jumps(*(one.ticks for one in measured))):
+            # Of its own motion, or of a restart.
+            self._check_torque(pair)
         self._check_by_turns(pair)
-        return self._reading(pair, [measurement for measurement, _ in measured], goals, time_s)
+        return self._reading(pair, measured, goals, time_s)
 
     def _has_paused(self) -> bool:
         return self._is_torque_wanted and time.monotonic() - self._commanded_s > self._watchdog * servo.WATCHDOG_S / 2
@@ -281,13 +285,8 @@ class DynamixelBase:
     def _reading(
         self, pair: ServoPair, measured: Sequence[Measurement], goals: tuple[int, int], time_s: float
     ) -> DriveReading:
-        signs = [settings.sign for settings in pair.settings.values()]
-        left, right = (sign * one.ticks for sign, one in zip(signs, measured, strict=True))
-        velocities_raw = [sign * one.velocity_raw for sign, one in zip(signs, measured, strict=True)]
-        before = self._odometry.rebases
-        self._odometry = self._odometry.advanced(left, right, time_s)
-        # Wheels do not jump: a motor has restarted, and is looked at before anything else is commanded.
-        self._is_doubtful = self._odometry.rebases > before
+        self._odometry = self._odometry.advanced(measured[0].ticks, measured[1].ticks)
+        velocities_raw = [one.velocity_raw for one in measured]
         faults = self._stops.union(*pair.hardware.values())
         if not self._is_torque_wanted or self._stops:
             self._following.forget()

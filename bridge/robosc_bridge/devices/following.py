@@ -16,20 +16,25 @@ class FollowingWatch:
     def __init__(self, limit_s: float = 0.7) -> None:
         self._limit_s = limit_s
         self._since_s: list[float | None] = []
+        self._time_s = 0.0
 
     def forget(self) -> None:
         """Begin anew: nothing is asked of the wheels."""
         self._since_s = []
 
     def is_blocked(self, goals_raw: Sequence[int], velocities_raw: Sequence[int], time_s: float) -> bool:
-        """Whether any wheel has been far from its goal for longer than the limit.
+        """Whether any wheel has been far from its goal in all readings of longer than the limit.
+
+        After a pause it begins anew: what the wheels did meanwhile is not known.
 
         Args:
             goals_raw: Of each wheel.
             velocities_raw: That each has.
             time_s: When they were read.
         """
-        self._since_s = self._since_s or [None] * len(goals_raw)
+        if not self._since_s or time_s - self._time_s > self._limit_s / 2:
+            self._since_s = [None] * len(goals_raw)
+        self._time_s = time_s
         for index, (goal, velocity) in enumerate(zip(goals_raw, velocities_raw, strict=True)):
             if abs(goal - velocity) <= max(_LEAST_RAW, _SHARE * abs(goal)):
                 self._since_s[index] = None

@@ -10,8 +10,6 @@ from dataclasses import dataclass, field, replace
 from robosc_bridge.devices.interface import Pose
 
 _MODULUS = 2**32
-# A wheel may be pushed faster than its motor turns it.
-_FASTER = 1.25
 # A restart moves the count by whole turns; half a turn takes the fastest wheel 0.4 s.
 _HALF_TURN = 2048
 
@@ -20,46 +18,38 @@ _HALF_TURN = 2048
 class Odometry:
     """An odometry after some readings; `advanced` gives the one after the next.
 
+    The encoders wrap around at 2**32, which is seen to, and fall back into one turn when their motor restarts. Whether
+    one has is not for the odometry to know: a jump is a reason to look, and `rebased` what follows from it.
+
     Attributes:
         tick_m: Way of a wheel in one tick.
         separation_m: Between the wheels.
-        fastest_m_s: Of a wheel.
         pose: Where the body is.
         ticks: Of the left and the right wheel in the last reading; None: the next one begins anew.
-        time_s: Of the last reading.
-        rebases: How often a wheel began anew, since it cannot have moved as far as its encoder says.
     """
 
     tick_m: float
     separation_m: float
-    fastest_m_s: float
     pose: Pose = field(default_factory=Pose)
     ticks: tuple[int | None, int | None] = (None, None)
-    time_s: float = 0.0
-    rebases: int = 0
 
-    def advanced(self, left: int, right: int, time_s: float) -> "Odometry":
+    def advanced(self, left: int, right: int) -> "Odometry":
         """The odometry after another reading.
-
-        The encoders wrap around at 2**32, and fall back into one turn when their motor restarts. Such a jump is no
-        motion: that wheel then counts from its new place on.
 
         Args:
             left: Ticks of the left wheel, signed or not.
             right: Of the right wheel.
-            time_s: When they were read.
         """
-        most = max(_HALF_TURN, int((time_s - self.time_s) * self.fastest_m_s * _FASTER / self.tick_m))
-        steps = [_step(before, now) for before, now in zip(self.ticks, (left, right), strict=True)]
-        jumps = sum(abs(step) > most for step in steps)
-        ways_m = [0.0 if abs(step) > most else step * self.tick_m for step in steps]
-        return replace(
-            self,
-            pose=_moved(self.pose, ways_m[0], ways_m[1], self.separation_m),
-            ticks=(left, right),
-            time_s=time_s,
-            rebases=self.rebases + jumps,
-        )
+        left_m, right_m = (step * self.tick_m for step in self._steps(left, right))
+        return replace(self, pose=_moved(self.pose, left_m, right_m, self.separation_m), ticks=(left, right))
+
+    def jumps(self, left: int, right: int) -> tuple[bool, bool]:
+        """Whether each wheel has gone so far since the last reading that its motor may have restarted instead."""
+        is_left, is_right = (abs(step) > _HALF_TURN for step in self._steps(left, right))
+        return is_left, is_right
+
+    def _steps(self, left: int, right: int) -> tuple[int, int]:
+        return _step(self.ticks[0], left), _step(self.ticks[1], right)
 
     def rebased(self, is_left: bool = True, is_right: bool = True) -> "Odometry":
         """The odometry whose next reading is no motion of these wheels."""

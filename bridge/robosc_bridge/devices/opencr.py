@@ -57,7 +57,7 @@ class OpenCrBase:
         self._exchange_limit_s = exchange_limit_s(answer_limit_s)
         self._line: SerialLine | None = None
         self._bus: DynamixelBus | None = None
-        self._odometry = Odometry(robot.tick_m, robot.wheel_separation_m, self.limits.wheel_m_s)
+        self._odometry = Odometry(robot.tick_m, robot.wheel_separation_m)
         self._following = FollowingWatch()
         self._heartbeat = 0
         self._uptime_ms: int | None = None
@@ -266,7 +266,10 @@ class OpenCrBase:
 
     def _reading(self, block: Block, faults: frozenset[MotorFault]) -> DriveReading:
         time_s = self._used_bus.received_s
-        self._odometry = self._odometry.advanced(*block.ticks, time_s)
+        if not block.is_torque_on:
+            # The firmware does not switch torque on again: only now a motor may have restarted.
+            self._odometry = self._odometry.rebased(*self._odometry.jumps(*block.ticks))
+        self._odometry = self._odometry.advanced(*block.ticks)
         left_m_s, right_m_s = (raw * self._robot.raw_m_s for raw in block.velocities_raw)
         # Below this, the board no longer refreshes the share.
         is_empty = block.battery_v < self._robot.battery.empty_v

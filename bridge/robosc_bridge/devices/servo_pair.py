@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 
 from robosc_bridge.devices.dynamixel_bus import DynamixelBus, RefusedError
 from robosc_bridge.devices.interface import MotorFault
@@ -147,14 +148,17 @@ class ServoPair:
             time.sleep(_POLL_S)
 
     def measure(self) -> list[tuple[Measurement, bool]]:
-        """What each measures, as the servo has it, and whether it tells of a hardware error.
+        """What each measures, positive forward, and whether it tells of a hardware error.
 
         Raises:
             LineError: The line is gone.
             DeviceError: One does not answer, or refuses it.
         """
         found = self._read_both(servo.MEASUREMENT_ADDRESS, servo.MEASUREMENT_LENGTH)
-        return [(decode_measurement(found[motor].data), found[motor].is_alert) for motor in self.motors]
+        return [
+            (_forward(decode_measurement(found[motor].data), settings.sign), found[motor].is_alert)
+            for motor, settings in self.settings.items()
+        ]
 
     def read_torque(self) -> tuple[bool, list[bool]]:
         """Whether both have torque, and whether each has restarted since this was asked last.
@@ -261,3 +265,13 @@ class ServoPair:
             if status.number:
                 raise RefusedError(f"{self._names[motor]} does not let {length} bytes at {address} be read", status)
         return found
+
+
+def _forward(measurement: Measurement, sign: int) -> Measurement:
+    """The same in the robot's direction."""
+    return replace(
+        measurement,
+        load=sign * measurement.load,
+        velocity_raw=sign * measurement.velocity_raw,
+        ticks=sign * measurement.ticks,
+    )

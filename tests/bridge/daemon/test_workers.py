@@ -7,7 +7,7 @@ import pytest
 
 from robosc_bridge.daemon.backoff import Backoff
 from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone
-from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
+from robosc_bridge.daemon.workers import SILENT_LIMIT, DriveWorker, ScannerWorker
 from robosc_bridge.devices.interface import (
     BINS,
     STANDSTILL,
@@ -181,7 +181,7 @@ def test_a_port_that_is_missing_is_tried_again_with_longer_pauses(scene: Scene) 
 
 
 @pytest.mark.parametrize(
-    "error", [LineLostError("/dev/x", "gone"), DeviceSilentError("no answer"), ZeroDivisionError("a bug")]
+    "error", [LineLostError("/dev/x", "gone"), DeviceFaultError("no motors"), ZeroDivisionError("a bug")]
 )
 def test_whatever_breaks_it_is_closed_and_opened_anew_with_torque_off(scene: Scene, error: Exception) -> None:
     scene.up()
@@ -201,6 +201,24 @@ def test_whatever_breaks_it_is_closed_and_opened_anew_with_torque_off(scene: Sce
     scene.up()
     scene.step()
     assert scene.taken() == [("torque", True), ("exchange", FORWARD)]
+
+
+def test_a_missing_answer_is_noise_and_three_in_a_row_are_a_loss(scene: Scene) -> None:
+    scene.up()
+    for _ in range(2):
+        scene.base.failing["exchange"] = DeviceSilentError("no answer")
+        for _ in range(SILENT_LIMIT - 1):
+            # At once again.
+            assert scene.step() == 0.0
+        del scene.base.failing["exchange"]
+        scene.step()
+    assert "close" not in scene.taken()
+    assert scene.gate.failures == 2 * (SILENT_LIMIT - 1)
+    scene.base.failing["exchange"] = DeviceSilentError("no answer")
+    for _ in range(SILENT_LIMIT - 1):
+        scene.step()
+    assert scene.step() == pytest.approx(0.5)
+    assert scene.taken()[-1] == "close"
 
 
 def test_motors_that_do_not_hold_are_a_failure(scene: Scene) -> None:

@@ -99,6 +99,19 @@ def test_the_odometry_goes_on_where_the_encoders_wrap_around(kind: str, position
         assert reading.pose.heading_rad == pytest.approx(bench.robot.world.pose[2], abs=0.005)
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_in_a_world_that_is_faster_no_motion_is_taken_for_a_restart(kind: str) -> None:
+    with rig(kind, factor=6.0) as bench:
+        bench.start()
+        for _ in range(5):
+            bench.drive(Velocity(0.0, 2.5))
+            time.sleep(0.1)
+        bench.drive_until(_is_at_rest)
+        reading = bench.drive(seconds=0.05)
+        assert bench.robot.world.pose[2] > 4.0
+        assert math.cos(reading.pose.heading_rad - bench.robot.world.pose[2]) == pytest.approx(1.0, abs=1e-3)
+
+
 def test_torque_off_is_after_a_stop_and_on_again_without_motion(bench: Rig) -> None:
     bench.start()
     bench.drive(FORWARD, 0.2)

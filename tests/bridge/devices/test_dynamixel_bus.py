@@ -1,5 +1,6 @@
 """Requests and answers over a real pseudo-terminal, and every way in which an answer can be wrong."""
 
+import itertools
 import resource
 import threading
 import time
@@ -155,6 +156,28 @@ def test_all_requests_of_a_cycle_end_with_it() -> None:
         assert 1.4 * LIMIT_S < time.monotonic() - begin_s < 3 * LIMIT_S
 
 
+def test_a_synchronised_read_that_came_damaged_is_made_again() -> None:
+    reads = iter((status(1, b"", 3) + status(2, b"", 3), status(1, b"a") + status(2, b"b")))
+
+    def answer(request: bytes) -> Answers:
+        return [next(reads)] if request[7] == 0x82 else [_memory(request)]
+
+    with Peer(answer) as peer, _bus(peer) as bus:
+        found = bus.sync_read(64, 1, (1, 2))
+        assert [found[device].data for device in (1, 2)] == [b"a", b"b"]
+        assert bus.counters.repeated == 1
+
+
+def test_a_clock_that_is_set_back_prolongs_no_wait(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(time, "time", itertools.count(1e9, -1.0).__next__)
+    with Peer(lambda request: []) as peer, _bus(peer) as bus:
+        bus.begin(1.0, repeats=0)
+        begin_s = time.monotonic()
+        with pytest.raises(DeviceSilentError):
+            bus.ping(1)
+        assert time.monotonic() - begin_s < 3 * LIMIT_S
+
+
 def test_waiting_costs_nothing() -> None:
     with Peer(lambda request: []) as peer, _bus(peer, 0.5) as bus:
         bus.begin(0.5, repeats=0)
@@ -193,6 +216,13 @@ def test_a_late_answer_is_not_taken_for_that_to_the_next_request() -> None:
         assert bus.counters.foreign == 1
 
 
+def test_an_answer_that_comes_twice_is_not_taken_for_that_to_the_next_request() -> None:
+    with Peer(_Scripted([status(1, b"good"), 0.01, status(1, b"good")])) as peer, _bus(peer) as bus:
+        assert bus.read(1, 132, 4).data == b"good"
+        time.sleep(0.05)
+        assert bus.read(1, 132, 4).data == bytes((132, 133, 134, 135))
+
+
 def test_a_late_answer_to_a_write_confirms_no_other_write() -> None:
     late: Answers = [1.5 * LIMIT_S, status(1)]
     with Peer(_Scripted(late, [])) as peer, _bus(peer) as bus:
@@ -211,6 +241,35 @@ def test_a_late_refusal_refuses_no_other_request() -> None:
         with pytest.raises(DeviceSilentError):
             bus.read(1, 132, 4)
         assert bus.read(1, 132, 4).data == bytes((132, 133, 134, 135))
+
+
+def test_a_line_that_is_always_late_never_seems_to_answer() -> None:
+    # It answers everything, in order, half a second late.
+    delayed: list[tuple[float, bytes]] = []
+    ended = threading.Event()
+
+    def send() -> None:
+        while not ended.wait(0.002):
+            while delayed and delayed[0][0] <= time.monotonic():
+                peer.send(delayed.pop(0)[1])
+
+    def keep(request: bytes) -> Answers:
+        delayed.append((time.monotonic() + 0.5, _memory(request)))
+        return []
+
+    with Peer(keep) as peer, _bus(peer, 0.03) as bus:
+        thread = threading.Thread(target=send)
+        thread.start()
+        try:
+            end_s = time.monotonic() + 1.5
+            while time.monotonic() < end_s:
+                bus.begin(0.1)
+                with pytest.raises(DeviceSilentError):
+                    bus.read(1, 132, 4)
+        finally:
+            ended.set()
+            thread.join()
+        assert bus.counters.foreign > 5
 
 
 def test_late_answers_of_a_synchronised_read_are_not_taken_for_the_next() -> None:

@@ -63,6 +63,9 @@ def test_both_wheels_are_slowed_alike(linear: float, angular: float, robot: Robo
 @example(0.205, 0.05, BURGER)
 @example(0.0, 2.84, BURGER)
 @example(0.0, -2.624, BURGER)
+@example(0.1936, 1.48116, BURGER)
+@example(-0.10511, -2.87106, BURGER)
+@example(-0.18282, 2.0846, BURGER)
 @example(0.26, 0.0, WAFFLE)
 @example(0.0, 1.82, WAFFLE)
 def test_opencr_makes_nothing_of_it_that_a_servo_refuses(linear: float, angular: float, robot: Robot) -> None:
@@ -74,6 +77,10 @@ def test_opencr_makes_nothing_of_it_that_a_servo_refuses(linear: float, angular:
     firmware_m_s = robot.firmware_rpm * 2 * math.pi / 60 * robot.wheel_radius_m
     assert abs(words[0]) <= firmware_m_s * 100
     assert abs(words[1]) <= firmware_m_s / (robot.wheel_separation_m / 2) * 100
+    # And it is the nearest of that.
+    found = within_limits(Velocity(linear, angular), limits, robot.wheel_separation_m)
+    assert abs(words[0] - found.linear_m_s * 100) <= 1.0 + 1e-6
+    assert abs(words[1] - found.angular_rad_s * 100) <= 1.0 + 1e-6
 
 
 @given(st.floats(-0.19, 0.19), st.floats(-0.2, 0.2))

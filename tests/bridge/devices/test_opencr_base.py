@@ -206,6 +206,39 @@ def test_what_is_no_sound_turtlebot_is_refused(
         assert all(request[7] in (1, 2) for request in peer.requests)
 
 
+def test_answers_to_an_earlier_session_are_not_taken_for_what_the_board_is() -> None:
+    answer = _answers(0x5000, 5, {2: b"\2", 18: b"\0", 148: b"\1"})
+    count = 0
+
+    def late(request: bytes) -> Answers:
+        nonlocal count
+        count += 1
+        # Behind the answer to the ping, what was asked before: a Burger.
+        return [*([status(200, b"\1\0\0\0")] if count == 2 else []), *answer(request)]  # type: ignore[operator]
+
+    with Peer(late) as peer:
+        base = OpenCrBase(peer.path, BURGER, answer_limit_s=PATIENT_S)
+        with pytest.raises(WrongDeviceError, match="another robot"):
+            base.open()
+
+
+def test_motors_that_restart_in_a_pause_have_not_jumped(bench: Rig) -> None:
+    for servo in (bench.robot.left, bench.robot.right):
+        servo.set_position(4096 + 1000)
+    bench.start()
+    bench.drive(seconds=0.1)
+    # They are pushed on unseen, so that falling back does not look as a jump.
+    for servo in (bench.robot.left, bench.robot.right):
+        servo.set_position(4096 + 1000 + 2500)
+    _board(bench).set_battery(4.0)
+    time.sleep(0.1)
+    _board(bench).set_battery(12.0)
+    time.sleep(0.5)
+    reading = bench.base.exchange(Velocity())
+    assert MotorFault.TORQUE_LOST in reading.faults
+    assert (reading.pose.x_m, reading.pose.heading_rad) == (0.0, 0.0)
+
+
 def test_torque_that_is_gone_is_a_fault_that_stays_until_torque_is_switched_on_anew(bench: Rig) -> None:
     bench.start()
     bench.drive(Velocity(0.1), 0.2)

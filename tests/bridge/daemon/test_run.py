@@ -1,0 +1,141 @@
+"""`robosc-bridge run` as a program, on a simulated TurtleBot3 at the other end of real serial lines."""
+
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from robosc_bridge.simulated import SimulatedTurtleBot3
+from support.models import EXAMPLES
+
+MODEL = EXAMPLES / "maze_solver" / "maze_solver.rscd"
+START_LIMIT_S, LIMIT_S = 90.0, 30.0
+
+
+def wait_until(condition: Callable[[], bool], what: str, process: subprocess.Popen[str], limit_s: float) -> None:
+    end_s = time.monotonic() + limit_s
+    while not condition():
+        assert process.poll() is None, process.communicate()[1]
+        assert time.monotonic() < end_s, f"waited {limit_s} s in vain for {what}"
+        time.sleep(0.01)
+
+
+def bridge(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "robosc_bridge.main", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def configured(folder: Path, robot: SimulatedTurtleBot3, base: str) -> Path:
+    """A configuration as `init` writes it, with the ports of a simulated robot."""
+    made = bridge("init", "--model", str(MODEL), "--drive", base, "--scanner", "lds01")
+    assert made.returncode == 0, made.stderr
+    ports = iter((robot.base_path, robot.scanner_path))
+    text = re.sub(r"^  port: .*$", lambda _: f"  port: {next(ports)}", made.stdout, flags=re.MULTILINE)
+    # A machine on which tests run is not one for robots.
+    text = re.sub(r"^  (overrun_s|motor_timeout_s|scan_timeout_s): .*$", r"  \1: 1.0", text, flags=re.MULTILINE)
+    file = folder / "bridge.yaml"
+    file.write_text(text)
+    return file
+
+
+@contextmanager
+def running(folder: Path, robot: SimulatedTurtleBot3, base: str) -> Iterator[subprocess.Popen[str]]:
+    """The bridge, until the robot has moved."""
+    configuration = configured(folder, robot, base)
+    command = [sys.executable, "-m", "robosc_bridge.main", "run", "--model", str(MODEL), "--config", str(configuration)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        start = robot.world.pose
+        wait_until(lambda: robot.world.pose != start, "the robot to move", process, START_LIMIT_S)
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def stands_still(robot: SimulatedTurtleBot3) -> bool:
+    return robot.left.table["present velocity"] == 0 == robot.right.table["present velocity"]
+
+
+@pytest.mark.parametrize("base", ["opencr", "dynamixel"])
+def test_the_maze_solver_drives_and_a_signal_ends_it_at_rest(base: str, tmp_path: Path) -> None:
+    with SimulatedTurtleBot3("burger", base, "lds01") as robot, running(tmp_path, robot, base) as process:
+        process.send_signal(signal.SIGTERM)
+        _, errors = process.communicate(timeout=LIMIT_S)
+        assert process.returncode == 0, errors
+        assert stands_still(robot)
+        assert robot.left.table["torque enable"] == robot.right.table["torque enable"] == 0
+        assert "Traceback" not in errors
+
+
+@pytest.mark.parametrize("base", ["opencr", "dynamixel"])
+def test_a_base_that_is_unplugged_is_one_clear_message_and_the_wheels_stop(base: str, tmp_path: Path) -> None:
+    with SimulatedTurtleBot3("burger", base, "lds01") as robot, running(tmp_path, robot, base) as process:
+        robot.base_line.disconnect()
+        _, errors = process.communicate(timeout=LIMIT_S)
+        assert process.returncode == 1, errors
+        assert "the drive base is lost" in errors
+        assert "Traceback" not in errors
+        end_s = time.monotonic() + LIMIT_S
+        while not stands_still(robot):
+            assert time.monotonic() < end_s, "the wheels still turn"
+            time.sleep(0.01)
+
+
+@pytest.mark.parametrize("base", ["opencr", "dynamixel"])
+def test_a_bridge_that_is_killed_leaves_wheels_that_stop(base: str, tmp_path: Path) -> None:
+    """The devices' own watchdogs are the last line."""
+    with SimulatedTurtleBot3("burger", base, "lds01") as robot, running(tmp_path, robot, base) as process:
+        process.kill()
+        process.wait()
+        end_s = time.monotonic() + LIMIT_S
+        while not stands_still(robot):
+            assert time.monotonic() < end_s, "the wheels still turn"
+            time.sleep(0.01)
+
+
+def test_what_is_not_tied_is_listed(tmp_path: Path) -> None:
+    file = tmp_path / "bridge.yaml"
+    file.write_text(
+        "robot: burger\ndrive: {driver: opencr, port: /dev/ttyACM0}\nchannels: {/cmd_vel: {channel: drive}}\n"
+    )
+    for command in ("check", "run"):
+        done = bridge(command, "--model", str(MODEL), "--config", str(file))
+        assert done.returncode == 2
+        for name in ("scan_front", "rotate_left", "rotate_right", "rotate_done"):
+            assert f"'{name}'" in done.stderr
+        assert "Traceback" not in done.stderr
+
+
+def test_what_is_not_served_is_refused(tmp_path: Path) -> None:
+    model = EXAMPLES / "line_follower" / "line_follower.rscd"
+    made = bridge("init", "--model", str(model))
+    file = tmp_path / "bridge.yaml"
+    file.write_text(made.stdout)
+    done = bridge("run", "--model", str(model), "--config", str(file))
+    assert done.returncode == 2
+    assert "not served by this version of the bridge: " in done.stderr
+    assert "is tied to 'line'" in done.stderr
+
+
+def test_drivers_are_listed_for_people_and_programs() -> None:
+    assert "opencr" in bridge("drivers").stdout
+    assert '"name": "lds03"' in bridge("drivers", "--json").stdout
+
+
+def test_the_schema_is_printed() -> None:
+    assert bridge("schema").stdout.startswith("{")
+
+
+def test_a_file_is_not_overwritten(tmp_path: Path) -> None:
+    file = tmp_path / "bridge.yaml"
+    assert bridge("init", "--model", str(MODEL), "-o", str(file)).returncode == 0
+    again = bridge("init", "--model", str(MODEL), "-o", str(file))
+    assert again.returncode == 2
+    assert "File exists" in again.stderr

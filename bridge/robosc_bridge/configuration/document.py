@@ -137,7 +137,7 @@ class _Builder:
             self.problems.append(Problem("aliases and anchors are not allowed; write it out", path, line))
         if isinstance(event, yaml.AliasEvent):
             return None
-        if event.tag is not None and event.tag != "!":
+        if event.tag is not None:
             self.problems.append(Problem("tags are not allowed", path, line))
         if isinstance(event, yaml.ScalarEvent):
             return self._scalar(event, path)

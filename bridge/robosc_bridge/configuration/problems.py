@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 
+from robosc.source import visible
 from robosc_bridge.errors import BridgeError
 
 Path = tuple[str | int, ...]
@@ -30,9 +31,10 @@ class Problem:
     line: int | None = None
 
     def text(self, file: str) -> str:
-        """The problem on one line, with the place that editors jump to."""
+        """The problem on one line, with the place that editors jump to; identifiers of a model may be any text."""
         place = file if self.line is None else f"{file}:{self.line}"
-        return f"{place}: {path_text(self.path)}: {self.message}" if self.path else f"{place}: {self.message}"
+        where = f"{path_text(self.path)}: " if self.path else ""
+        return visible(f"{place}: {where}{self.message}")
 
 
 class ConfigurationError(BridgeError):

@@ -52,6 +52,14 @@ def test_a_jammed_resume_button_lets_nothing_go_on() -> None:
     assert stop.is_stopped
 
 
+def test_a_resume_button_that_jammed_before_it_was_seen_lets_nothing_go_on() -> None:
+    stop = EmergencyStop(SETTINGS)
+    assert stop.update(None, ["space"]) is STOP
+    assert stop.update(["button_2"]) is None
+    assert stop.update([]) is None
+    assert stop.update(["button_2"]) is RESUME
+
+
 def test_unknown_buttons_are_as_they_were() -> None:
     stop = EmergencyStop(SETTINGS)
     assert stop.update(["button_1"]) is STOP

@@ -161,6 +161,22 @@ def test_only_a_stay_within_the_tolerance_ends_it() -> None:
     assert rotate.remaining_rad == pytest.approx(-0.01)
 
 
+def test_the_next_turn_settles_by_itself() -> None:
+    rotate = Rotate(USUAL)
+    for start_s in (0.0, 10.0):
+        assert rotate.start(0.01, start_s)
+        rotate.update(0.5, start_s)
+        assert rotate.is_turning
+        rotate.update(0.5, start_s + 0.31)
+        assert rotate.state is RotateState.DONE
+
+
+def test_it_is_never_so_slow_that_wheels_stand_still() -> None:
+    rotate = Rotate(RotateSettings(tolerance_rad=0.01, slowest_rad_s=0.1, gain_per_s=2.0))
+    rotate.start(0.02, 0.0)
+    assert rotate.update(0.0, 0.0).angular_rad_s == 0.1
+
+
 def test_a_blocked_body_fails_after_the_stated_time() -> None:
     rotate = Rotate(USUAL)
     taken_s = turn(rotate, Body(is_blocked=True), math.pi / 2)
@@ -210,6 +226,7 @@ def test_one_turn_at_a_time_and_another_one_afterwards() -> None:
     assert rotate.start(-1.0, 10.0)
     assert rotate.reason == ""
     assert rotate.update(2.0, 10.0).angular_rad_s < 0
+    assert rotate.remaining_rad == -1.0
     turned = Rotate(USUAL)
     turned.cancel("nothing is under way")
     assert turned.state is RotateState.IDLE

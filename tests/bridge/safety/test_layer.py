@@ -28,7 +28,9 @@ def test_every_call_may_be_the_first() -> None:
     layer.operator_stop()
     assert layer.reset() == (Reason.OPERATOR_STOP,)
     layer = Bench().layer
+    layer.command(Velocity(0.1), -1.0)
     first = layer.output(0.0)  # a clock may begin there
+    assert Reason.COMMAND_SILENT not in first.reasons
     assert Reason.CLOCK not in first.reasons
     assert first.warnings == ()
     layer = Bench().layer

@@ -11,7 +11,7 @@ READY := $(VENV)/.ready
 COLCON := .venv-colcon
 PROTO := proto/robosc_api/v1/synthesis.proto
 
-.PHONY: demo test lint format bindings lock benchmark environment colcon clean help
+.PHONY: demo test mutants lint format bindings lock benchmark environment colcon clean help
 
 help:
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -32,6 +32,18 @@ demo: $(READY) ## run the line follower from model to moving robot
 
 test: $(READY) ## run every test
 	$(BIN)/python -m pytest -n 2 --dist loadscope $(TESTS)
+
+# mutmut names what it changes by its path, so the packages must lie where it is started.
+MUTMUT := PYTHONPATH=$(CURDIR)/out/mutmut $(CURDIR)/$(BIN)/python -m mutmut
+
+mutants: $(READY) ## mutation tests of the bridge's safety layer
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade --target out/mutmut mutmut==3.8.1
+	rm -rf out/mutation
+	mkdir -p out/mutation/tests/bridge
+	cp -r bridge/robosc_bridge docs pyproject.toml out/mutation
+	cp -r tests/support out/mutation/tests
+	cp -r tests/bridge/safety out/mutation/tests/bridge
+	cd out/mutation && $(MUTMUT) run && $(MUTMUT) results
 
 lint: $(READY) ## formatter, linter, types, import contracts, bindings
 	$(BIN)/ruff format --check .

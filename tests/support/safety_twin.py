@@ -168,17 +168,20 @@ class SafetyTwin:
         return bool(switches) and switches[-1].name == "enable"
 
     def _command(self) -> Velocity:
-        """That counts: given after the last output that had a reason, and after the last change."""
+        """The last one, if it was given after an output without reasons, and none nor any change came since."""
+        is_found, velocity = False, STANDSTILL
         for each in reversed(self.past):
-            if each.name == "command":
-                numbers = (each.value.linear_m_s, each.value.angular_rad_s, each.time_s)
-                if not all(math.isfinite(number) for number in numbers):
-                    return STANDSTILL
-                return self._limited(*numbers[:2])
             if each.name in ("enable", "disable") or (each.name == "reset" and each.value):
                 return STANDSTILL
-            if each.name == "output" and each.reasons - {Reason.COMMAND_SILENT}:
-                return STANDSTILL
+            if each.name == "output":
+                if each.reasons - {Reason.COMMAND_SILENT}:
+                    return STANDSTILL
+                if is_found:
+                    return velocity
+            if each.name == "command" and not is_found:
+                is_found = True
+                numbers = (each.value.linear_m_s, each.value.angular_rad_s, each.time_s)
+                velocity = self._limited(*numbers[:2]) if all(map(math.isfinite, numbers)) else STANDSTILL
         return STANDSTILL
 
     def _is_held(self) -> bool:

@@ -6,6 +6,7 @@ the safety layer decides that alone.
 """
 
 import logging
+import math
 from collections.abc import Callable
 from typing import Protocol
 
@@ -21,6 +22,10 @@ SILENT_LIMIT = 3
 """So many exchanges in a row without an answer, and the drive base counts as lost; fewer are noise on the line."""
 
 _log = logging.getLogger(__name__)
+
+
+VALID_LIMIT = 8
+"""A turn with fewer valid ranges shows nothing: the LiDAR is covered, or something is too near."""
 
 
 class Command(Protocol):
@@ -231,7 +236,8 @@ class ScannerWorker:
         scan = self._scanner.receive(_LISTEN_S)
         if scan is not None:
             self._backoff.succeeded()
-            self._gate.saw_scan(scan.time_s)
+            if sum(not math.isnan(value) for value in scan.ranges_m) >= VALID_LIMIT:
+                self._gate.saw_scan(scan.time_s)
             self._report(scan)
             self._restart_at_s = scan.time_s + self._restart_after_s
         elif self._clock() >= self._restart_at_s:

@@ -37,7 +37,7 @@ class SafetyLayer:
     The thread of the drive base calls `output`, switches torque as it says, exchanges the velocity, and reports with
     `saw_drive` or `drive_failed`; the others may be called from any thread, also from a signal handler. All times are
     those of one monotonic clock, in seconds. Nothing raises, and nothing waits but for the lock, which is held for
-    some microseconds.
+    some 40 microseconds.
 
     A command counts only if it was given after an `output` without reasons, or ends the silence of commands: what was
     said before or during a stop never moves the robot afterwards. Motion begins with the ramp from standstill.

@@ -95,7 +95,7 @@ class WheelWatch:
             wheels_m_s: What they do.
             time_s: When that was measured.
         """
-        if all(self._follows(*pair) for pair in zip(goals_m_s, wheels_m_s, strict=True)):
+        if self._follows(goals_m_s[0], wheels_m_s[0]) and self._follows(goals_m_s[1], wheels_m_s[1]):
             self._since_s = None
             return False
         self._since_s = time_s if self._since_s is None else min(self._since_s, time_s)

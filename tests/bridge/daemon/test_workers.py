@@ -1,13 +1,14 @@
 """The devices' workers, step by step: what goes out, what is reported, and what follows a failure."""
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import pytest
 
 from robosc_bridge.daemon.backoff import Backoff
 from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone
-from robosc_bridge.daemon.workers import SILENT_LIMIT, DriveWorker, ScannerWorker
+from robosc_bridge.daemon.workers import SILENT_LIMIT, VALID_LIMIT, DriveWorker, ScannerWorker
 from robosc_bridge.devices.interface import (
     BINS,
     STANDSTILL,
@@ -336,6 +337,15 @@ def test_each_turn_is_reported_with_its_own_time(turning: ScannerScene) -> None:
     turning.step()
     assert turning.reports == [scan(100.1), scan(100.3)]
     assert turning.gate.scans == [100.1, 100.3]
+
+
+@pytest.mark.parametrize(("valid", "counts"), [(VALID_LIMIT, True), (VALID_LIMIT - 1, False), (0, False)])
+def test_a_turn_that_shows_nothing_is_none_for_safety(turning: ScannerScene, valid: int, counts: bool) -> None:
+    shown = replace(scan(100.1), ranges_m=(1.0,) * valid + (math.nan,) * (BINS - valid))
+    turning.scanner.coming = [shown]
+    turning.step()
+    assert turning.reports == [shown]
+    assert turning.gate.scans == ([100.1] if counts else [])
 
 
 def test_a_motor_that_falls_silent_is_restarted_again_and_again(turning: ScannerScene) -> None:

@@ -22,6 +22,28 @@ def test_nothing_passes_before_it_is_enabled() -> None:
         assert (found.velocity, found.is_torque_wanted, found.reasons) == (STANDSTILL, False, (Reason.STANDBY,))
 
 
+def test_every_call_may_be_the_first() -> None:
+    layer = Bench().layer
+    layer.drive_failed()
+    layer.operator_stop()
+    assert layer.reset() == (Reason.OPERATOR_STOP,)
+    layer = Bench().layer
+    layer.command(Velocity(0.1), -1.0)
+    first = layer.output(0.0)  # a clock may begin there
+    assert Reason.COMMAND_SILENT not in first.reasons
+    assert Reason.CLOCK not in first.reasons
+    assert first.warnings == ()
+    layer = Bench().layer
+    assert layer.reset() == ()
+    # Torque is wanted and given up without a word from the motors.
+    layer.enable()
+    assert layer.output(100.0).is_torque_wanted
+    layer.disable()
+    assert layer.output(100.0).is_torque_wanted
+    assert layer.output(100.9).is_torque_wanted
+    assert not layer.output(101.0).is_torque_wanted
+
+
 def test_torque_comes_first_then_a_new_command() -> None:
     bench = Bench()
     bench.cycle()
@@ -123,6 +145,16 @@ def test_what_comes_between_two_outputs_stops_it_once(change: Callable[[Bench], 
     found = bench.layer.output(bench.now_s)
     assert (found.velocity, found.is_torque_wanted, found.reasons) == (STANDSTILL, True, ())
     assert bench.cycle().velocity == near(0.02)
+
+
+@pytest.mark.parametrize("change", [lambda bench: bench.layer.disable(), lambda bench: bench.layer.reset()])
+def test_in_standby_no_command_is_missed(change: Callable[[Bench], object]) -> None:
+    bench = Bench(motor_timeout_s=1.0)
+    bench.drive()
+    change(bench)
+    bench.silent.add("command")
+    assert bench.cycle(0.4).reasons == (Reason.STANDBY,)
+    assert bench.cycles(1.0).reasons == (Reason.STANDBY,)
 
 
 def test_standby_takes_torque_once_the_wheels_stand_still() -> None:

@@ -11,7 +11,7 @@ ROWS = {
     cells[0].strip("`"): cells[1:]
     for cells in (
         [cell.strip() for cell in line.strip("|").split("|")]
-        for line in re.findall(r"^\| `[A-Z].*$", PAGE, re.MULTILINE)
+        for line in re.findall(r"^\| `[A-Z_]+` .*$", PAGE, re.MULTILINE)
     )
 }
 

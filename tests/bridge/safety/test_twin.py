@@ -28,8 +28,8 @@ class Sequence(RuleBasedStateMachine):
         self.now_s = 100.0
         self.last = Output(STANDSTILL, False, (), ())
 
-    @initialize(is_off=st.booleans(), needs_all=st.booleans())
-    def begin(self, is_off: bool, needs_all: bool) -> None:
+    @initialize(is_off=st.booleans(), needs_all=st.booleans(), is_driving=st.sampled_from([True, True, False]))
+    def begin(self, is_off: bool, needs_all: bool, is_driving: bool) -> None:
         changes: dict[str, Any] = {"is_torque_off_on_operator_stop": is_off, "battery_mean_s": 0.1, "astray_s": 0.1}
         if not needs_all:
             changes |= {"scan_timeout_s": None, "operator_timeout_s": None}
@@ -38,6 +38,10 @@ class Sequence(RuleBasedStateMachine):
         # What must be reset before anything may move again; whether it is enabled.
         self.stopped: set[Reason] = set()
         self.is_enabled = False
+        if is_driving:
+            self.enable()
+            self.healthy(4, 0.2, 0.3)
+            assert self.last.velocity != STANDSTILL
 
     @rule()
     def enable(self) -> None:

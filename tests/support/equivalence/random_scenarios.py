@@ -18,10 +18,10 @@ from robosc.expressions import (
     Type,
     leaves,
 )
-from robosc.model.structure import CommunicationKind, Model
+from robosc.model.structure import CommunicationKind, Deployment, Model
 from robosc.supervisor.structure import Supervisor
 from support.equivalence.observation import Observation
-from support.equivalence.python_targets import PythonTarget, reference
+from support.equivalence.python_targets import PythonLayer, PythonTarget, reference
 from support.equivalence.scenario import Action, Scenario
 
 # Numbers that a float of 32 bits holds, too, but for the hostile ones.
@@ -29,6 +29,7 @@ _DOUBLES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 6.0, -0.25, -1.0, -2.0)
 # Numbers that any integer field holds, but for the hostile ones.
 _INTEGERS = (0, 1, 2, 3, 4, 5, 6, 7, 100)
 _TEXTS = ("", "a", "it's", '"""\n\\', "é")
+_ASKS = {CommunicationKind.SERVICE: "ask_call", CommunicationKind.ACTION: "ask_goal"}
 _OUTCOMES = ("succeeded", "succeeded", "rejected", "aborted", "cancelled", "lost")
 
 
@@ -46,10 +47,13 @@ class Dice:
         self._dice = dice
         self._is_hostile = is_hostile
         self._topics: dict[str, list[Type]] = {}
+        self._asked: dict[str, list[Type]] = {}
         self._texts = (*_TEXTS, *_texts_of(model))
         for item in model.communications:
             if item.kind is CommunicationKind.OUTGOING_MESSAGE and item.response is not None:
                 self._topics.setdefault(item.identifier, []).append(item.response)
+            if item.kind is CommunicationKind.INCOMING_MESSAGE and item.request is not None:
+                self._asked.setdefault(item.identifier, []).append(item.request)
 
     def message(self) -> Action | None:
         """A message on some topic: what all messages of the model read of it."""
@@ -57,6 +61,17 @@ class Dice:
             return None
         topic = self._dice.choice(sorted(self._topics))
         return Action("message", topic, self.datum(*self._topics[topic]))
+
+    def asked(self) -> Action | None:
+        """What an existing controller may ask of a layer: a message, a call, a goal."""
+        servers = [item for item in self._model.communications if item.kind in _ASKS]
+        kinds = {identifier: ("ask", types) for identifier, types in self._asked.items()}
+        kinds |= {item.name: (_ASKS[item.kind], [item.request or NoneType()]) for item in servers}
+        if not kinds:
+            return None
+        subject = self._dice.choice(sorted(kinds))
+        kind, types = kinds[subject]
+        return Action(kind, subject, self.datum(*types))
 
     def received(self, name: str, part: str) -> Any:
         """Data of a reply, feedback or result."""
@@ -116,17 +131,23 @@ def _texts_of(model: Model) -> list[str]:
     ]
 
 
-def random_settings(model: Model, dice: Random) -> dict[str, Any]:
+def random_settings(supervisor: Supervisor, dice: Random) -> dict[str, Any]:
     """Settings under which targets must agree: all but the policy `random`, which C draws from another generator."""
+    model = supervisor.model
     requests = [item.name for item in model.communications if item.kind is not CommunicationKind.OUTGOING_MESSAGE]
     # In source order: C takes no order of them.
     sent = [item for item in model.communications if item.kind is CommunicationKind.INCOMING_MESSAGE]
     topics = list(dict.fromkeys(item.identifier for item in sent))
     policy = dice.choice(("fair", "fair", "priority"))
-    return {
+    decisions: dict[str, Any] = {
         "policy": policy,
         "priority": tuple(dice.sample(requests, dice.randint(0, len(requests)))) if policy == "priority" else (),
         "every": dice.choice(("period", "event")),
+    }
+    if supervisor.deployment is Deployment.LAYER:
+        decisions = {"command_timeout_s": dice.choice((0.0, 0.5, 2.0))}
+    return {
+        **decisions,
         "on_unknown": dice.choice(("default", "default", "keep", "fault")),
         "release_identifiers": tuple(topic for topic in topics if dice.random() < 0.7),
         "service_timeout_s": dice.choice((0.25, 1.5, 10.0)),
@@ -137,13 +158,14 @@ def random_settings(model: Model, dice: Random) -> dict[str, Any]:
 def random_scenario(supervisor: Supervisor, seed: int, length: int, *, is_hostile: bool = True) -> Scenario:
     """A run that follows what the reference asks for: replies come to calls that were made."""
     dice = Random(seed)
-    scenario = Scenario((), random_settings(supervisor.model, dice))
+    scenario = Scenario((), random_settings(supervisor, dice))
     target = reference(supervisor)
     target.start(scenario)
     drawn = Dice(supervisor.model, dice, is_hostile=is_hostile)
     actions: list[Action] = []
+    following = _next_of_layer if supervisor.deployment is Deployment.LAYER else _next
     for _ in range(length):
-        action = _next(supervisor.model, target, dice, drawn)
+        action = following(supervisor.model, target, dice, drawn)
         actions.append(action)
         target.do(action)
     return Scenario(tuple(actions), scenario.settings)
@@ -160,6 +182,23 @@ def _next(model: Model, target: PythonTarget, dice: Random, drawn: Dice) -> Acti
     if chance < 0.65 and (replies := _replies(model, target, dice, drawn, _OUTCOMES)):
         return dice.choice(replies)
     return drawn.message() or Action("tick")
+
+
+def _next_of_layer(model: Model, target: PythonTarget, dice: Random, drawn: Dice) -> Action:
+    assert isinstance(target, PythonLayer)
+    if target.is_faulty and dice.random() < 0.4:
+        return Action("restart")
+    if dice.random() < 0.55:
+        return _next(model, target, dice, drawn)
+    if dice.random() < 0.15 and (cancels := cancels_of(model, target)):
+        return dice.choice(cancels)
+    return drawn.asked() or Action("tick")
+
+
+def cancels_of(model: Model, target: PythonLayer) -> list[Action]:
+    """The cancels of goals that an existing controller has sent."""
+    actions = [item.name for item in model.communications if item.kind is CommunicationKind.ACTION]
+    return [Action("ask_cancel", name) for name in actions if target.callers.count(name)]
 
 
 def _replies(model: Model, target: PythonTarget, dice: Random, drawn: Dice, outcomes: Sequence[str]) -> list[Action]:

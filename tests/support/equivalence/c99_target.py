@@ -12,7 +12,7 @@ from robosc.execution.interpreter import describe
 from robosc.execution.runner import Status
 from robosc.execution.settings import Settings, settings_for
 from robosc.expressions import BooleanType, DoubleType, EnumType, StringType, Type
-from robosc.model.structure import CommunicationKind
+from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.c99.layer import request_parameters
 from robosc.targets.c99.layout import PLANT_LOCATIONS, event_data, make_layout
@@ -271,6 +271,12 @@ class C99Layer(C99Target):
 
     def _data(self, number: int = -1) -> dict[str, Any]:
         return {} if number < 0 else flat(self._messages[number])
+
+
+def c99_target(supervisor: Supervisor, folder: Path) -> C99Target:
+    """The target `c99` of a controller or a layer."""
+    kind = C99Layer if supervisor.deployment is Deployment.LAYER else C99Target
+    return kind(supervisor, folder)
 
 
 def _pipe(pipe: IO[str] | None) -> IO[str]:

@@ -58,6 +58,8 @@ class Sight:
         has_log: Whether it writes a log.
         has_readings: Whether the log tells with an event of the environment what the model reads of the data that
             came; else it tells the data as it came, which is not compared.
+        has_requests: Whether it tells with a request what the model knows of its data; a layer on a middleware tells
+            the whole message, which is not compared.
     """
 
     topics: Mapping[str, str] | None = None
@@ -65,6 +67,7 @@ class Sight:
     log_keys: frozenset[str] | None = None
     has_log: bool = True
     has_readings: bool = True
+    has_requests: bool = True
 
 
 FULL = Sight()
@@ -147,8 +150,9 @@ def _on_wire(value: Any) -> Any:
 
 
 def _told(log: Sequence[Entry], sight: Sight) -> list[Entry]:
-    if not sight.has_readings:
-        log = [{**item, "data": None} if item.get("controllable") is False else item for item in log]
+    for is_controllable, is_told in ((False, sight.has_readings), (True, sight.has_requests)):
+        if not is_told:
+            log = [{**item, "data": None} if item.get("controllable") is is_controllable else item for item in log]
     if sight.log_keys is None:
         return list(log)
     return [{key: value for key, value in item.items() if key in sight.log_keys} for item in log]

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from random import Random
 from typing import Any
 
@@ -20,7 +21,7 @@ from robosc.expressions import (
 )
 from robosc.model.structure import CommunicationKind, Deployment, Model
 from robosc.supervisor.structure import Supervisor
-from support.equivalence.observation import Observation
+from support.equivalence.observation import Issued, Observation
 from support.equivalence.python_targets import PythonLayer, PythonTarget, reference
 from support.equivalence.scenario import Action, Scenario
 
@@ -29,6 +30,7 @@ _DOUBLES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 6.0, -0.25, -1.0, -2.0)
 # Numbers that any integer field holds, but for the hostile ones.
 _INTEGERS = (0, 1, 2, 3, 4, 5, 6, 7, 100)
 _TEXTS = ("", "a", "it's", '"""\n\\', "é")
+_NAN = math.nan
 _ASKS = {CommunicationKind.SERVICE: "ask_call", CommunicationKind.ACTION: "ask_goal"}
 _OUTCOMES = ("succeeded", "succeeded", "rejected", "aborted", "cancelled", "lost")
 
@@ -257,6 +259,72 @@ def node_scenario(supervisor: Supervisor, seed: int, length: int) -> Scenario:
     return Scenario(tuple(actions), settings)
 
 
+LAYER_KINDS = frozenset(
+    {"publish", "call", "goal", "cancel", "pass", "blocked", "answer", "no answer", "accept", "reject", "told", "ended"}
+)
+"""What a layer asks for and tells, all of which a random run should show."""
+
+
+def layer_node_scenario(supervisor: Supervisor, seed: int, length: int) -> Scenario:
+    """A run for a layer with real servers: they accept every goal, and end one that is cancelled as cancelled."""
+    dice = Random(seed)
+    model = supervisor.model
+    settings = layer_node_settings(model)
+    target = reference(supervisor)
+    assert isinstance(target, PythonLayer)
+    target.start(Scenario((), settings))
+    drawn = Dice(model, dice, is_hostile=False)
+    actions: list[Action] = []
+    running: set[int] = set()
+    while len(actions) < length:
+        chance = dice.random()
+        replies = _replies(model, target, dice, drawn, ("succeeded", "aborted"))
+        replies = [item for item in replies if item.do not in ("accept", "fail")]
+        # A caller's cancel of a goal that was rejected or has ended does not reach the layer.
+        cancels = [item for item in cancels_of(model, target) if target.callers.last(item.subject) in running]
+        if replies and chance < 0.25:
+            action: Action | None = dice.choice(replies)
+        elif cancels and chance < 0.35:
+            action = dice.choice(cancels)
+        else:
+            action = drawn.message() if chance < 0.6 else drawn.asked()
+            if action is not None and action.do == "ask" and dice.random() < 0.1:
+                action = replace(action, data=_spoiled(action.data))
+        if action is None:
+            break
+        actions.append(action)
+        seen = target.do(action)
+        issued = list(seen.issued)
+        actions += follow(seen, target, issued)
+        running |= {data["caller"] for kind, _, data in issued if kind == "accept"}
+        running -= {data["caller"] for kind, _, data in issued if kind == "ended"}
+    return Scenario(tuple(actions), settings)
+
+
+def layer_node_settings(model: Model) -> dict[str, Any]:
+    """Settings under which a layer does nothing because time passes."""
+    sensors = {item.identifier for item in model.communications if item.max_age is not None}
+    return {
+        "period_s": 3600.0,
+        "command_timeout_s": 0.0,
+        "service_timeout_s": 3600.0,
+        "max_age_s": dict.fromkeys(sorted(sensors), 3600.0),
+    }
+
+
+def _spoiled(data: Any) -> Any:
+    """The same with its numbers not finite."""
+    if isinstance(data, dict):
+        return {name: _spoiled(part) for name, part in data.items()}
+    return _NAN if isinstance(data, float) else data
+
+
+def for_layer_node(supervisor: Supervisor, scenario: Scenario) -> Scenario:
+    """What both sides send in a recorded run, for a layer that does nothing because time passes."""
+    actions = tuple(action for action in scenario.actions if action.do in ("message", "ask"))
+    return Scenario(actions, layer_node_settings(supervisor.model))
+
+
 def for_node(supervisor: Supervisor, scenario: Scenario) -> Scenario:
     """The messages of a recorded run for a node, whose services answer at once as they did last."""
     settings = node_settings(supervisor.model)
@@ -274,7 +342,6 @@ def for_node(supervisor: Supervisor, scenario: Scenario) -> Scenario:
     return Scenario(tuple(actions), settings)
 
 
-_NAN = math.nan
 ODD_MESSAGES = tuple(
     Action("message", topic, data)
     for topic, data in (
@@ -297,8 +364,8 @@ ODD_MESSAGES = tuple(
 """What may come to the line follower, too: numbers that are none, and too few."""
 
 
-def follow(seen: Observation, target: PythonTarget) -> list[Action]:
-    """What servers do at once: accept goals, end those that are cancelled."""
+def follow(seen: Observation, target: PythonTarget, issued: list[Issued] | None = None) -> list[Action]:
+    """What servers do at once: accept goals, end those that are cancelled; `issued` gets what is issued meanwhile."""
     found = []
     waiting = list(seen.issued)
     while waiting:
@@ -306,5 +373,8 @@ def follow(seen: Observation, target: PythonTarget) -> list[Action]:
         if kind in ("goal", "cancel"):
             action = Action("accept", name) if kind == "goal" else Action("end", name, how="cancelled")
             found.append(action)
-            waiting += target.do(action).issued
+            then = target.do(action).issued
+            waiting += then
+            if issued is not None:
+                issued += then
     return found

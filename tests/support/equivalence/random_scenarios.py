@@ -1,7 +1,7 @@
 """Random runs: what is likely to bring a controller on, with data that is often at a border."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from random import Random
 from typing import Any
@@ -326,19 +326,23 @@ def for_layer_node(supervisor: Supervisor, scenario: Scenario) -> Scenario:
 
 
 def for_node(supervisor: Supervisor, scenario: Scenario) -> Scenario:
-    """The messages of a recorded run for a node, whose services answer at once as they did last."""
+    """A recorded run for a node that decides whenever something comes.
+
+    Services answer at once as they did last; goals are accepted at once, and cancelled ones end at once; feedback and
+    other ends come when they came, if there is a goal then.
+    """
     settings = node_settings(supervisor.model)
     answers = {action.subject: action.data for action in scenario.actions if action.do == "reply"}
     target = reference(supervisor)
     target.start(Scenario((), settings))
     actions: list[Action] = []
     for action in scenario.actions:
-        if action.do == "message":
+        if action.do == "end" and action.how == "rejected":
+            action = replace(action, how="aborted")
+        is_of_goal = action.do == "feedback" or (action.do == "end" and action.how != "cancelled")
+        if action.do == "message" or (is_of_goal and target.ids.count(action.subject)):
             actions.append(action)
-            seen = target.do(action)
-            while asked := [name for kind, name, _ in seen.issued if kind == "call"]:
-                actions.append(Action("reply", asked[0], answers[asked[0]]))
-                seen = target.do(actions[-1])
+            actions += follow(target.do(action), target, answers=answers)
     return Scenario(tuple(actions), settings)
 
 
@@ -364,14 +368,26 @@ ODD_MESSAGES = tuple(
 """What may come to the line follower, too: numbers that are none, and too few."""
 
 
-def follow(seen: Observation, target: PythonTarget, issued: list[Issued] | None = None) -> list[Action]:
-    """What servers do at once: accept goals, end those that are cancelled; `issued` gets what is issued meanwhile."""
+def follow(
+    seen: Observation,
+    target: PythonTarget,
+    issued: list[Issued] | None = None,
+    answers: Mapping[str, Any] | None = None,
+) -> list[Action]:
+    """What servers do at once: accept goals, end those that are cancelled; services with an answer give it.
+
+    `issued` gets what is issued meanwhile.
+    """
     found = []
     waiting = list(seen.issued)
     while waiting:
         kind, name, _ = waiting.pop(0)
-        if kind in ("goal", "cancel"):
-            action = Action("accept", name) if kind == "goal" else Action("end", name, how="cancelled")
+        action = {
+            "goal": Action("accept", name),
+            "cancel": Action("end", name, how="cancelled"),
+            "call": Action("reply", name, answers[name]) if answers and name in answers else None,
+        }.get(kind)
+        if action is not None:
             found.append(action)
             then = target.do(action).issued
             waiting += then

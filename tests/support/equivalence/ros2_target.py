@@ -261,11 +261,14 @@ def _fields(message_class: Any, data: Any) -> dict[str, Any]:
 
 
 def _given(message: Any) -> dict[str, Any]:
-    """What a message holds, by path; what has its default is left out."""
-    fields = message.get_fields_and_field_types()
-    if message_name(type(message)).startswith("std_msgs/") and "data" in fields:
-        return {path: value for path, value in flat(message.data).items() if value}
-    return {path: value for path, value in flat(_plain(message)).items() if value}
+    """What a message holds, by path; what has its default is left out, such as the 1 of a quaternion's `w`."""
+    defaults = _parts(type(message)())
+    return {path: value for path, value in _parts(message).items() if value and value != defaults.get(path)}
+
+
+def _parts(message: Any) -> dict[str, Any]:
+    is_basic = message_name(type(message)).startswith("std_msgs/") and hasattr(message, "data")
+    return flat(message.data) if is_basic else flat(_plain(message))
 
 
 def _plain(message: Any) -> Any:

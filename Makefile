@@ -30,8 +30,11 @@ $(COLCON)/.ready: deploy/requirements-colcon.txt deploy/make_colcon_environment.
 demo: $(READY) ## run the line follower from model to moving robot
 	$(BIN)/python deploy/demo/demo.py
 
-test: $(READY) ## run every test
-	$(BIN)/python -m pytest -n 2 --dist loadscope $(TESTS)
+# One worker more than cores: many tests wait for real middleware.
+WORKERS := $(shell echo $$(( $$(nproc 2>/dev/null || echo 2) + 1 )))
+
+test: $(READY) ## run every test; TESTS=... chooses, WORKERS=... says how many at a time
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadscope --durations 20 $(TESTS)
 
 # mutmut names what it changes by its path, so the packages must lie where it is started.
 MUTMUT := PYTHONPATH=$(CURDIR)/out/mutmut $(CURDIR)/$(BIN)/python -m mutmut

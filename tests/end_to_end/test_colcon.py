@@ -3,15 +3,17 @@
 import json
 import math
 import os
+import re
 import shutil
 import signal
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from support.colcon import Workspace, locked
+from support.colcon import ROOT, Workspace, locked
 from support.example_robots import Stage, generated_package, stage
 from support.kinematic_robot import KinematicRobot, Thing, World
 from support.models import EXAMPLES
@@ -157,13 +159,22 @@ def test_without_odometry_goals_fail_until_somebody_presses_the_button(navigatio
 
 
 def test_a_stopped_driver_leaves_the_robot_at_rest(navigation: Navigation) -> None:
-
     navigation.until_driving()
     navigation.driver.signal(signal.SIGTERM)
     navigation.at.until(
         lambda: navigation.robot.speed == 0.0 and not navigation.driver.is_running, "a zero and the end"
     )
     assert navigation.driver.wait() == 0
+
+
+def test_a_recorded_run_is_the_same_as_that_of_the_reference(workspace: Workspace, tmp_path: Path) -> None:
+    """The suite of `tests/equivalence`, for the one example whose interfaces must be built first."""
+    command = workspace.python(str(ROOT / "tests" / "equivalence" / "compare_navigation.py"), str(tmp_path / "run"))
+    done = subprocess.run(["/bin/bash", *command], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    steps, calls, goals, cancels = map(int, re.findall(r"\d+", done.stdout))
+    assert steps > 50
+    assert min(calls, goals, cancels) > 0
 
 
 def test_colcon_test_passes(workspace: Workspace) -> None:

@@ -14,14 +14,14 @@ from robosc.model.structure import Deployment
 from robosc.supervisor.structure import Supervisor
 from robosc.targets import generate
 from support.c99 import GCC
-from support.equivalence.c99_target import C99Target
+from support.equivalence.c99_target import C99Target, c99_target
 from support.equivalence.python_targets import PythonTarget, generated_python, observe, reference
 from support.equivalence.random_scenarios import random_scenario
 from support.equivalence.recorded import FOLDER, read_recorded, recorded_text
 from support.equivalence.scenario import Action, Scenario
 from support.equivalence.targets import compare
-from support.equivalence.worlds import WORLDS, live
-from support.generated import example_supervisor, loaded_file
+from support.equivalence.worlds import WORLDS, live, robot_supervisor
+from support.generated import loaded_file
 from support.models import model_of
 from support.random_controllers import random_controller, random_robot
 from support.random_supervisors import CERTIFICATE, random_supervisor
@@ -51,20 +51,20 @@ def test_the_reference_does_what_was_recorded(robot: str) -> None:
     file = FOLDER / f"{robot}.jsonl"
     assert recorded_text(*live(robot)) == file.read_text(encoding="utf-8")
     scenario = read_recorded(robot)
-    supervisor = example_supervisor(f"{robot}/{robot}")
+    supervisor = robot_supervisor(robot)
     assert recorded_text(scenario, observe(supervisor, scenario)) == file.read_text(encoding="utf-8")
 
 
 def test_the_recorded_runs_show_every_request() -> None:
     for robot in ROBOTS:
         text = (FOLDER / f"{robot}.jsonl").read_text(encoding="utf-8")
-        for item in example_supervisor(f"{robot}/{robot}").model.communications:
+        for item in robot_supervisor(robot).model.communications:
             assert f'"{item.events[0]}"' in text, item.name
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_a_recorded_run_in_python(robot: str) -> None:
-    supervisor = example_supervisor(f"{robot}/{robot}")
+    supervisor = robot_supervisor(robot)
     scenario = read_recorded(robot)
     compare(python_target(supervisor), scenario, observe(supervisor, scenario))
 
@@ -72,14 +72,14 @@ def test_a_recorded_run_in_python(robot: str) -> None:
 @needs_gcc
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_a_recorded_run_in_c(robot: str, tmp_path: Path) -> None:
-    supervisor = example_supervisor(f"{robot}/{robot}")
+    supervisor = robot_supervisor(robot)
     scenario = read_recorded(robot)
-    compare(C99Target(supervisor, tmp_path), scenario, observe(supervisor, scenario))
+    compare(c99_target(supervisor, tmp_path), scenario, observe(supervisor, scenario))
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_an_example_in_python(robot: str) -> None:
-    supervisor = example_supervisor(f"{robot}/{robot}")
+    supervisor = robot_supervisor(robot)
     for seed in range(4):
         scenario = random_scenario(supervisor, seed, 150)
         compare(python_target(supervisor), scenario, observe(supervisor, scenario))
@@ -105,7 +105,7 @@ def test_without_a_log_whole_messages_are_taken_with_the_same_effect(seed: int) 
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_a_recorded_run_without_a_log(robot: str) -> None:
-    supervisor = example_supervisor(f"{robot}/{robot}")
+    supervisor = robot_supervisor(robot)
     scenario = read_recorded(robot)
     compare(python_target(supervisor, has_log=False), scenario, observe(supervisor, scenario))
 
@@ -113,9 +113,9 @@ def test_a_recorded_run_without_a_log(robot: str) -> None:
 @needs_gcc
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_an_example_in_c(robot: str, tmp_path: Path) -> None:
-    supervisor = example_supervisor(f"{robot}/{robot}")
+    supervisor = robot_supervisor(robot)
     scenario = random_scenario(supervisor, 7, 400)
-    compare(C99Target(supervisor, tmp_path), scenario, observe(supervisor, scenario))
+    compare(c99_target(supervisor, tmp_path), scenario, observe(supervisor, scenario))
 
 
 @needs_gcc

@@ -139,7 +139,7 @@ def test_a_node_that_decides_by_its_own_timer(robot: str, tmp_path: Path) -> Non
     supervisor = example_supervisor(f"{robot}/{robot}")
     model = supervisor.model
     requests = tuple(i.name for i in model.communications if i.kind is CommunicationKind.INCOMING_MESSAGE)
-    settings = {"policy": "priority", "priority": requests, "period_s": 0.02}
+    settings = {**node_settings(model), "every": "period", "policy": "priority", "priority": requests, "period_s": 0.02}
     messages = tuple(action for action in read_recorded(robot).actions if action.do == "message")[:40]
     surroundings = Ros2Surroundings(supervisor, tmp_path)
     log = timed_log(surroundings, Scenario(messages, settings), tmp_path / "events", model)

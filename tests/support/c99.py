@@ -396,6 +396,13 @@ def settings_words(layout: Layout, settings: Settings) -> list[object]:
     return words + [int(topic in (settings.release_identifiers or ())) for topic in layout.topics]
 
 
+def lonely_end(supervisor: Supervisor) -> str:
+    """What an example program, to which nothing is ever sent, prints at its end after a second."""
+    ages = [item.max_age for item in supervisor.model.communications if item.max_age is not None]
+    status = 4 if any(age <= 1.0 for age in ages) else 1 if ages else 2  # Stopped by a stale sensor, waiting, running.
+    return f"status {status} after 1000000 us"
+
+
 def data_words(layout: Layout, type_: Type, datum: Any, is_root: bool = False) -> list[object]:
     """Received data of a type as the test program reads it; what is not there, or of another type, is unknown."""
     type_ = layout.source(type_)

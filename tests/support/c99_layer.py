@@ -16,12 +16,12 @@ from robosc.model.structure import CommunicationKind
 from robosc.supervisor.structure import Supervisor
 from robosc.targets import generate
 from robosc.targets.c99.layer import request_parameters
-from robosc.targets.c99.layout import event_data, make_layout
+from robosc.targets.c99.layout import Layout, event_data, make_layout
 from support.c99 import GCC, WARNINGS, Reference, _hex, data_words, microseconds, replay
 from support.c99_layer_main import CALLBACKS, TOKENS, layer_program
 from support.c99_main import batch_types, events_back
 
-_REFUSALS = (
+REFUSALS = (
     _NOT_ALLOWED,
     _NOT_FINITE,
     _NOT_KNOWN,
@@ -47,6 +47,26 @@ def compiled_layer(supervisor: Supervisor, folder: Path, *options: str) -> Path:
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr[:4000]
     return folder / "test"
+
+
+def layer_settings_words(layout: Layout, settings: Settings) -> list[object]:
+    """The command that makes a new layer with some settings."""
+    words: list[object] = ["n", ("default", "keep", "fault").index(settings.on_unknown)]
+    words += [microseconds(settings.service_timeout_s), microseconds(settings.action_timeout_s)]
+    words.append(microseconds(settings.command_timeout_s))
+    for item in layout.model.communications:
+        is_sensor = item.kind is CommunicationKind.OUTGOING_MESSAGE
+        age = settings.max_age_s.get(item.identifier, item.max_age) if is_sensor else None
+        words.append(0 if age is None else microseconds(age))
+    return words + [int(topic in (settings.release_identifiers or ())) for topic in layout.topics]
+
+
+def caller_place(layout: Layout, name: str) -> int:
+    """Number of the function for a caller's call, goal or cancel, such as `goal_NAME`."""
+    names = [f"call_{item.name}" for item in layout.of_kind(CommunicationKind.SERVICE)]
+    for item in layout.of_kind(CommunicationKind.ACTION):
+        names += [f"goal_{item.name}", f"cancel_{item.name}"]
+    return len(layout.topics) + names.index(name)
 
 
 class LayerReference(Reference):
@@ -81,17 +101,8 @@ class LayerReference(Reference):
 
     def _new(self, settings: Settings) -> Layer:  # type: ignore[override]
         executor = Layer(self.system, self, self, settings, self.clock, self)
-        settings = executor.settings
-        words: list[object] = ["n", ("default", "keep", "fault").index(settings.on_unknown)]
-        words += [microseconds(settings.service_timeout_s), microseconds(settings.action_timeout_s)]
-        words.append(microseconds(settings.command_timeout_s))
-        for item in self.model.communications:
-            is_sensor = item.kind is CommunicationKind.OUTGOING_MESSAGE
-            age = settings.max_age_s.get(item.identifier, item.max_age) if is_sensor else None
-            words.append(0 if age is None else microseconds(age))
-        words += [int(topic in (settings.release_identifiers or ())) for topic in self.topics]
         self.executor = executor
-        self._told(words)
+        self._told(layer_settings_words(self.layout, executor.settings))
         return executor
 
     # Both sides.
@@ -161,7 +172,7 @@ class LayerReference(Reference):
     def write(self, entry: dict[str, Any]) -> None:
         """Remember what happened."""
         if entry["kind"] == "blocked":
-            self.refusal = _REFUSALS.index(entry["why"])
+            self.refusal = REFUSALS.index(entry["why"])
             self.lines.append(f"log blocked {self.refusal}")
         else:
             super().write(entry)
@@ -308,10 +319,7 @@ class LayerReference(Reference):
 
     def _place(self, name: str) -> int:
         """Number of the function for a call, a goal or a cancel."""
-        names = [f"call_{item.name}" for item in self.layout.of_kind(CommunicationKind.SERVICE)]
-        for item in self.layout.of_kind(CommunicationKind.ACTION):
-            names += [f"goal_{item.name}", f"cancel_{item.name}"]
-        return len(self.topics) + names.index(name)
+        return caller_place(self.layout, name)
 
     def _cancel(self, now: int) -> None:
         action = self.dice.choice(self.layout.of_kind(CommunicationKind.ACTION)).name

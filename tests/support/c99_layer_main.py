@@ -144,6 +144,7 @@ int main(void)
         default: printf("what?\\n"); return 1;
         }
         print_state(now_us);
+        fflush(stdout);
     }
 }
 """

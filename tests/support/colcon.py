@@ -99,3 +99,7 @@ class Workspace:
         program = self.folder / "install" / package / "lib" / package / executable
         assert program.is_file(), f"colcon installed no {program}"
         return ["-c", _ENTER, str(self.folder), str(program), *arguments]
+
+    def python(self, *arguments: str) -> list[str]:
+        """Arguments of bash that run this Python with the workspace sourced."""
+        return ["-c", _ENTER, str(self.folder), sys.executable, *arguments]

@@ -1,23 +1,31 @@
 """Generated C99, compiled with sanitizers, as a process that is told what happens."""
 
 import subprocess
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any
 
 from robosc.automata.plants import communication_plant_name
+from robosc.execution.foreign import is_finite
 from robosc.execution.interpreter import describe
 from robosc.execution.runner import Status
-from robosc.execution.settings import settings_for
+from robosc.execution.settings import Settings, settings_for
 from robosc.expressions import BooleanType, DoubleType, EnumType, StringType, Type
+from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor.structure import Supervisor
+from robosc.targets.c99.layer import request_parameters
 from robosc.targets.c99.layout import PLANT_LOCATIONS, event_data, make_layout
 from robosc.targets.events import has_plant_location
 from support.c99 import SANITIZERS, compiled, data_words, microseconds, settings_words
+from support.c99_layer import REFUSALS, caller_place, compiled_layer, layer_settings_words
+from support.c99_layer_main import TOKENS
 from support.c99_main import batch_types, events_back
-from support.equivalence.observation import Entry, Issued, Observation, Sight
-from support.equivalence.python_targets import Ids
+from support.equivalence.observation import Entry, Issued, Observation, Sight, flat
+from support.equivalence.python_targets import Callers, Ids
 from support.equivalence.scenario import PERIOD_S, Action, Scenario
 
+_ENDS = ("succeeded", "aborted", "cancelled")
 _STATUSES = (Status.NEW, Status.WAITING, Status.RUNNING, Status.STOPPING, Status.STOPPED)
 
 
@@ -33,6 +41,7 @@ class C99Target:
     name = "c99"
     # Its callback for a log tells kind and event, or the topic of a release.
     sight = Sight(log_keys=frozenset({"kind", "event", "identifier"}))
+    _commands: Mapping[str, str] = {"tick": "t", "wait": "w", "restart": "R"}
 
     def __init__(self, supervisor: Supervisor, folder: Path, *options: str) -> None:
         self._supervisor = supervisor
@@ -42,17 +51,23 @@ class C99Target:
         self._topics = tuple(self._layout.topics)
         self._ids = Ids()
         self._now_s = 0.0
-        program = compiled(supervisor, folder, *(options or SANITIZERS))
+        program = self._compiled(folder, *(options or SANITIZERS))
         self._errors = (folder / "errors").open("w+", encoding="utf-8")
         self._process = subprocess.Popen(
             [program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors, text=True
         )
 
+    def _compiled(self, folder: Path, *options: str) -> Path:
+        return compiled(self._supervisor, folder, *options)
+
     def start(self, scenario: Scenario, awaited: Observation | None = None) -> Observation:
         """Begin."""
         settings = settings_for(scenario.all_settings(), describe(self._supervisor))
-        self._tell(settings_words(self._layout, settings))
+        self._tell(self._settings(settings))
         return self._tell(["s", microseconds(self._now_s)])
+
+    def _settings(self, settings: Settings) -> list[object]:
+        return settings_words(self._layout, settings)
 
     def do(self, action: Action, awaited: Observation | None = None) -> Observation:
         """Let one thing happen."""
@@ -60,11 +75,12 @@ class C99Target:
         now, name, ids = microseconds(self._now_s), action.subject, self._ids
         match action.do:
             case "tick" | "wait" | "restart":
-                return self._tell([{"tick": "t", "wait": "w", "restart": "R"}[action.do], now])
+                return self._tell([self._commands[action.do], now])
             case "stop":
                 return self._tell(["S", now, 0])
             case "message":
-                words: list[object] = ["m", now, list(self._layout.received_topics).index(name)]
+                place = list(self._layout.received_topics).index(name)
+                words: list[object] = ["m", now, place, *self._handed(action.data)]
                 for type_ in batch_types(self._layout, name):
                     words += data_words(self._layout, type_, action.data, is_root=True)
                 return self._tell(words)
@@ -79,13 +95,22 @@ class C99Target:
             case "end" if action.how == "succeeded":
                 return self._back(f"{name}.response", ids.end(name), action.data)
             case "end":
-                return self._tell(["e", now, ids.end(name)])
+                return self._tell(["e", now, ids.end(name), *self._ended(action)])
         raise ValueError(action.do)
 
     def _back(self, event: str, number: int, data: Any) -> Observation:
-        words = ["b", microseconds(self._now_s), events_back(self._layout).index(event), number]
+        place = events_back(self._layout).index(event)
+        words: list[object] = ["b", microseconds(self._now_s), place, number, *self._handed(data)]
         type_ = event_data(self._layout.model, event)
         return self._tell(words + ([] if type_ is None else data_words(self._layout, type_, data, is_root=True)))
+
+    def _handed(self, data: Any) -> list[object]:
+        """How the program is handed the message itself, which a controller does not need."""
+        return []
+
+    def _ended(self, action: Action) -> list[object]:
+        """How it is told in what way a goal ended without success, which a controller does not need."""
+        return []
 
     def _tell(self, words: list[object]) -> Observation:
         _pipe(self._process.stdin).write(" ".join(map(str, words)) + "\n")
@@ -99,7 +124,7 @@ class C99Target:
             if kind == "log":
                 log.append(self._entry(*rest))
             else:
-                issued.append(self._issued(kind, rest))
+                issued += self._issued(kind, rest)
         self._process.wait()
         self._errors.seek(0)
         raise AssertionError(f"c99: the program ended: {self._errors.read()[-3000:]}")
@@ -111,14 +136,14 @@ class C99Target:
             return {"kind": kind}
         return {"kind": kind, "event": self._events[int(number)]}
 
-    def _issued(self, kind: str, words: list[str]) -> Issued:
+    def _issued(self, kind: str, words: list[str]) -> list[Issued]:
         if kind == "default":
-            return kind, self._topics[int(words[0])], {}
+            return [(kind, self._topics[int(words[0])], {})]
         number = words.pop(0) if kind != "publish" else ""
         name = self._communications[int(words.pop(0))]
         if kind in ("call", "goal"):
             self._ids.add(name, int(number))
-        return kind, name, {path: _given(text) for path, _, text in (word.partition("=") for word in words)}
+        return [(kind, name, {path: _given(text) for path, _, text in (word.partition("=") for word in words)})]
 
     def _observation(self, words: list[str], issued: list[Issued], log: list[Entry]) -> Observation:
         left = iter(words)
@@ -162,6 +187,96 @@ class C99Target:
         _pipe(self._process.stdout).close()
         assert not complaint and not left, complaint or left
         return Observation()
+
+
+class C99Layer(C99Target):
+    """A compiled test program around a generated C layer, which tells each message by the number that it came with."""
+
+    name = "c99 layer"
+    _commands: Mapping[str, str] = {"tick": "w", "wait": "w", "restart": "R"}  # It decides nothing.
+
+    def __init__(self, supervisor: Supervisor, folder: Path, *options: str) -> None:
+        super().__init__(supervisor, folder, *options)
+        topics = {
+            item.name: item.identifier
+            for item in supervisor.model.communications
+            if item.kind is CommunicationKind.INCOMING_MESSAGE
+        }
+        # It publishes on a topic, whichever of the messages there it recognized.
+        self.sight = replace(self.sight, log_keys=frozenset({"kind", "event", "why"}), topics=topics, is_exact=True)
+        self._callers = Callers()
+        self._messages: list[Any] = []
+
+    def _compiled(self, folder: Path, *options: str) -> Path:
+        return compiled_layer(self._supervisor, folder, *options)
+
+    def _settings(self, settings: Settings) -> list[object]:
+        return layer_settings_words(self._layout, settings)
+
+    def do(self, action: Action, awaited: Observation | None = None) -> Observation:
+        """Let one thing happen."""
+        name = action.subject
+        kind = action.do.removeprefix("ask_")
+        if action.do == "ask":
+            types = [self._layout.source(type_) for _, type_ in request_parameters(self._layout, name).values()]
+            data = [word for type_ in types for word in data_words(self._layout, type_, action.data, is_root=True)]
+            return self._ask(action, self._topics.index(name), self._sent(action.data) + data)
+        if kind in ("call", "goal"):
+            place = caller_place(self._layout, f"{kind}_{name}")
+            return self._ask(action, place, [self._callers.next(name), *self._sent(action.data)])
+        if kind == "cancel":
+            return self._ask(action, caller_place(self._layout, f"cancel_{name}"), [self._callers.last(name)])
+        return super().do(action, awaited)
+
+    def _ask(self, action: Action, place: int, words: list[object]) -> Observation:
+        return self._tell(["q", microseconds(self._now_s), place, *words])
+
+    def _sent(self, data: Any) -> list[object]:
+        return [*self._handed(data), int(is_finite(data)), int(not any(flat(data).values()))]
+
+    def _handed(self, data: Any) -> list[object]:
+        self._messages.append(data)
+        return [(len(self._messages) - 1) % TOKENS]
+
+    def _ended(self, action: Action) -> list[object]:
+        return [int(action.how == "cancelled"), -1]
+
+    def _entry(self, kind: str, number: str = "-1") -> Entry:
+        if kind == "blocked":
+            return {"kind": kind, "why": REFUSALS[int(number)]}
+        return super()._entry(kind, number)
+
+    def _issued(self, kind: str, words: list[str]) -> list[Issued]:
+        if kind == "blocked":
+            return [(kind, _text(words[0]), {})]
+        numbers = [int(word) for word in words]
+        match kind:
+            case "default" | "publish":
+                # The topic's name stands for the message's: `Sight.topics`.
+                return [(kind, self._topics[numbers[0]], self._data(*numbers[1:]))]
+            case "pass":
+                return [(kind, list(self._layout.received_topics)[numbers[0]], self._data(numbers[1]))]
+            case "call" | "goal":
+                self._ids.add(self._communications[numbers[1]], numbers[0])
+                return [(kind, self._communications[numbers[1]], self._data(numbers[2]))]
+            case "cancel":
+                return [(kind, self._communications[numbers[0]], {})]
+        name, caller = self._communications[numbers[0]], {"caller": numbers[1]}
+        match kind:
+            case "answer" | "feedback":
+                return [("told" if kind == "feedback" else kind, name, {**caller, **self._data(numbers[2])})]
+            case "end":
+                return [("ended", name, {**caller, "how": _ENDS[numbers[2]], **self._data(numbers[3])})]
+        return [(kind.replace("_", " "), name, caller)]
+
+    def _data(self, number: int = -1) -> dict[str, Any]:
+        return {} if number < 0 else flat(self._messages[number])
+
+
+def c99_target(supervisor: Supervisor, folder: Path) -> C99Target:
+    """The target `c99` of a controller or a layer."""
+    kind = C99Layer if supervisor.deployment is Deployment.LAYER else C99Target
+    return kind(supervisor, folder)
 
 
 def _pipe(pipe: IO[str] | None) -> IO[str]:

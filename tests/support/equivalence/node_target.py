@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from robosc.model.structure import CommunicationKind, Interface, Model
+from robosc.model.structure import CommunicationKind, Deployment, Interface, Model
 from support.equivalence.observation import FULL, Entry, Issued, Observation, Sight, entry, flat
 from support.equivalence.scenario import Action, Scenario
 
@@ -37,8 +37,11 @@ class Surroundings(Protocol):
     def answer(self, action: Action) -> None:
         """Let a server do what an action says: `reply`, `accept`, `feedback`, `end`."""
 
+    def ask(self, action: Action) -> None:
+        """Let the existing controller before a layer do what an action says: `ask`, `ask_call` and so on."""
+
     def take_issued(self) -> list[Issued]:
-        """What the node has asked for since the last time: `publish` on a topic, `call`, `goal`, `cancel`."""
+        """What the node has asked for or told since the last time, `publish` with the topic."""
 
     def settle(self) -> None:
         """Return when the node has handled what was sent to it and shows nothing of it."""
@@ -121,6 +124,9 @@ class NodeTarget:
             self._surroundings.send(action.subject, action.data)
             # Sensors' topics may lose a message; one that comes always shows in the log.
             return self._wait_for(awaited, lambda: self._surroundings.send(action.subject, action.data))
+        if action.do.startswith("ask"):
+            self._surroundings.ask(action)
+            return self._wait_for(awaited)
         self._surroundings.answer(action)
         return self._wait_for(awaited)
 
@@ -165,18 +171,21 @@ class NodeTarget:
             self._surroundings.close()
         stop = next((number for number, item in enumerate(self._log) if item["kind"] == "stop"), len(self._log))
         self._log = self._log[:stop]
-        # What brings the robot to rest: all-default messages, and cancels.
-        self._issued = [item for item in self._issued if item[2] or item[0] in ("call", "goal")]
+        # What brings the robot to rest: all-default messages, and cancels; a layer takes leave of its callers.
+        leave = [item for item in self._issued if item[0] in ("answer", "ended")]
+        self._issued = [item for item in self._issued if item not in leave and (item[2] or item[0] in ("call", "goal"))]
         return self._taken()
 
 
-def node_parameters(scenario: Scenario, folder: Path) -> dict[str, Any]:
+def node_parameters(scenario: Scenario, folder: Path, deployment: Deployment) -> dict[str, Any]:
     """The settings as the node's parameters."""
     settings = scenario.all_settings()
+    is_layer = deployment is Deployment.LAYER
+    decisions = {"policy": settings.policy, "every": settings.every}
     return {
+        **({"command_timeout": settings.command_timeout_s} if is_layer else decisions),
         "period": settings.period_s,
-        "policy": settings.policy,
-        "every": settings.every,
+        "service_timeout": settings.service_timeout_s,
         "on_unknown": settings.on_unknown,
         "max_age": [f"{topic}={age}" for topic, age in (settings.max_age_s or {}).items()] or [""],
         "log_folder": str(folder),
@@ -197,4 +206,6 @@ def set_parts(value: Any) -> dict[str, Any]:
 def _plain(value: Any) -> Any:
     if isinstance(value, dict):
         return {name: _plain(part) for name, part in value.items() if name != "header"}
+    if isinstance(value, list):
+        return [_plain(part) for part in value]
     return value if isinstance(value, bool | int | float | str) else None

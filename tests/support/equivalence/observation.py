@@ -1,6 +1,7 @@
 """What a controller shows after each action, and the one message about what differs from the reference."""
 
 import json
+import math
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +12,10 @@ from robosc.execution.event_log import plain
 MAXIMUM_FLOAT32 = 3.4028234663852886e38
 
 Issued = tuple[str, str, Mapping[str, Any]]
-"""`publish`, `default`, `call`, `goal` or `cancel`; of what (`default`: a topic); the data that was given, by path."""
+"""What was asked of the robot: `publish`, `default`, `call`, `goal` or `cancel`; of what (`default`: a topic); the data
+that was given, by path. What a layer told its caller: `pass` and `blocked` (a topic or identifier), `answer`,
+`no answer`, `accept`, `reject`, `told` (feedback) and `ended`; the caller's number of the call or goal is in the data.
+"""
 
 Entry = Mapping[str, Any]
 """An entry of the event log without its times."""
@@ -47,18 +51,23 @@ class Sight:
     """How much a target shows.
 
     Attributes:
-        topics: For a target seen over a middleware, the topic of each message: which of those on a topic was sent is
-            not to be seen, nor which properties were given; a field may have less precision than the model's number.
+        topics: The topic of each message, for a target that does not show which of those on a topic was sent.
+        is_exact: With `topics`: False for a target seen over a middleware. Which properties were given is not to be
+            seen then, a field may have less precision than the model's number, and topics have no order between them.
         log_keys: Which parts of an entry of the log it tells; None: all.
         has_log: Whether it writes a log.
         has_readings: Whether the log tells with an event of the environment what the model reads of the data that
             came; else it tells the data as it came, which is not compared.
+        has_requests: Whether it tells with a request what the model knows of its data; a layer on a middleware tells
+            the whole message, which is not compared.
     """
 
     topics: Mapping[str, str] | None = None
+    is_exact: bool = False
     log_keys: frozenset[str] | None = None
     has_log: bool = True
     has_readings: bool = True
+    has_requests: bool = True
 
 
 FULL = Sight()
@@ -66,7 +75,11 @@ NO_LOG = Sight(has_log=False)
 
 
 def flat(data: Any, path: str = "") -> dict[str, Any]:
-    """Data of a request by path; numbers and truth values as floats, since not every target has all of them."""
+    """Data by path; numbers and truth values as floats, since not every target has all of them."""
+    if isinstance(data, list):
+        return {
+            name: part for place, value in enumerate(data) for name, part in flat(value, f"{path}[{place}]").items()
+        }
     if isinstance(data, dict):
         return {
             name: part
@@ -75,6 +88,8 @@ def flat(data: Any, path: str = "") -> dict[str, Any]:
         }
     if data is None:
         return {}
+    if isinstance(data, float) and math.isnan(data):
+        return {path: "NaN"}  # Which equals itself.
     return {path: data if isinstance(data, str) else float(data)}
 
 
@@ -112,11 +127,16 @@ def difference(target: str, number: int, what: str, expected: Observation, found
 def _seen(issued: Sequence[Issued], sight: Sight) -> list[Any]:
     if sight.topics is None:
         return [list(item) for item in issued]
+    if sight.is_exact:
+        return [
+            [kind, sight.topics.get(name, name) if kind == "publish" else name, data] for kind, name, data in issued
+        ]
     found = []
     for kind, name, data in issued:
         if kind == "default":
             found.append(["publish", name, {}])
         else:
+            kind = "answer" if kind == "no answer" else kind
             subject = sight.topics.get(name, name) if kind == "publish" else name
             found.append([kind, subject, {path: part for path, value in data.items() if (part := _on_wire(value))}])
     # A middleware keeps the order on each topic; between topics, the event log tells it.
@@ -130,8 +150,9 @@ def _on_wire(value: Any) -> Any:
 
 
 def _told(log: Sequence[Entry], sight: Sight) -> list[Entry]:
-    if not sight.has_readings:
-        log = [{**item, "data": None} if item.get("controllable") is False else item for item in log]
+    for is_controllable, is_told in ((False, sight.has_readings), (True, sight.has_requests)):
+        if not is_told:
+            log = [{**item, "data": None} if item.get("controllable") is is_controllable else item for item in log]
     if sight.log_keys is None:
         return list(log)
     return [{key: value for key, value in item.items() if key in sight.log_keys} for item in log]

@@ -3,9 +3,9 @@
 from types import SimpleNamespace
 from typing import Any
 
-from robosc.execution import clock, event_log, executor, settings
+from robosc.execution import clock, event_log, executor, layer, settings
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.model.structure import Communication, CommunicationKind, Model
+from robosc.model.structure import Communication, CommunicationKind, Deployment, Model
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.events import events, is_controllable
 from support.equivalence.observation import FULL, NO_LOG, Entry, Issued, Observation, entry, flat
@@ -33,6 +33,28 @@ class Ids:
     def count(self, name: str) -> int:
         """How many are under way."""
         return len(self._open.get(name, ()))
+
+
+class Callers:
+    """The numbers of the calls and goals of an existing controller: 1, 2 and so on."""
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._last: dict[str, int] = {}
+
+    def next(self, name: str) -> int:
+        """Of one more."""
+        self._count += 1
+        self._last[name] = self._count
+        return self._count
+
+    def last(self, name: str) -> int:
+        """Of the last one there."""
+        return self._last[name]
+
+    def count(self, name: str) -> int:
+        """How many there were until the last one there; 0: none."""
+        return self._last.get(name, 0)
 
 
 class _World:
@@ -88,15 +110,21 @@ class PythonTarget:
         self._servers = [item.name for item in model.communications if _is_server(item)]
         self._clock = runtime.ManualClock()
         self._log = runtime.MemoryLog() if has_log else runtime.NullLog()
-        self._world = _World(self.ids)
+        self._world = self._make_world()
         self._executor: Any = None
 
     def start(self, scenario: Scenario, awaited: Observation | None = None) -> Observation:
         """Begin."""
         settings = self._runtime.Settings(**scenario.all_settings()._asdict())
-        self._executor = self._runtime.Executor(self._system, self._world, settings, self._clock, self._log)
+        self._executor = self._make_executor(settings)
         self._executor.start()
         return self._observation()
+
+    def _make_world(self) -> _World:
+        return _World(self.ids)
+
+    def _make_executor(self, settings: Any) -> Any:
+        return self._runtime.Executor(self._system, self._world, settings, self._clock, self._log)
 
     def do(self, action: Action, awaited: Observation | None = None) -> Observation:
         """Let one thing happen."""
@@ -150,20 +178,89 @@ class PythonTarget:
         return Observation()
 
 
+class _BothSides(_World):
+    """Remembers what both sides of a layer are told."""
+
+    def pass_on(self, identifier: str, message: Any) -> None:
+        self.issued.append(("pass", identifier, flat(message)))
+
+    def blocked(self, identifier: str) -> None:
+        self.issued.append(("blocked", identifier, {}))
+
+    def answer(self, communication: str, call_id: Any, data: Any) -> None:
+        self.issued.append(("answer", communication, {"caller": call_id, **flat(data)}))
+
+    def answer_default(self, communication: str, call_id: Any) -> None:
+        self.issued.append(("no answer", communication, {"caller": call_id}))
+
+    def accept_goal(self, communication: str, goal_id: Any) -> None:
+        self.issued.append(("accept", communication, {"caller": goal_id}))
+
+    def reject_goal(self, communication: str, goal_id: Any) -> None:
+        self.issued.append(("reject", communication, {"caller": goal_id}))
+
+    def pass_feedback(self, communication: str, goal_id: Any, data: Any) -> None:
+        self.issued.append(("told", communication, {"caller": goal_id, **flat(data)}))
+
+    def end_goal(self, communication: str, goal_id: Any, outcome: str, data: Any) -> None:
+        self.issued.append(("ended", communication, {"caller": goal_id, "how": outcome, **flat(data)}))
+
+
+class PythonLayer(PythonTarget):
+    """A system and a supervision layer in this process; `runtime` holds `Layer` in place of `Executor`."""
+
+    def __init__(self, name: str, model: Model, system: Any, runtime: Any, *, has_log: bool = True) -> None:
+        super().__init__(name, model, system, runtime, has_log=has_log)
+        self.callers = Callers()
+
+    @property
+    def is_faulty(self) -> bool:
+        """Whether it rests until it is restarted."""
+        return bool(self._executor.is_faulty)
+
+    def do(self, action: Action, awaited: Observation | None = None) -> Observation:
+        """Let one thing happen."""
+        executor, name = self._executor, action.subject
+        match action.do:
+            case "ask":
+                executor.on_request(name, action.data)
+            case "ask_call":
+                executor.on_call(name, self.callers.next(name), action.data)
+            case "ask_goal":
+                executor.on_goal(name, self.callers.next(name), action.data)
+            case "ask_cancel":
+                executor.on_cancel(name, self.callers.last(name))
+            case _:
+                return super().do(action, awaited)
+        return self._observation()
+
+    def _make_world(self) -> _World:
+        return _BothSides(self.ids)
+
+    def _make_executor(self, settings: Any) -> Any:
+        return self._runtime.Layer(self._system, self._world, self._world, settings, self._clock, self._log)
+
+
 def _is_server(item: Communication) -> bool:
     return item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
 
 
 def reference(supervisor: Supervisor, *, has_log: bool = True) -> PythonTarget:
-    """The yardstick: the executor of RoboSC on the interpreted system."""
+    """The yardstick: the executor of RoboSC on the interpreted system, or its layer if the supervisor is for one."""
     runtime = SimpleNamespace(
         Executor=executor.Executor,
+        Layer=layer.Layer,
         Settings=settings.Settings,
         ManualClock=clock.ManualClock,
         MemoryLog=event_log.MemoryLog,
         NullLog=event_log.NullLog,
     )
-    return PythonTarget("reference", supervisor.model, InterpretedSystem(supervisor), runtime, has_log=has_log)
+    kind = _kind(supervisor)
+    return kind("reference", supervisor.model, InterpretedSystem(supervisor), runtime, has_log=has_log)
+
+
+def _kind(supervisor: Supervisor) -> type[PythonTarget]:
+    return PythonLayer if supervisor.deployment is Deployment.LAYER else PythonTarget
 
 
 def observe(supervisor: Supervisor, scenario: Scenario) -> list[Observation]:
@@ -180,4 +277,4 @@ def generated_python(supervisor: Supervisor, module: Any, *, has_log: bool = Tru
         module: The module.
         has_log: Whether its executor writes a log.
     """
-    return PythonTarget("python", supervisor.model, module.Supervisor(), module, has_log=has_log)
+    return _kind(supervisor)("python", supervisor.model, module.Supervisor(), module, has_log=has_log)

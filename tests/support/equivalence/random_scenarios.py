@@ -1,7 +1,8 @@
 """Random runs: what is likely to bring a controller on, with data that is often at a border."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from random import Random
 from typing import Any
 
@@ -18,10 +19,10 @@ from robosc.expressions import (
     Type,
     leaves,
 )
-from robosc.model.structure import CommunicationKind, Model
+from robosc.model.structure import CommunicationKind, Deployment, Model
 from robosc.supervisor.structure import Supervisor
-from support.equivalence.observation import Observation
-from support.equivalence.python_targets import PythonTarget, reference
+from support.equivalence.observation import Issued, Observation
+from support.equivalence.python_targets import PythonLayer, PythonTarget, reference
 from support.equivalence.scenario import Action, Scenario
 
 # Numbers that a float of 32 bits holds, too, but for the hostile ones.
@@ -29,6 +30,8 @@ _DOUBLES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 6.0, -0.25, -1.0, -2.0)
 # Numbers that any integer field holds, but for the hostile ones.
 _INTEGERS = (0, 1, 2, 3, 4, 5, 6, 7, 100)
 _TEXTS = ("", "a", "it's", '"""\n\\', "é")
+_NAN = math.nan
+_ASKS = {CommunicationKind.SERVICE: "ask_call", CommunicationKind.ACTION: "ask_goal"}
 _OUTCOMES = ("succeeded", "succeeded", "rejected", "aborted", "cancelled", "lost")
 
 
@@ -46,10 +49,13 @@ class Dice:
         self._dice = dice
         self._is_hostile = is_hostile
         self._topics: dict[str, list[Type]] = {}
+        self._asked: dict[str, list[Type]] = {}
         self._texts = (*_TEXTS, *_texts_of(model))
         for item in model.communications:
             if item.kind is CommunicationKind.OUTGOING_MESSAGE and item.response is not None:
                 self._topics.setdefault(item.identifier, []).append(item.response)
+            if item.kind is CommunicationKind.INCOMING_MESSAGE and item.request is not None:
+                self._asked.setdefault(item.identifier, []).append(item.request)
 
     def message(self) -> Action | None:
         """A message on some topic: what all messages of the model read of it."""
@@ -57,6 +63,17 @@ class Dice:
             return None
         topic = self._dice.choice(sorted(self._topics))
         return Action("message", topic, self.datum(*self._topics[topic]))
+
+    def asked(self) -> Action | None:
+        """What an existing controller may ask of a layer: a message, a call, a goal."""
+        servers = [item for item in self._model.communications if item.kind in _ASKS]
+        kinds = {identifier: ("ask", types) for identifier, types in self._asked.items()}
+        kinds |= {item.name: (_ASKS[item.kind], [item.request or NoneType()]) for item in servers}
+        if not kinds:
+            return None
+        subject = self._dice.choice(sorted(kinds))
+        kind, types = kinds[subject]
+        return Action(kind, subject, self.datum(*types))
 
     def received(self, name: str, part: str) -> Any:
         """Data of a reply, feedback or result."""
@@ -116,17 +133,23 @@ def _texts_of(model: Model) -> list[str]:
     ]
 
 
-def random_settings(model: Model, dice: Random) -> dict[str, Any]:
+def random_settings(supervisor: Supervisor, dice: Random) -> dict[str, Any]:
     """Settings under which targets must agree: all but the policy `random`, which C draws from another generator."""
+    model = supervisor.model
     requests = [item.name for item in model.communications if item.kind is not CommunicationKind.OUTGOING_MESSAGE]
     # In source order: C takes no order of them.
     sent = [item for item in model.communications if item.kind is CommunicationKind.INCOMING_MESSAGE]
     topics = list(dict.fromkeys(item.identifier for item in sent))
     policy = dice.choice(("fair", "fair", "priority"))
-    return {
+    decisions: dict[str, Any] = {
         "policy": policy,
         "priority": tuple(dice.sample(requests, dice.randint(0, len(requests)))) if policy == "priority" else (),
         "every": dice.choice(("period", "event")),
+    }
+    if supervisor.deployment is Deployment.LAYER:
+        decisions = {"command_timeout_s": dice.choice((0.0, 0.5, 2.0))}
+    return {
+        **decisions,
         "on_unknown": dice.choice(("default", "default", "keep", "fault")),
         "release_identifiers": tuple(topic for topic in topics if dice.random() < 0.7),
         "service_timeout_s": dice.choice((0.25, 1.5, 10.0)),
@@ -137,13 +160,14 @@ def random_settings(model: Model, dice: Random) -> dict[str, Any]:
 def random_scenario(supervisor: Supervisor, seed: int, length: int, *, is_hostile: bool = True) -> Scenario:
     """A run that follows what the reference asks for: replies come to calls that were made."""
     dice = Random(seed)
-    scenario = Scenario((), random_settings(supervisor.model, dice))
+    scenario = Scenario((), random_settings(supervisor, dice))
     target = reference(supervisor)
     target.start(scenario)
     drawn = Dice(supervisor.model, dice, is_hostile=is_hostile)
     actions: list[Action] = []
+    following = _next_of_layer if supervisor.deployment is Deployment.LAYER else _next
     for _ in range(length):
-        action = _next(supervisor.model, target, dice, drawn)
+        action = following(supervisor.model, target, dice, drawn)
         actions.append(action)
         target.do(action)
     return Scenario(tuple(actions), scenario.settings)
@@ -160,6 +184,23 @@ def _next(model: Model, target: PythonTarget, dice: Random, drawn: Dice) -> Acti
     if chance < 0.65 and (replies := _replies(model, target, dice, drawn, _OUTCOMES)):
         return dice.choice(replies)
     return drawn.message() or Action("tick")
+
+
+def _next_of_layer(model: Model, target: PythonTarget, dice: Random, drawn: Dice) -> Action:
+    assert isinstance(target, PythonLayer)
+    if target.is_faulty and dice.random() < 0.4:
+        return Action("restart")
+    if dice.random() < 0.55:
+        return _next(model, target, dice, drawn)
+    if dice.random() < 0.15 and (cancels := cancels_of(model, target)):
+        return dice.choice(cancels)
+    return drawn.asked() or Action("tick")
+
+
+def cancels_of(model: Model, target: PythonLayer) -> list[Action]:
+    """The cancels of goals that an existing controller has sent."""
+    actions = [item.name for item in model.communications if item.kind is CommunicationKind.ACTION]
+    return [Action("ask_cancel", name) for name in actions if target.callers.count(name)]
 
 
 def _replies(model: Model, target: PythonTarget, dice: Random, drawn: Dice, outcomes: Sequence[str]) -> list[Action]:
@@ -218,24 +259,93 @@ def node_scenario(supervisor: Supervisor, seed: int, length: int) -> Scenario:
     return Scenario(tuple(actions), settings)
 
 
+LAYER_KINDS = frozenset(
+    {"publish", "call", "goal", "cancel", "pass", "blocked", "answer", "no answer", "accept", "reject", "told", "ended"}
+)
+"""What a layer asks for and tells, all of which a random run should show."""
+
+
+def layer_node_scenario(supervisor: Supervisor, seed: int, length: int) -> Scenario:
+    """A run for a layer with real servers: they accept every goal, and end one that is cancelled as cancelled."""
+    dice = Random(seed)
+    model = supervisor.model
+    settings = layer_node_settings(model)
+    target = reference(supervisor)
+    assert isinstance(target, PythonLayer)
+    target.start(Scenario((), settings))
+    drawn = Dice(model, dice, is_hostile=False)
+    actions: list[Action] = []
+    running: set[int] = set()
+    while len(actions) < length:
+        chance = dice.random()
+        replies = _replies(model, target, dice, drawn, ("succeeded", "aborted"))
+        replies = [item for item in replies if item.do not in ("accept", "fail")]
+        # A caller's cancel of a goal that was rejected or has ended does not reach the layer.
+        cancels = [item for item in cancels_of(model, target) if target.callers.last(item.subject) in running]
+        if replies and chance < 0.25:
+            action: Action | None = dice.choice(replies)
+        elif cancels and chance < 0.35:
+            action = dice.choice(cancels)
+        else:
+            action = drawn.message() if chance < 0.6 else drawn.asked()
+            if action is not None and action.do == "ask" and dice.random() < 0.1:
+                action = replace(action, data=_spoiled(action.data))
+        if action is None:
+            break
+        actions.append(action)
+        seen = target.do(action)
+        issued = list(seen.issued)
+        actions += follow(seen, target, issued)
+        running |= {data["caller"] for kind, _, data in issued if kind == "accept"}
+        running -= {data["caller"] for kind, _, data in issued if kind == "ended"}
+    return Scenario(tuple(actions), settings)
+
+
+def layer_node_settings(model: Model) -> dict[str, Any]:
+    """Settings under which a layer does nothing because time passes."""
+    sensors = {item.identifier for item in model.communications if item.max_age is not None}
+    return {
+        "period_s": 3600.0,
+        "command_timeout_s": 0.0,
+        "service_timeout_s": 3600.0,
+        "max_age_s": dict.fromkeys(sorted(sensors), 3600.0),
+    }
+
+
+def _spoiled(data: Any) -> Any:
+    """The same with its numbers not finite."""
+    if isinstance(data, dict):
+        return {name: _spoiled(part) for name, part in data.items()}
+    return _NAN if isinstance(data, float) else data
+
+
+def for_layer_node(supervisor: Supervisor, scenario: Scenario) -> Scenario:
+    """What both sides send in a recorded run, for a layer that does nothing because time passes."""
+    actions = tuple(action for action in scenario.actions if action.do in ("message", "ask"))
+    return Scenario(actions, layer_node_settings(supervisor.model))
+
+
 def for_node(supervisor: Supervisor, scenario: Scenario) -> Scenario:
-    """The messages of a recorded run for a node, whose services answer at once as they did last."""
+    """A recorded run for a node that decides whenever something comes.
+
+    Services answer at once as they did last; goals are accepted at once, and cancelled ones end at once; feedback and
+    other ends come when they came, if there is a goal then.
+    """
     settings = node_settings(supervisor.model)
     answers = {action.subject: action.data for action in scenario.actions if action.do == "reply"}
     target = reference(supervisor)
     target.start(Scenario((), settings))
     actions: list[Action] = []
     for action in scenario.actions:
-        if action.do == "message":
+        if action.do == "end" and action.how == "rejected":
+            action = replace(action, how="aborted")
+        is_of_goal = action.do == "feedback" or (action.do == "end" and action.how != "cancelled")
+        if action.do == "message" or (is_of_goal and target.ids.count(action.subject)):
             actions.append(action)
-            seen = target.do(action)
-            while asked := [name for kind, name, _ in seen.issued if kind == "call"]:
-                actions.append(Action("reply", asked[0], answers[asked[0]]))
-                seen = target.do(actions[-1])
+            actions += follow(target.do(action), target, answers=answers)
     return Scenario(tuple(actions), settings)
 
 
-_NAN = math.nan
 ODD_MESSAGES = tuple(
     Action("message", topic, data)
     for topic, data in (
@@ -258,14 +368,29 @@ ODD_MESSAGES = tuple(
 """What may come to the line follower, too: numbers that are none, and too few."""
 
 
-def follow(seen: Observation, target: PythonTarget) -> list[Action]:
-    """What servers do at once: accept goals, end those that are cancelled."""
+def follow(
+    seen: Observation,
+    target: PythonTarget,
+    issued: list[Issued] | None = None,
+    answers: Mapping[str, Any] | None = None,
+) -> list[Action]:
+    """What servers do at once: accept goals, end those that are cancelled; services with an answer give it.
+
+    `issued` gets what is issued meanwhile.
+    """
     found = []
     waiting = list(seen.issued)
     while waiting:
         kind, name, _ = waiting.pop(0)
-        if kind in ("goal", "cancel"):
-            action = Action("accept", name) if kind == "goal" else Action("end", name, how="cancelled")
+        action = {
+            "goal": Action("accept", name),
+            "cancel": Action("end", name, how="cancelled"),
+            "call": Action("reply", name, answers[name]) if answers and name in answers else None,
+        }.get(kind)
+        if action is not None:
             found.append(action)
-            waiting += target.do(action).issued
+            then = target.do(action).issued
+            waiting += then
+            if issued is not None:
+                issued += then
     return found

@@ -9,6 +9,7 @@ from typing import IO, Any
 
 import pytest
 
+from robosc.model.structure import Deployment
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.ros.topics import servers, topics
 from support.equivalence.node_target import IN_CPP, LIMIT_S, NodeTarget, given, node_parameters, set_parts
@@ -42,7 +43,11 @@ class StandInSurroundings:
 
     def start(self, scenario: Scenario, folder: Path) -> None:
         """Start the node; every server is there."""
-        parameters = {name: value for name, value in node_parameters(scenario, folder).items() if value != [""]}
+        parameters = {
+            name: value
+            for name, value in node_parameters(scenario, folder, Deployment.CONTROLLER).items()
+            if value != [""]
+        }
         words = [word for name, value in parameters.items() for word in ("-p", f"{name}:={_parameter(value)}")]
         with self._output.open("wb") as output, self._errors.open("wb") as errors:
             self._process = subprocess.Popen(
@@ -85,6 +90,10 @@ class StandInSurroundings:
                 self._tell("result", name, str(_ENDS[action.how]), _line(action.data))
             case _:
                 raise ValueError(action.do)
+
+    def ask(self, action: Action) -> None:
+        """Nobody does: these nodes are controllers."""
+        raise ValueError(action.do)
 
     def take_issued(self) -> list[Issued]:
         """What it did since the last time."""

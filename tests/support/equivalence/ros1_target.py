@@ -10,12 +10,15 @@ from pathlib import Path
 from typing import Any
 
 from robosc.execution.interpreter import describe
-from robosc.model.structure import CommunicationKind
+from robosc.expressions import ObjectType
+from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor.structure import Supervisor
 from robosc.targets import generate, write_files
+from robosc.targets.ros.runtime.supervised import robots_name
 from robosc.targets.ros.topics import Topic, servers, topics
 from support.equivalence.node_target import IN_CPP, LIMIT_S, NodeTarget, given, node_parameters, set_parts
-from support.equivalence.observation import Issued
+from support.equivalence.observation import Issued, Sight
+from support.equivalence.ros1_caller import Ros1Caller
 from support.equivalence.scenario import Action, Scenario
 from support.process import Process
 from support.ros1 import PYTHON, Master, Peer, until, wait_until
@@ -48,13 +51,15 @@ class Ros1Surroundings:
         self._python_path = python_path
         self._stack = ExitStack()
         self._servers: dict[str, str] = {}
+        self._is_layer = supervisor.deployment is Deployment.LAYER
+        self._caller: Ros1Caller | None = None
         # How much of what the peer was sent is taken, by kind and name.
         self._taken: dict[tuple[str, str], int] = {}
 
     def start(self, scenario: Scenario, folder: Path) -> None:
         """Start node and surroundings."""
         self._master = self._stack.enter_context(Master(self._folder))
-        for name, value in node_parameters(scenario, folder).items():
+        for name, value in node_parameters(scenario, folder, self._supervisor.deployment).items():
             self._master.set_parameter(f"/{self._name}/{name}", value)
         self._peer = self._stack.enter_context(Peer(self._master, self._folder))
         for topic in self._topics:
@@ -72,6 +77,7 @@ class Ros1Surroundings:
     def _serve(self) -> None:
         """Offer every service and action, as `ros1_peer` has them."""
         linked = {item.name: item for item in describe(self._supervisor).communications}
+        types: dict[str, str] = {}
         for item in servers(self._supervisor.model):
             name = re.sub("^~/", f"/{self._name}/", item.identifier)
             self._servers[item.name] = name
@@ -79,7 +85,13 @@ class Ros1Surroundings:
             if item.kind is CommunicationKind.SERVICE:
                 self._peer.serve(name, type_name)
             else:
-                self._peer.act(name, type_name.removesuffix("Action"))
+                type_name = type_name.removesuffix("Action")
+                # What a layer is told of the end of a cancelled goal is a step of its own.
+                self._peer.act(name, type_name, ends_on_cancel=not self._is_layer)
+            types[item.name] = type_name
+        if self._is_layer:
+            basic = {i.name for i in self._supervisor.model.communications if not isinstance(i.feedback, ObjectType)}
+            self._caller = Ros1Caller(self._peer, list(self._topics), types, self._servers, basic)
 
     def _is_running(self) -> bool:
         reports = self._peer.values(_DIAGNOSTICS)
@@ -88,9 +100,12 @@ class Ros1Surroundings:
     def _is_connected(self) -> bool:
         """Each end says whom it sends to: what is sent now arrives."""
         found = self._connections()
+        for name in self._caller.names() if self._caller else ():
+            if f"/{self._name}" not in self._peer.ends(name):
+                return False
         return all(
             (not topic.received or f"/{self._name}" in self._peer.ends(topic.identifier))
-            and (not topic.published or topic.identifier in found)
+            and (not topic.published or robots_name("", topic.identifier) in found)
             for topic in self._topics
         )
 
@@ -114,19 +129,25 @@ class Ros1Surroundings:
             case "reply":
                 self._peer.do("answer", name=name, message=_fields(action.data))
             case "feedback":
-                self._peer.do("feedback", name=name, message=_fields(action.data))
-            case "end" if action.how != "cancelled":
-                self._peer.do("end", name=name, how=action.how, message=_fields(action.data))
+                self._peer.do("feedback", name=name, message=action.data)
+            case "end" if action.how != "cancelled" or self._is_layer:
+                how = {"cancelled": "canceled"}.get(action.how, action.how)
+                self._peer.do("end", name=name, how=how, message=_fields(action.data))
             case "accept" | "end":
                 # What the peer does by itself, as soon as the goal or its cancel comes.
                 pass
             case _:
                 raise ValueError(action.do)
 
+    def ask(self, action: Action) -> None:
+        """Let the existing controller do it."""
+        assert self._caller is not None
+        self._caller.ask(action)
+
     def take_issued(self) -> list[Issued]:
         """What came since the last time."""
         peer = self._peer
-        found: list[Issued] = []
+        found: list[Issued] = self._caller.take_issued() if self._caller else []
         for topic in self._topics:
             if topic.published:
                 values = self._new("publish", topic.identifier, peer.values(topic.identifier))
@@ -190,7 +211,8 @@ def ros1_target(supervisor: Supervisor, folder: Path) -> NodeTarget:
     write_files(files, package)
     name = next(path.partition("/")[0] for path in files if path.endswith("/node.py"))
     surroundings = Ros1Surroundings(supervisor, name, [PYTHON, "-m", f"{name}.node"], folder, str(package))
-    return NodeTarget("ros1", supervisor.model, surroundings, folder / "events")
+    sight = Sight(has_requests=supervisor.deployment is Deployment.CONTROLLER)
+    return NodeTarget("ros1", supervisor.model, surroundings, folder / "events", sight)
 
 
 def ros1_cpp_target(supervisor: Supervisor, workspace: Path, folder: Path) -> NodeTarget:

@@ -2,18 +2,20 @@
 
 import json
 import signal
+from array import array
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 from robosc.execution.interpreter import describe
-from robosc.model.structure import CommunicationKind
+from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor.structure import Supervisor
 from robosc.targets import generate, write_files
 from robosc.targets.ros.runtime.messages import basic_field, load_message, load_server, message_name
 from robosc.targets.ros.topics import servers, topics
 from support.equivalence.node_target import LIMIT_S, NodeTarget
-from support.equivalence.observation import Issued, flat
+from support.equivalence.observation import Issued, Sight, flat
+from support.equivalence.ros2_caller import Ros2Caller
 from support.equivalence.scenario import Action, Scenario
 from support.ros2 import Peer, RosProcess, environment, own_domain
 from support.ros2_servers import End, HeldAction, HeldService, ServerHost
@@ -42,6 +44,8 @@ class Ros2Surroundings:
         self._seen: dict[str, int] = {}
         self._cancelled: dict[str, int] = {}
         self._settled: Any = None
+        self._is_layer = supervisor.deployment is Deployment.LAYER
+        self._caller: Ros2Caller | None = None
 
     def start(self, scenario: Scenario, folder: Path) -> None:
         """Start node and surroundings."""
@@ -59,7 +63,7 @@ class Ros2Surroundings:
         self._states = self._peer.receive(String, "/state")
         reports = self._peer.receive(DiagnosticArray, "/diagnostics")
         parameters = folder.parent / "parameters.yaml"
-        parameters.write_text(json.dumps({"/**": {"ros__parameters": _parameters(scenario, folder)}}))
+        parameters.write_text(json.dumps({"/**": {"ros__parameters": _parameters(scenario, folder, self._is_layer)}}))
         command = ["-m", f"{package}.node", "--ros-args", "--params-file", str(parameters)]
         self._node = self._stack.enter_context(
             RosProcess(command, variables, self._folder / "run", [self._folder / "package"])
@@ -81,6 +85,7 @@ class Ros2Surroundings:
                 self._peer.publisher(message_class, topic.identifier, _DEPTH)
             if topic.published:
                 self._receive(message_class, topic.identifier)
+        types: dict[str, Any] = {}
         for item in self._model.communications:
             if host is None or item.kind not in (CommunicationKind.SERVICE, CommunicationKind.ACTION):
                 continue
@@ -89,9 +94,14 @@ class Ros2Surroundings:
             type_ = load_server(_ServerType(is_action, str(info.package), str(info.interface)))  # type: ignore[arg-type]
             self._seen[item.name] = 0
             if is_action:
-                self._actions[item.name] = HeldAction(host, type_, item.identifier)
+                # What a layer is told of the end of a cancelled goal is a step of its own.
+                self._actions[item.name] = HeldAction(host, type_, item.identifier, ends_on_cancel=not self._is_layer)
             else:
                 self._services[item.name] = HeldService(host, type_, item.identifier)
+            types[item.name] = type_
+        if self._is_layer:
+            identifiers = {item.name: item.identifier for item in self._model.communications}
+            self._caller = Ros2Caller(self._peer, list(topics(self._model)), types, identifiers, _given, _filled)
 
     def _receive(self, message_class: Any, topic: str) -> None:
         def receive(message: Any) -> None:
@@ -101,6 +111,8 @@ class Ros2Surroundings:
 
     def _is_connected(self) -> bool:
         names = [topic.identifier for topic in topics(self._model) if topic.received]
+        if self._caller and not self._caller.is_connected():
+            return False
         return all(self._peer.publisher(None, name).get_subscription_count() for name in names)
 
     def send(self, topic: str, data: Any) -> None:
@@ -126,7 +138,7 @@ class Ros2Surroundings:
                 self._peer.spin_until(lambda: len(server.handles) == self._seen[name], LIMIT_S, "the goal", self._node)
             case "feedback":
                 self._actions[name].feedback(**_fields(self._actions[name].action_class.Feedback, action.data))
-            case "end" if action.how == "cancelled":
+            case "end" if action.how == "cancelled" and not self._is_layer:
                 # As soon as the cancel comes, the server ends the goal.
                 server = self._actions[name]
                 self._peer.spin_until(server.is_last_over, LIMIT_S, "the cancelled goal's end", self._node)
@@ -139,9 +151,17 @@ class Ros2Surroundings:
     def _response(self, name: str) -> Any:
         return self._services[name].service_class.Response
 
+    def ask(self, action: Action) -> None:
+        """Let the existing controller do it."""
+        assert self._caller is not None
+        self._caller.ask(action)
+
     def take_issued(self) -> list[Issued]:
         """What came since the last time."""
         found, self._issued = self._issued, []
+        if self._caller:
+            found += self._caller.issued
+            self._caller.issued = []
         for kind, server_of in (("call", self._services), ("goal", self._actions)):
             for name, server in server_of.items():
                 requests = server.requests
@@ -193,13 +213,14 @@ class _ServerType:
         self.is_action, self.package, self.type = is_action, package, type_
 
 
-def _parameters(scenario: Scenario, folder: Path) -> dict[str, Any]:
+def _parameters(scenario: Scenario, folder: Path, is_layer: bool) -> dict[str, Any]:
     """The settings as the node's parameters."""
     settings = scenario.all_settings()
+    decisions = {"policy": settings.policy, "every": settings.every}
     found: dict[str, Any] = {
+        **({"command_timeout": settings.command_timeout_s} if is_layer else decisions),
         "period": settings.period_s,
-        "policy": settings.policy,
-        "every": settings.every,
+        "service_timeout": settings.service_timeout_s,
         "on_unknown": settings.on_unknown,
         "log_folder": str(folder),
         "server_wait": LIMIT_S,
@@ -207,7 +228,7 @@ def _parameters(scenario: Scenario, folder: Path) -> dict[str, Any]:
     }
     if settings.max_age_s:
         found["max_age"] = [f"{topic}={age}" for topic, age in settings.max_age_s.items()]
-    if settings.priority:
+    if settings.priority and not is_layer:
         found["priority"] = list(settings.priority)
     if settings.release_identifiers is not None:
         found["release_identifiers"] = list(settings.release_identifiers) or [""]
@@ -226,22 +247,33 @@ def _fill(message: Any, data: Any) -> None:
             setattr(message, name, value)
 
 
-def _fields(message_class: Any, data: Any) -> dict[str, Any]:
-    """The fields of a reply with plain data in it."""
+def _filled(message_class: Any, data: Any) -> Any:
+    """A message with plain data in it."""
     message = message_class()
     _fill(message, data)
+    return message
+
+
+def _fields(message_class: Any, data: Any) -> dict[str, Any]:
+    """The fields of a reply with plain data in it."""
+    message = _filled(message_class, data)
     return {name: getattr(message, name) for name in message.get_fields_and_field_types()}
 
 
 def _given(message: Any) -> dict[str, Any]:
-    """What a message holds, by path; what has its default is left out."""
-    fields = message.get_fields_and_field_types()
-    if message_name(type(message)).startswith("std_msgs/") and "data" in fields:
-        return {path: value for path, value in flat(message.data).items() if value}
-    return {path: value for path, value in flat(_plain(message)).items() if value}
+    """What a message holds, by path; what has its default is left out, such as the 1 of a quaternion's `w`."""
+    defaults = _parts(type(message)())
+    return {path: value for path, value in _parts(message).items() if value and value != defaults.get(path)}
+
+
+def _parts(message: Any) -> dict[str, Any]:
+    is_basic = message_name(type(message)).startswith("std_msgs/") and hasattr(message, "data")
+    return flat(message.data) if is_basic else flat(_plain(message))
 
 
 def _plain(message: Any) -> Any:
+    if isinstance(message, list | array):
+        return [_plain(part) for part in message]
     if not hasattr(message, "get_fields_and_field_types"):
         return message if isinstance(message, bool | int | float | str) else None
     return {name: _plain(getattr(message, name)) for name in message.get_fields_and_field_types() if name != "header"}
@@ -249,4 +281,5 @@ def _plain(message: Any) -> Any:
 
 def ros2_target(supervisor: Supervisor, folder: Path) -> NodeTarget:
     """The target `ros2`."""
-    return NodeTarget("ros2", supervisor.model, Ros2Surroundings(supervisor, folder), folder / "events")
+    sight = Sight(has_requests=supervisor.deployment is Deployment.CONTROLLER)
+    return NodeTarget("ros2", supervisor.model, Ros2Surroundings(supervisor, folder), folder / "events", sight)

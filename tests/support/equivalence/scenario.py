@@ -20,8 +20,9 @@ class Action:
 
     Attributes:
         do: `tick`, `wait` (no period, only time), `message`, `reply`, `fail` (a call), `accept`, `feedback`, `end` (a
-            goal), `stop`, `restart`.
-        subject: The topic, service or action.
+            goal), `stop`, `restart`. What an existing controller does before a supervision layer: `ask` (a message),
+            `ask_call`, `ask_goal`, `ask_cancel` (its last goal there).
+        subject: The topic (`message`, `ask`), or the name of the service or action.
         data: What comes with it, as plain values: dicts of properties, lists, numbers, texts, booleans, None.
         how: `end`: the outcome.
         seconds: `wait`: for how long.

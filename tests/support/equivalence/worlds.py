@@ -3,9 +3,12 @@
 Nothing in them is random, and every number is one that a float of 32 bits holds.
 """
 
+import math
 from collections.abc import Callable, Generator, Sequence
 from typing import Any
 
+from robosc.model.structure import Deployment
+from robosc.supervisor.structure import Supervisor
 from support.equivalence.observation import Issued, Observation
 from support.equivalence.python_targets import reference
 from support.equivalence.scenario import Action, Scenario
@@ -55,6 +58,23 @@ def _line_follower() -> Run:
             coming.append(_message("/line/correction", round(-4 * (offset + heading)) / 8))
         if step in (44, 50):
             coming.append(_message("/emergency_stop/stop" if step == 44 else "/emergency_stop/resume"))
+        issued = yield coming
+
+
+def _supervised_line_follower() -> Run:
+    """The same line, followed by a controller that heeds nothing else; it sends nonsense for a while, and dies."""
+    correction = 0.0
+    world = _line_follower()
+    coming = next(world)
+    issued = yield coming
+    for step in range(60):
+        for kind, name, data in issued:
+            if (kind, name) == ("pass", "/line/correction"):
+                correction = data[""]
+        coming = world.send([item for item in issued if item[0] in ("publish", "default")])
+        turn = math.nan if step in (10, 11) else correction
+        if step < 48:
+            coming.append(Action("ask", "/cmd_vel", {"linear": {"x": 0.25}, "angular": {"z": turn}}))
         issued = yield coming
 
 
@@ -222,6 +242,7 @@ def _person_follower() -> Run:
 WORLDS: dict[str, Callable[[], Run]] = {
     "ball_pusher": _ball_pusher,
     "line_follower": _line_follower,
+    "line_follower_layer": _supervised_line_follower,
     "maze_solver": _maze_solver,
     "navigation": _navigation,
     "object_finder": _object_finder,
@@ -229,9 +250,20 @@ WORLDS: dict[str, Callable[[], Run]] = {
 }
 
 
+_LAYERS = {"line_follower_layer": "line_follower"}
+"""In whose folder each robot is that only makes sense behind a supervision layer."""
+
+
+def robot_supervisor(robot: str) -> Supervisor:
+    """The supervisor of an example robot, for the deployment that its recorded run has."""
+    if robot in _LAYERS:
+        return example_supervisor(f"{_LAYERS[robot]}/{robot}", Deployment.LAYER)
+    return example_supervisor(f"{robot}/{robot}")
+
+
 def live(robot: str) -> tuple[Scenario, list[Observation]]:
     """Let an example robot live in its surroundings, a decision each period: what came, and what the reference did."""
-    target = reference(example_supervisor(f"{robot}/{robot}"))
+    target = reference(robot_supervisor(robot))
     world = WORLDS[robot]()
     next(world)
     seen = [target.start(Scenario(()))]

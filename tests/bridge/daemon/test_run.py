@@ -60,7 +60,8 @@ def running(folder: Path, robot: SimulatedTurtleBot3, base: str) -> Iterator[sub
 
 
 def stands_still(robot: SimulatedTurtleBot3) -> bool:
-    return robot.left.table["present velocity"] == 0 == robot.right.table["present velocity"]
+    robot.world.catch_up()
+    return robot.world.left.speed_rad_s == 0.0 == robot.world.right.speed_rad_s
 
 
 @pytest.mark.parametrize("base", ["opencr", "dynamixel"])

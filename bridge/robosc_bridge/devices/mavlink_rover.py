@@ -364,7 +364,7 @@ class MavlinkRover:
         reasons = [
             told.content.text
             for told in state.texts
-            if told.time_s >= began_s and told.content.severity <= _WARNING and told.content.text
+            if told.time_s >= began_s and told.content.severity <= _WARNING and told.content.data
         ]
         reason = "; ".join(dict.fromkeys(reasons)) or "it gives no reason"
         raise DeviceFaultError(f"{self._path}: the rover does not {action} ({name}): {reason}")

@@ -127,7 +127,7 @@ class VehicleState:
             chunks = (*chunks, text)
             if not text.is_last:
                 return replace(self, _chunks=chunks)
-            text = replace(text, text="".join(chunk.text for chunk in chunks))
+            text = replace(text, data=b"".join(chunk.data for chunk in chunks))
         return replace(self, texts=(*self.texts, Told(time_s, text))[-_KEPT_TEXTS:], _chunks=())
 
 

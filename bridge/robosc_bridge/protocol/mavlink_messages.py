@@ -156,20 +156,25 @@ class Text:
 
     Attributes:
         severity: 0 emergency to 7 debug.
-        text: Without its end.
+        data: As it came, without the zeros at its end; a piece may end within a character.
         number: Of the long text; 0: it is a whole one.
         chunk: Which piece.
     """
 
     severity: int
-    text: str
-    number: int
-    chunk: int
+    data: bytes
+    number: int = 0
+    chunk: int = 0
+
+    @property
+    def text(self) -> str:
+        """For a person."""
+        return self.data.decode("utf-8", errors="replace")
 
     @property
     def is_last(self) -> bool:
         """Whether no piece follows."""
-        return self.number == 0 or len(self.text.encode()) < _CHUNK
+        return self.number == 0 or len(self.data) < _CHUNK
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,7 +286,8 @@ def _battery_status(told: Any) -> BatteryState | None:
 
 
 def _text(told: Any) -> Text:
-    return Text(told.severity, told.text, told.id, told.chunk_seq)
+    # The library's own `text` is ASCII: one character for each byte that is none, of a length of its own.
+    return Text(told.severity, bytes(told._text_raw).partition(b"\0")[0], told.id, told.chunk_seq)
 
 
 def _answer(told: Any) -> Answer:

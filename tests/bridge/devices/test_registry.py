@@ -92,6 +92,6 @@ def test_a_broken_plug_in_is_an_error_only_for_who_asks_for_it(
     monkeypatch: pytest.MonkeyPatch, value: str, problem: str
 ) -> None:
     _entry(monkeypatch, value)
-    assert [info.name for info in available_drivers(Kind.DRIVE_BASE)] == ["dynamixel", "opencr"]
+    assert [info.name for info in available_drivers(Kind.DRIVE_BASE)] == ["dynamixel", "mavlink-rover", "opencr"]
     with pytest.raises(UnknownDriverError, match=f"the plug-in of driver 'plug' {problem}"):
         make_range_scanner("plug")

@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from robosc_bridge.simulated.mavlink_packets import BY_NAME, LAYOUTS, Encoder, Layout, Parser
 
 KEY = bytes(range(32))
-WORKED = {
+WORKED: dict[str, tuple[str, dict[str, Any]]] = {
     "fd 09 00 00 00 01 bf 00 00 00 00 00 00 00 12 08 00 04 03 ae c6": (
         "HEARTBEAT",
         {"type": 18, "autopilot": 8, "system_status": 4, "version": 3},

@@ -321,7 +321,8 @@ class MavlinkRover:
 
     def _comes_to_rest(self) -> bool:
         def is_at_rest(state: VehicleState) -> bool:
-            told = estimate(state)
+            # Where it tells nothing, there is nothing to wait for.
+            told = self._fresh(state)
             return told is None or (
                 abs(told.content.linear_m_s) < _REST_M_S and abs(told.content.angular_rad_s) < _REST_RAD_S
             )

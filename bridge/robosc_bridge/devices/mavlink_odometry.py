@@ -11,11 +11,23 @@ from robosc_bridge.devices.interface import Pose, Velocity
 from robosc_bridge.devices.mavlink_state import Told, VehicleState
 from robosc_bridge.protocol.mavlink_messages import Motion
 
+_NO_LONGER_S = 0.5
+# No vehicle counts its resets so: going from one source to the other is a jump.
+_NO_ODOMETRY = -1
+
 
 def estimate(state: VehicleState) -> Told[Motion] | None:
-    """The newest estimate, and when the older of its parts came; None: there is none yet."""
-    if state.motion is not None:
-        return state.motion
+    """The newest estimate, and when the older of its parts came; None: there is none yet.
+
+    Place and attitude stand in where ODOMETRY does not come, or comes no longer.
+    """
+    pair = _of_place_and_attitude(state)
+    if state.motion is None or (pair is not None and pair.time_s - state.motion.time_s > _NO_LONGER_S):
+        return pair
+    return state.motion
+
+
+def _of_place_and_attitude(state: VehicleState) -> Told[Motion] | None:
     if state.position is None or state.attitude is None:
         return None
     place, attitude = state.position.content, state.attitude.content
@@ -26,6 +38,7 @@ def estimate(state: VehicleState) -> Told[Motion] | None:
         attitude.heading_rad,
         place.x_m_s * cosine + place.y_m_s * sine,
         attitude.turn_rad_s,
+        _NO_ODOMETRY,
     )
     return Told(min(state.position.time_s, state.attitude.time_s), motion)
 

@@ -159,7 +159,9 @@ class MavlinkRover:
             self._following.forget()
             self._find(self._link)
             self._restarts = self._link.state.restarts
-            self._leave_at_rest(self._heartbeat(self._link.state))
+            heartbeat = self._heartbeat(self._link.state)
+            self._check_ours(heartbeat)
+            self._leave_at_rest(heartbeat)
             for telemetry in _TELEMETRY:
                 self._link.request((telemetry,), _TELEMETRY_S.get(telemetry, self._telemetry_s))
             if not self._waits(lambda state: self._fresh(state) is not None, _SHOWN_LIMIT_S):
@@ -172,20 +174,22 @@ class MavlinkRover:
             raise
 
     def set_torque(self, is_on: bool) -> None:
-        """Enter GUIDED and arm; or stop and disarm, unless somebody else has taken the vehicle over.
+        """Enter GUIDED and arm; or stop and disarm. A vehicle that somebody else has taken over is left to them.
 
         Raises:
             LineError: The line is gone.
             DeviceSilentError: The vehicle does not answer.
-            DeviceFaultError: It refuses, with its reason.
-            DeviceError: It does not come to rest.
+            DeviceFaultError: It refuses, with its reason, or somebody else drives it.
         """
         link = self._used_link
         self._is_torque_wanted = False
+        heartbeat = self._heartbeat(link.state)
         if not is_on:
-            self._leave_at_rest(self._heartbeat(link.state))
+            if not self._is_another_s(heartbeat):
+                self._leave_at_rest(heartbeat)
             return
-        if self._heartbeat(link.state).mode != Mode.GUIDED:
+        self._check_ours(heartbeat)
+        if heartbeat.mode != Mode.GUIDED:
             self._command(Command.SET_MODE, entering(Mode.GUIDED), "go to mode GUIDED")
             self._must_show(lambda heartbeat: heartbeat.mode == Mode.GUIDED, "show mode GUIDED")
         self._send_target(STANDSTILL)
@@ -219,19 +223,20 @@ class MavlinkRover:
             self._is_torque_wanted = False
             raise DeviceError(f"{self._path}: the rover has started anew; it must be opened again")
         is_obeying = heartbeat.is_armed and heartbeat.mode == Mode.GUIDED
+        told = self._fresh(state)
         if self._is_torque_wanted:
             self._is_torque_lost = self._is_torque_lost or not is_obeying
-            target = STANDSTILL if self._is_torque_lost else velocity
+            # Nor is one driven that no longer tells what it does.
+            target = STANDSTILL if self._is_torque_lost or told is None else velocity
             target = within_limits(target, self.limits, self._robot.wheel_separation_m)
             if self._is_due(target):
                 self._send_target(target)
-        told = self._fresh(state)
         if told is None:
             raise DeviceSilentError(f"{self._path}: the rover has not told its motion for {self._motion_limit_s:g} s")
         return self._reading(state, told, is_obeying)
 
     def reset(self) -> None:
-        """Take the vehicle back when a person says so: see whether it arms in GUIDED, and disarm it again.
+        """See whether the vehicle arms in GUIDED again, and disarm it.
 
         Raises:
             LineError: The line is gone.
@@ -296,20 +301,21 @@ class MavlinkRover:
         is_fresh = told is not None and time.monotonic() - told.time_s <= self._motion_limit_s
         return told if is_fresh else None
 
-    def _leave_at_rest(self, heartbeat: Heartbeat) -> None:
-        """Stop and disarm.
+    def _is_another_s(self, heartbeat: Heartbeat) -> bool:
+        return heartbeat.is_armed and heartbeat.mode != Mode.GUIDED
 
-        Raises:
-            DeviceFaultError: Somebody else drives it.
-        """
-        if not heartbeat.is_armed:
-            return
-        if heartbeat.mode != Mode.GUIDED:
+    def _check_ours(self, heartbeat: Heartbeat) -> None:
+        if self._is_another_s(heartbeat):
             mode = Mode(heartbeat.mode).name if heartbeat.mode in Mode else str(heartbeat.mode)
-            raise DeviceFaultError(f"{self._path}: somebody else drives the rover: it is armed in mode {mode}")
-        self._send_target(STANDSTILL)
-        self._comes_to_rest()
-        self._disarm(_TRIALS)
+            raise DeviceFaultError(
+                f"{self._path}: somebody else drives the rover: it is armed in mode {mode}; disarm it there first"
+            )
+
+    def _leave_at_rest(self, heartbeat: Heartbeat) -> None:
+        if heartbeat.is_armed:
+            self._send_target(STANDSTILL)
+            self._comes_to_rest()
+            self._disarm(_TRIALS)
 
     def _disarm(self, trials: int) -> None:
         """Stopping is not refused: what a polite command does not reach, a forced one does."""

@@ -90,7 +90,14 @@ def test_an_estimate_is_as_old_as_its_older_part() -> None:
     assert told.time_s == 0.0
     assert (told.content.linear_m_s, told.content.angular_rad_s) == pytest.approx((0.4, 0.3))
     motion = Motion(1.0, 2.0, 0.0, 0.0, 0.0)
-    assert estimate(_after(motion, state=state)) == Told(0.0, motion)
+    place = LocalPosition(1.0, 2.0, 3.0, 0.1, 0.4)
+    both = _after(None, motion, place, state=state)
+    assert estimate(both) == Told(1.0, motion)
+    # It comes no longer; the other estimate is another frame.
+    later = _after(None, None, None, Attitude(2.0, 0.0, 0.0), place, state=both)
+    found = estimate(later)
+    assert found is not None
+    assert found.content.resets != motion.resets
 
 
 places = st.floats(-100, 100)

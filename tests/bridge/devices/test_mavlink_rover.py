@@ -363,6 +363,9 @@ def test_closing_leaves_a_vehicle_that_a_person_drives_to_them(bench: Bench) -> 
     bench.start()
     bench.rover.take_over(MANUAL, -0.1)
     bench.drive_until(lambda reading: not reading.is_torque_on, FORWARD, 1.5)
+    bench.base.set_torque(False)
+    with pytest.raises(DeviceFaultError, match="somebody else drives the rover"):
+        bench.base.set_torque(True)
     bench.base.close()
     assert bench.rover.is_armed
     assert bench.speed_m_s == pytest.approx(-0.1)
@@ -421,6 +424,7 @@ def test_silence_is_told_in_time(any_bench: Bench) -> None:
     begin_s = time.monotonic()
     with pytest.raises(DeviceSilentError, match="has not told its motion for 1 s"):
         bench.drive(FORWARD, 3.0)
+    wait_until(lambda: bench.speed_m_s == 0.0, 0.5)
     assert 0.8 < time.monotonic() - begin_s < 1.4
 
 

@@ -31,6 +31,7 @@ class LineError(BridgeError):
     def __init__(self, path: str, problem: str) -> None:
         super().__init__(f"{path}: {problem}")
         self.path = path
+        self.problem = problem
 
 
 class LineMissingError(LineError):

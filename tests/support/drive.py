@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from robosc_bridge.devices.dynamixel import DynamixelBase
 from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, exchange_limit_s
 from robosc_bridge.devices.interface import STANDSTILL, DriveReading, Velocity
+from robosc_bridge.devices.mavlink_rover import MavlinkRover, RoverBody
 from robosc_bridge.devices.opencr import OpenCrBase
 from robosc_bridge.devices.robots import ROBOTS
 from robosc_bridge.simulated import SimulatedTurtleBot3
@@ -60,12 +61,12 @@ class Rig:
     Attributes:
         robot: The simulated one.
         base: Its driver, of the kind `kind`.
-        kind: `opencr` or `dynamixel`.
-        tap: On its line.
+        kind: `opencr`, `dynamixel` or `mavlink-rover`.
+        tap: On its line; understands the packets of Dynamixel only.
     """
 
     robot: SimulatedTurtleBot3
-    base: OpenCrBase | DynamixelBase
+    base: OpenCrBase | DynamixelBase | MavlinkRover
     kind: str
     tap: Tap
 
@@ -75,7 +76,8 @@ class Rig:
         self.base.set_torque(True)
 
     def hurry(self, answer_limit_s: float = ANSWER_LIMIT_S) -> None:
-        """From now on, time-outs as on a robot, or as given."""
+        """From now on, time-outs as on a robot, or as given; a MAVLink rover is not asked for anything."""
+        assert not isinstance(self.base, MavlinkRover)
         bus = self.base._bus
         assert bus is not None
         bus._port.answer_limit_s = answer_limit_s
@@ -125,16 +127,23 @@ def rig(kind: str, robot: str = "burger", answer_limit_s: float = PATIENT_S, **a
     """A simulated robot and its driver, not opened.
 
     Args:
-        kind: `opencr` or `dynamixel`.
+        kind: `opencr`, `dynamixel` or `mavlink-rover`.
         robot: Its name.
-        answer_limit_s: Of the driver.
+        answer_limit_s: Of the driver, if it asks.
         arguments: Further ones of the simulated robot.
     """
     with SimulatedTurtleBot3(robot, kind, **arguments) as simulated:  # type: ignore[arg-type]
         tap = Tap(simulated.base_line.device)
         simulated.base_line.device = tap
-        driver = OpenCrBase if kind == "opencr" else DynamixelBase
-        base = driver(simulated.base_path, ROBOTS[robot], answer_limit_s=answer_limit_s)
+        base: OpenCrBase | DynamixelBase | MavlinkRover
+        if kind == "mavlink-rover":
+            body = ROBOTS[robot]
+            base = MavlinkRover(
+                simulated.base_path, RoverBody(body.linear_m_s, body.angular_rad_s, body.wheel_separation_m)
+            )
+        else:
+            driver = OpenCrBase if kind == "opencr" else DynamixelBase
+            base = driver(simulated.base_path, ROBOTS[robot], answer_limit_s=answer_limit_s)
         try:
             yield Rig(simulated, base, kind, tap)
         finally:

@@ -61,6 +61,10 @@ _BUILT_IN: dict[Kind, dict[str, tuple[str, str]]] = {
             "two Dynamixel X wheels (XL430-W250, XM430-W210) on a U2D2 or another half-duplex adapter",
             "robosc_bridge.devices.dynamixel:DynamixelBase",
         ),
+        "mavlink-rover": (
+            "a MAVLink rover: ArduPilot Rover, driven in its mode GUIDED over a serial line, UDP or TCP",
+            "robosc_bridge.devices.mavlink_rover:MavlinkRover",
+        ),
         "opencr": (
             "a stock TurtleBot3: its OpenCR board with the ROS 2 firmware",
             "robosc_bridge.devices.opencr:OpenCrBase",
@@ -75,6 +79,10 @@ _BUILT_IN: dict[Kind, dict[str, tuple[str, str]]] = {
         "lds03": (
             "the LiDAR LDS-03 (COIN-D4): 0.05 to 12 m, 10 turns a second",
             "robosc_bridge.devices.lidar:make_lds03",
+        ),
+        "mavlink-rover": (
+            "the obstacles that a MAVLink rover tells of, also on the line of its drive base",
+            "robosc_bridge.devices.mavlink_obstacles:MavlinkObstacles",
         ),
     },
 }

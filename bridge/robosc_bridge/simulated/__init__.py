@@ -5,10 +5,12 @@
 in a process of its own. Nothing here knows the drivers' encoders and decoders: both sides stand on the manuals alone.
 """
 
+from robosc_bridge.simulated.datagram_line import DatagramFaults, DatagramLine
 from robosc_bridge.simulated.lidar import LIDARS, Lds01, Lds02, Lds03, Lidar
 from robosc_bridge.simulated.line import Faults, SimulatedLine
 from robosc_bridge.simulated.opencr import OpenCr
 from robosc_bridge.simulated.robots import BODIES, Body
+from robosc_bridge.simulated.rover import Rover
 from robosc_bridge.simulated.servo import HardwareError, Servo
 from robosc_bridge.simulated.servo_bus import ServoBus
 from robosc_bridge.simulated.timebase import Timebase
@@ -21,6 +23,8 @@ __all__ = [
     "BODIES",
     "LIDARS",
     "Body",
+    "DatagramFaults",
+    "DatagramLine",
     "Faults",
     "HardwareError",
     "Lds01",
@@ -28,6 +32,7 @@ __all__ = [
     "Lds03",
     "Lidar",
     "OpenCr",
+    "Rover",
     "Servo",
     "ServoBus",
     "SimulatedLine",

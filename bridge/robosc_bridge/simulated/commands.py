@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import fields
 
 from robosc_bridge.simulated.line import Faults, SimulatedLine
+from robosc_bridge.simulated.rover import Rover
 from robosc_bridge.simulated.servo import HardwareError, Servo
 from robosc_bridge.simulated.turtlebot3 import SimulatedTurtleBot3
 
@@ -11,11 +12,14 @@ HELP = """\
 base|scanner disconnect|reconnect|sound     the plug of a line; `sound` removes its faults
 base|scanner FAULT VALUE                    a fault of a line: {faults}
 base answers_as ID|own                      the ID that its answers carry
-left|right overheat|cool_down               a wheel's servo
+left|right overheat|cool_down               a wheel's servo; a rover has none
 left|right trip ERROR                       an error of its hardware: {errors}
 left|right block|release                    a wheel
 left|right voltage V                        a servo's supply
-battery V                                   OpenCR's battery
+battery V                                   OpenCR's or the rover's battery
+rover refuse REASON|accept                  whether it arms
+rover take_over MODE                        its mode's number, by its remote control
+rover disarm|restart|silent|heard           the rover's autopilot
 press|let NAME                              button_1, button_2, bumper_1, bumper_2 of OpenCR
 scanner cover|uncover|stall|go              the LiDAR
 scanner turn SHARE                          its speed, as a share of the nominal one
@@ -64,10 +68,14 @@ def _obey(robot: SimulatedTurtleBot3, words: list[str]) -> str:
             robot.world.place(float(x), float(y), float(heading))
         case ["collisions"]:
             return f"collisions {robot.world.collisions}"
-        case ["left" | "right" as side, *what]:
+        case ["left" | "right" as side, *what] if robot.rover is None:
             _to_servo(robot.left if side == "left" else robot.right, what)
         case ["battery", voltage] if robot.opencr is not None:
             robot.opencr.set_battery(float(voltage))
+        case ["battery", voltage] if robot.rover is not None:
+            robot.rover.battery_v = float(voltage)
+        case ["rover", *what] if robot.rover is not None:
+            _to_rover(robot.rover, what)
         case ["press" | "let" as what, name] if robot.opencr is not None:
             robot.opencr.press(**{name: what == "press"})
         case ["scanner", "cover" | "uncover" as what]:
@@ -76,7 +84,7 @@ def _obey(robot: SimulatedTurtleBot3, words: list[str]) -> str:
             robot.scanner.is_stalled = what == "stall"
         case ["scanner", "turn", share]:
             robot.scanner.turn_at(float(share))
-        case ["base", "answers_as", device_id]:
+        case ["base", "answers_as", device_id] if robot.rover is None:
             answers_as = None if device_id == "own" else int(device_id)
             # It has one of the two.
             if robot.opencr is not None:
@@ -106,6 +114,24 @@ def _to_servo(servo: Servo, words: list[str]) -> None:
             servo.brown_out(float(voltage))
         case _:
             raise UnknownCommandError(f"a servo does not know {' '.join(words)!r}; `help` lists what it knows")
+
+
+def _to_rover(rover: Rover, words: list[str]) -> None:
+    match words:
+        case ["refuse", *reason] if reason:
+            rover.refusal = " ".join(reason)
+        case ["accept"]:
+            rover.refusal = ""
+        case ["take_over", mode]:
+            rover.take_over(int(mode))
+        case ["disarm"]:
+            rover.disarm()
+        case ["restart"]:
+            rover.restart()
+        case ["silent" | "heard" as what]:
+            rover.is_silent = what == "silent"
+        case _:
+            raise UnknownCommandError(f"a rover does not know {' '.join(words)!r}; `help` lists what it knows")
 
 
 def _boolean(text: str) -> bool:

@@ -1,4 +1,7 @@
-"""A whole TurtleBot3 in a world: a drive base and a LiDAR, each on a serial line of its own."""
+"""A whole TurtleBot3 in a world: a drive base and a LiDAR, each on a serial line of its own.
+
+Its body may also have the autopilot of a MAVLink rover in place of its own base; the wheels are the autopilot's then.
+"""
 
 from pathlib import Path
 from types import TracebackType
@@ -9,13 +12,14 @@ from robosc_bridge.simulated.lidar import LIDARS, Lidar
 from robosc_bridge.simulated.line import Faults, SimulatedLine
 from robosc_bridge.simulated.opencr import OpenCr
 from robosc_bridge.simulated.robots import BODIES
+from robosc_bridge.simulated.rover import Rover
 from robosc_bridge.simulated.servo import Servo
 from robosc_bridge.simulated.servo_bus import ServoBus
 from robosc_bridge.simulated.timebase import Timebase
 from robosc_bridge.simulated.walls import Walls, room
 from robosc_bridge.simulated.world import World
 
-BASES = ("opencr", "dynamixel")
+BASES = ("opencr", "dynamixel", "mavlink-rover")
 # As the set-up of a TurtleBot3 leaves its motors: 1 Mbps, velocity mode, the right one reversed.
 _SET_UP = {"baud rate": 3, "operating mode": 1}
 
@@ -33,7 +37,7 @@ class SimulatedTurtleBot3:
 
     Args:
         robot: Key of `BODIES`.
-        base: `opencr`, or `dynamixel` for two servos behind an adapter.
+        base: `opencr`, `dynamixel` for two servos behind an adapter, or `mavlink-rover`.
         lidar: Key of `LIDARS`.
         walls: Around it; None: a room of 4 m by 3 m.
         clock: Of its devices; None: the computer's.
@@ -49,10 +53,11 @@ class SimulatedTurtleBot3:
     Attributes:
         time: That all of it lives by.
         world: Walls, pose, wheels.
-        left: The left servo, also behind OpenCR.
+        left: The left servo, also behind OpenCR; of no use where the base is a MAVLink rover.
         right: The right one.
         opencr: The board; None: the servos are reached directly.
-        bus: The servos' bus; None: they are behind OpenCR.
+        bus: The servos' bus; None: they are not reached directly.
+        rover: The autopilot of a MAVLink rover; None: it has another base.
         scanner: The LiDAR.
         base_line: The base's line, with its faults.
         scanner_line: The LiDAR's.
@@ -87,13 +92,16 @@ class SimulatedTurtleBot3:
         self.left, self.right = wheel_servos(self.world)
         self.opencr: OpenCr | None = None
         self.bus: ServoBus | None = None
-        device: OpenCr | ServoBus
+        self.rover: Rover | None = None
+        device: OpenCr | ServoBus | Rover
         if base == "opencr":
             device = self.opencr = OpenCr(
                 self.world, self.left, self.right, has_motors=has_motors, calibration_s=calibration_s
             )
-        else:
+        elif base == "dynamixel":
             device = self.bus = ServoBus((self.left, self.right))
+        else:
+            device = self.rover = Rover(self.world)
         self.scanner: Lidar = LIDARS[lidar](self.world, seed=seed, noise_m=noise_m)
         self.base_line = SimulatedLine(device, self.time, base_link, seed)
         try:

@@ -199,3 +199,30 @@ def test_servos_have_no_buttons() -> None:
         for line in ("battery 11.0", "press button_1"):
             with pytest.raises(UnknownCommandError):
                 obey(robot, line)
+
+
+def test_a_rover_is_told() -> None:
+    with SimulatedTurtleBot3(base="mavlink-rover", clock=ManualClock()) as robot:
+        rover = robot.rover
+        assert rover is not None
+        obey(robot, "rover refuse no GPS")
+        assert rover.refusal == "no GPS"
+        obey(robot, "rover accept")
+        assert rover.refusal == ""
+        obey(robot, "rover take_over 4")
+        assert rover.mode == 4
+        rover.is_armed = True
+        obey(robot, "rover disarm")
+        assert not rover.is_armed
+        rover.is_armed = True
+        obey(robot, "rover restart")
+        assert not rover.is_armed
+        obey(robot, "rover silent")
+        assert rover.is_silent
+        obey(robot, "rover heard")
+        assert not rover.is_silent
+        obey(robot, "battery 10.5")
+        assert rover.battery_v == 10.5
+        for line in ("left overheat", "rover jump", "rover refuse", "rover take_over x", "base answers_as 7", "rover"):
+            with pytest.raises(UnknownCommandError):
+                obey(robot, line)

@@ -1,0 +1,278 @@
+"""One line to a vehicle, and everyone in this process who uses it.
+
+A drive base and a scanner may be configured on one line, and have a thread each. A thread of the line itself reads, and
+sorts what comes; it never sends. What is sent comes from its users' threads, so that a user who no longer lives keeps
+nothing alive: above all, the heartbeat is sent by the drive base where there is one.
+"""
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from robosc_bridge.devices.mavlink_signing import Signing
+from robosc_bridge.devices.mavlink_state import Told, VehicleState
+from robosc_bridge.errors import LineBusyError, LineError, LineLostError
+from robosc_bridge.protocol.framing import FrameCounts
+from robosc_bridge.protocol.mavlink import Codec, Decoder
+from robosc_bridge.protocol.mavlink_messages import (
+    Command,
+    Message,
+    ObstacleRing,
+    SectorDistance,
+    Telemetry,
+    command,
+    own_heartbeat,
+)
+from robosc_bridge.transport.network_line import NetworkLine, is_network_address
+from robosc_bridge.transport.serial_line import SerialLine
+
+BAUD = 57_600
+HEARTBEAT_S = 1.0
+_KEPT_OBSTACLES = 32
+_READ_S = 1.0
+
+type Obstacle = ObstacleRing | SectorDistance
+
+
+@dataclass(frozen=True, slots=True)
+class LinkSettings:
+    """How a vehicle is reached, the same for all who share its line.
+
+    Attributes:
+        path: Of a serial port, or an address of `transport.network_line`.
+        baud: Of a serial port.
+        system: Of the vehicle; None: the first rover that is heard.
+        own_system: Ours; ArduPilot's failsafe counts the heartbeats of 255 alone, unless set otherwise.
+        own_component: Ours.
+        signing: How packets are signed; None: not, and signatures are not asked for.
+    """
+
+    path: str
+    baud: int = BAUD
+    system: int | None = None
+    own_system: int = 255
+    own_component: int = 190
+    signing: Signing | None = None
+
+
+class VehicleLink:
+    """An open line to a vehicle; made by `acquire`.
+
+    Args:
+        settings: How it is reached.
+
+    Raises:
+        LineError: The line cannot be used.
+    """
+
+    def __init__(self, settings: LinkSettings) -> None:
+        self.settings = settings
+        self.has_driver = False
+        self.users = 0
+        self._signing = settings.signing.begin() if settings.signing else None
+        self._codec = Codec(
+            settings.own_system,
+            settings.own_component,
+            self._signing.key if self._signing else None,
+            settings.signing.link if settings.signing else 0,
+            self._signing.timestamp() if self._signing else 0,
+        )
+        self._decoder = Decoder(self._codec)
+        self._state = VehicleState(settings.system)
+        self._obstacles: deque[Told[Obstacle]] = deque(maxlen=_KEPT_OBSTACLES)
+        self._lost: LineError | None = None
+        self._is_closing = False
+        self._changed = threading.Condition()
+        self._sending = threading.Lock()
+        self._heartbeat_s = -HEARTBEAT_S
+        self._line: SerialLine | NetworkLine = (
+            NetworkLine(settings.path)
+            if is_network_address(settings.path)
+            else SerialLine(settings.path, settings.baud)
+        )
+        self._reader = threading.Thread(target=self._read, name=f"MAVLink {settings.path}", daemon=True)
+        self._reader.start()
+
+    @property
+    def state(self) -> VehicleState:
+        """What the vehicle has told so far.
+
+        Raises:
+            LineLostError: The line is gone.
+        """
+        with self._changed:
+            self._check()
+            return self._state
+
+    @property
+    def counts(self) -> FrameCounts:
+        """What the line has brought."""
+        with self._changed:
+            return replace(self._decoder.counts)
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether the line is gone."""
+        return self._lost is not None
+
+    def wait(self, is_so: Callable[[VehicleState], bool], limit_s: float) -> bool:
+        """Wait until the vehicle has told something; whether it has, in time.
+
+        Raises:
+            LineLostError: The line is gone.
+        """
+        with self._changed:
+            found = self._changed.wait_for(lambda: self._lost is not None or is_so(self._state), limit_s)
+            self._check()
+            return found
+
+    def take_obstacles(self, limit_s: float, is_woken: Callable[[], bool]) -> list[Told[Obstacle]]:
+        """What was told of obstacles since it was taken last; waits for the first.
+
+        Raises:
+            LineLostError: The line is gone.
+        """
+        with self._changed:
+            self._changed.wait_for(lambda: bool(self._lost or self._obstacles or is_woken()), max(limit_s, 0.0))
+            self._check()
+            found = list(self._obstacles)
+            self._obstacles.clear()
+            return found
+
+    def wake(self) -> None:
+        """Let all who wait look whether they are meant."""
+        with self._changed:
+            self._changed.notify_all()
+
+    def send(self, make: Callable[[Any], Any]) -> None:
+        """Send one message, made with the library's codec.
+
+        Raises:
+            LineLostError: The line is gone, or does not take it.
+        """
+        with self._sending:
+            # The codec is the reader's, too: what is heard moves the time of signing.
+            with self._changed:
+                self._check()
+                if self._signing:
+                    self._codec.not_before(self._signing.timestamp())
+                packet = self._codec.encode(make)
+                timestamp = self._codec.timestamp
+            if self._signing:
+                self._signing.reserve(timestamp)
+            self._line.write(packet)
+
+    def keep_alive(self) -> None:
+        """Send our heartbeat when it is due.
+
+        Raises:
+            LineLostError: The line is gone.
+        """
+        now_s = time.monotonic()
+        if now_s - self._heartbeat_s >= HEARTBEAT_S:
+            self._heartbeat_s = now_s
+            self.send(own_heartbeat)
+
+    def request(self, telemetry: tuple[Telemetry, ...], interval_s: float) -> None:
+        """Ask the vehicle to send messages that often; those that it does not know it refuses, and that is all.
+
+        Raises:
+            LineLostError: The line is gone.
+        """
+        state = self.state
+        if state.system is None or state.component is None:
+            return
+        for number in telemetry:
+            self.send(
+                command(state.system, state.component, Command.SET_MESSAGE_INTERVAL, 0, float(number), interval_s * 1e6)
+            )
+
+    def close(self) -> None:
+        """Give the line back; never raises."""
+        self._is_closing = True
+        self._line.wake()
+        self._reader.join()
+        self._line.close()
+
+    def _check(self) -> None:
+        if self._lost is not None:
+            raise LineLostError(self.settings.path, self._lost.problem)
+
+    def _read(self) -> None:
+        try:
+            while not self._is_closing:
+                data = self._line.read(_READ_S)
+                if data:
+                    self._take(data, time.monotonic())
+        except LineError as error:
+            with self._changed:
+                self._lost = error
+                self._changed.notify_all()
+            # Whoever plugs it in again must not find it busy.
+            self._line.close()
+
+    def _take(self, data: bytes, time_s: float) -> None:
+        with self._changed:
+            messages = self._decoder.feed(data)
+            for message in messages:
+                self._sort(message, time_s)
+            if isinstance(self._line, NetworkLine) and self._line.is_datagram:
+                # A packet does not go on in the next datagram.
+                self._decoder.forget()
+            if messages:
+                self._changed.notify_all()
+
+    def _sort(self, message: Message, time_s: float) -> None:
+        own = (self.settings.own_system, self.settings.own_component)
+        before = self._state
+        self._state = before.after(message, time_s, own)
+        if self._state.heartbeat is not before.heartbeat and isinstance(self._line, NetworkLine):
+            self._line.answer_sender()
+        # A companion computer of the vehicle may be what sees.
+        if isinstance(message.content, (ObstacleRing, SectorDistance)) and message.system == self._state.system:
+            self._obstacles.append(Told(time_s, message.content))
+
+
+_links: dict[str, VehicleLink] = {}
+_guard = threading.Lock()
+
+
+def acquire(settings: LinkSettings, *, as_driver: bool) -> VehicleLink:
+    """The link on that line, opened if nobody uses it yet; to be given back by `release`.
+
+    Args:
+        settings: How it is reached.
+        as_driver: Whether it is to be driven; one user at a time may do that.
+
+    Raises:
+        LineBusyError: It is driven already, or used with other settings.
+        LineError: The line cannot be used.
+    """
+    with _guard:
+        link = _links.get(settings.path)
+        if link is not None and not link.is_lost:
+            if link.settings != settings:
+                raise LineBusyError(settings.path, "another device of this program uses it with other settings")
+            if as_driver and link.has_driver:
+                raise LineBusyError(settings.path, "another drive base of this program uses this port")
+        else:
+            link = _links[settings.path] = VehicleLink(settings)
+        link.users += 1
+        link.has_driver = link.has_driver or as_driver
+        return link
+
+
+def release(link: VehicleLink, *, as_driver: bool) -> None:
+    """Give it back; the last one closes it."""
+    with _guard:
+        link.users -= 1
+        if as_driver:
+            link.has_driver = False
+        if link.users:
+            return
+        if _links.get(link.settings.path) is link:
+            del _links[link.settings.path]
+    link.close()

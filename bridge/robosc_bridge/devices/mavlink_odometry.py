@@ -1,0 +1,82 @@
+"""Where a vehicle is since it was first seen, from the estimate that its autopilot tells.
+
+An autopilot counts from where its estimator began, and the estimate may jump: when it is reset, when the vehicle starts
+anew, when another message is what tells it. A jump is no motion.
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+
+from robosc_bridge.devices.interface import Pose, Velocity
+from robosc_bridge.devices.mavlink_state import Told, VehicleState
+from robosc_bridge.protocol.mavlink_messages import Motion
+
+_NO_LONGER_S = 0.5
+# No vehicle counts its resets so: going from one source to the other is a jump.
+_NO_ODOMETRY = -1
+
+
+def estimate(state: VehicleState) -> Told[Motion] | None:
+    """The newest estimate, and when the older of its parts came; None: there is none yet.
+
+    Place and attitude stand in where ODOMETRY does not come, or comes no longer.
+    """
+    pair = _of_place_and_attitude(state)
+    if state.motion is None or (pair is not None and pair.time_s - state.motion.time_s > _NO_LONGER_S):
+        return pair
+    return state.motion
+
+
+def _of_place_and_attitude(state: VehicleState) -> Told[Motion] | None:
+    if state.position is None or state.attitude is None:
+        return None
+    place, attitude = state.position.content, state.attitude.content
+    cosine, sine = math.cos(attitude.heading_rad), math.sin(attitude.heading_rad)
+    motion = Motion(
+        place.x_m,
+        place.y_m,
+        attitude.heading_rad,
+        place.x_m_s * cosine + place.y_m_s * sine,
+        attitude.turn_rad_s,
+        _NO_ODOMETRY,
+    )
+    return Told(min(state.position.time_s, state.attitude.time_s), motion)
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleOdometry:
+    """An odometry after some estimates; `advanced` gives the one after the next.
+
+    Attributes:
+        pose: Where the body is.
+        velocity: Of the body.
+        last: The last estimate; None: the next one is no motion.
+        rebases: How often the estimate has jumped.
+    """
+
+    pose: Pose = field(default_factory=Pose)
+    velocity: Velocity = field(default_factory=Velocity)
+    last: Motion | None = None
+    rebases: int = 0
+
+    def advanced(self, motion: Motion) -> "VehicleOdometry":
+        """The odometry after another estimate."""
+        velocity = Velocity(motion.linear_m_s, motion.angular_rad_s)
+        last = self.last
+        if last is None or last.resets != motion.resets:
+            jumps = self.rebases + (last is not None)
+            return replace(self, velocity=velocity, last=motion, rebases=jumps)
+        # The step, as seen along the vehicle's heading then, is the same in both frames.
+        turn_rad = self.pose.heading_rad - last.heading_rad
+        x_m, y_m = motion.x_m - last.x_m, motion.y_m - last.y_m
+        heading_rad = math.remainder(motion.heading_rad + turn_rad, 2 * math.pi)
+        pose = Pose(
+            self.pose.x_m + x_m * math.cos(turn_rad) - y_m * math.sin(turn_rad),
+            self.pose.y_m + x_m * math.sin(turn_rad) + y_m * math.cos(turn_rad),
+            math.pi if heading_rad <= -math.pi else heading_rad,
+        )
+        return replace(self, pose=pose, velocity=velocity, last=motion)
+
+    def rebased(self) -> "VehicleOdometry":
+        """The odometry whose next estimate is no motion."""
+        return replace(self, last=None)

@@ -1,0 +1,443 @@
+"""A MAVLink rover: ArduPilot Rover, driven in its mode GUIDED by velocity and turn rate.
+
+The vehicle stops by itself 3 s after the last target. It is no real-time wheel bus: it tells once a second whether it
+is armed and in which mode, and a person with its remote control may take it over at any time, which is respected.
+
+Sources: ArduPilot Rover (`GCS_MAVLink_Rover.cpp`, `mode_guided.cpp`, `AP_Arming_Rover.cpp`), mavlink.io.
+"""
+
+import contextlib
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from robosc_bridge.devices.following import FollowingWatch
+from robosc_bridge.devices.interface import STANDSTILL, DriveLimits, DriveReading, MotorFault, Velocity
+from robosc_bridge.devices.kinematics import wheel_speeds, within_limits
+from robosc_bridge.devices.mavlink_link import BAUD, LinkSettings, VehicleLink, acquire, release
+from robosc_bridge.devices.mavlink_odometry import VehicleOdometry, estimate
+from robosc_bridge.devices.mavlink_signing import Signing
+from robosc_bridge.devices.mavlink_state import Told, VehicleState
+from robosc_bridge.errors import (
+    BridgeError,
+    DeviceError,
+    DeviceFaultError,
+    DeviceSilentError,
+    WrongDeviceError,
+)
+from robosc_bridge.protocol.mavlink_messages import (
+    Command,
+    Heartbeat,
+    Mode,
+    Motion,
+    Result,
+    Telemetry,
+    arming,
+    command,
+    entering,
+    velocity_target,
+)
+
+HEARTBEAT_LIMIT_S = 3.5
+"""Three heartbeats of the vehicle were lost."""
+
+_FIRST_HEARTBEAT_LIMIT_S = 3.5
+_TELEMETRY = (
+    Telemetry.ATTITUDE,
+    Telemetry.LOCAL_POSITION,
+    Telemetry.ODOMETRY,
+    Telemetry.SYS_STATUS,
+    Telemetry.BATTERY_STATUS,
+)
+_TELEMETRY_S = {Telemetry.SYS_STATUS: 1.0, Telemetry.BATTERY_STATUS: 1.0}
+_ANSWER_LIMIT_S = 1.0
+_TRIALS = 3
+_SHOWN_LIMIT_S = 3.0
+_SLICE_S = 0.05
+_REST_LIMIT_S = 3.0
+_REST_M_S = 0.05
+_REST_RAD_S = 0.1
+_CLOSE_TRIALS = 1
+# Five times a second is asked for; a new velocity goes out at once, unless a slow radio would be filled by it.
+_TARGET_S = 0.1
+_NEW_TARGET_S = 0.02
+_WARNING = 4
+_FOLLOWING_LIMIT_S = 2.0
+_MM = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class RoverBody:
+    """What a rover can do, as its owner knows it.
+
+    Attributes:
+        linear_m_s: Fastest forward and backward; not more than its parameter CRUISE_SPEED, at which it caps.
+        angular_rad_s: Fastest turn.
+        wheel_separation_m: Between its left and its right wheels.
+    """
+
+    linear_m_s: float
+    angular_rad_s: float
+    wheel_separation_m: float
+
+    def __post_init__(self) -> None:
+        for name in ("linear_m_s", "angular_rad_s", "wheel_separation_m"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"{name} of a rover must be a positive number, and is {value}")
+
+    @property
+    def limits(self) -> DriveLimits:
+        """Of the body; each wheel may be as fast as both together make it."""
+        wheel_m_s = self.linear_m_s + self.angular_rad_s * self.wheel_separation_m / 2
+        return DriveLimits(self.linear_m_s, self.angular_rad_s, wheel_m_s)
+
+
+class MavlinkRover:
+    """A `DriveBase`. Used from one thread.
+
+    Args:
+        path: Of a serial port; or `udpin:HOST:PORT`, `udpout:HOST:PORT`, `tcp:HOST:PORT`.
+        robot: What it can do.
+        baud: Of a serial port.
+        system: Of the vehicle; None: the first rover that is heard.
+        own_system: Ours.
+        own_component: Ours.
+        signing: How packets are signed; None: not.
+        motion_limit_s: For how long the vehicle's last estimate of its motion holds.
+        telemetry_s: How often it is asked to tell its motion.
+
+    Attributes:
+        limits: What it can do.
+    """
+
+    def __init__(
+        self,
+        path: str,
+        robot: RoverBody,
+        baud: int = BAUD,
+        *,
+        system: int | None = None,
+        own_system: int = 255,
+        own_component: int = 190,
+        signing: Signing | None = None,
+        motion_limit_s: float = 1.0,
+        telemetry_s: float = 0.05,
+    ) -> None:
+        self.limits: DriveLimits = robot.limits
+        self._path = path
+        self._robot = robot
+        self._settings = LinkSettings(path, baud, system, own_system, own_component, signing)
+        self._motion_limit_s = motion_limit_s
+        self._telemetry_s = telemetry_s
+        self._link: VehicleLink | None = None
+        self._odometry = VehicleOdometry()
+        self._following = FollowingWatch(_FOLLOWING_LIMIT_S)
+        self._began_s = time.monotonic()
+        self._restarts = 0
+        self._is_torque_wanted = False
+        self._is_torque_lost = False
+        self._target = STANDSTILL
+        self._target_s = -math.inf
+
+    def open(self) -> None:
+        """Find the vehicle and check that it is a rover that tells where it is and that nobody else drives.
+
+        Raises:
+            LineError: The line cannot be used.
+            DeviceSilentError: No vehicle is heard.
+            WrongDeviceError: It is no ArduPilot Rover.
+            DeviceFaultError: Somebody else drives it, or it does not know where it is, or does not disarm.
+        """
+        self.close()
+        self._link = acquire(self._settings, as_driver=True)
+        try:
+            self._is_torque_wanted = self._is_torque_lost = False
+            self._target, self._target_s = STANDSTILL, -math.inf
+            self._odometry = self._odometry.rebased()
+            self._following.forget()
+            self._find(self._link)
+            self._restarts = self._link.state.restarts
+            heartbeat = self._heartbeat(self._link.state)
+            self._check_ours(heartbeat)
+            self._leave_at_rest(heartbeat)
+            for telemetry in _TELEMETRY:
+                self._link.request((telemetry,), _TELEMETRY_S.get(telemetry, self._telemetry_s))
+            if not self._waits(lambda state: self._fresh(state) is not None, _SHOWN_LIMIT_S):
+                raise DeviceFaultError(
+                    f"{self._path}: the rover does not tell where it is; its estimator has no origin (GPS, or another "
+                    "source of its position)"
+                )
+        except BaseException:
+            self._release()
+            raise
+
+    def set_torque(self, is_on: bool) -> None:
+        """Enter GUIDED and arm; or stop and disarm. A vehicle that somebody else has taken over is left to them.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceSilentError: The vehicle does not answer.
+            DeviceFaultError: It refuses, with its reason, or somebody else drives it.
+        """
+        link = self._used_link
+        self._is_torque_wanted = False
+        heartbeat = self._heartbeat(link.state)
+        if not is_on:
+            if not self._is_another_s(heartbeat):
+                self._leave_at_rest(heartbeat)
+            return
+        self._check_ours(heartbeat)
+        if heartbeat.mode != Mode.GUIDED:
+            self._command(Command.SET_MODE, entering(Mode.GUIDED), "go to mode GUIDED")
+            self._must_show(lambda heartbeat: heartbeat.mode == Mode.GUIDED, "show mode GUIDED")
+        self._send_target(STANDSTILL)
+        if not self._heartbeat(link.state).is_armed:
+            self._command(Command.ARM_DISARM, arming(True), "arm")
+            try:
+                self._must_show(lambda heartbeat: heartbeat.is_armed, "show that it is armed")
+            except DeviceError:
+                self._disarm(_CLOSE_TRIALS)
+                raise
+        self._send_target(STANDSTILL)
+        self._is_torque_wanted = True
+        self._is_torque_lost = False
+        self._following.forget()
+
+    def exchange(self, velocity: Velocity) -> DriveReading:
+        """Send the velocity and our heartbeat where they are due, and tell what came; waits for nothing.
+
+        A target is sent at once when it is another one, and again every 100 ms, if this is called that often.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceSilentError: No heartbeat, or no estimate of its motion, has come for too long.
+            DeviceError: The vehicle has started anew.
+        """
+        link = self._used_link
+        link.keep_alive()
+        state = link.state
+        heartbeat = self._heartbeat(state)
+        if state.restarts != self._restarts:
+            self._is_torque_wanted = False
+            raise DeviceError(f"{self._path}: the rover has started anew; it must be opened again")
+        is_obeying = heartbeat.is_armed and heartbeat.mode == Mode.GUIDED
+        told = self._fresh(state)
+        if self._is_torque_wanted:
+            self._is_torque_lost = self._is_torque_lost or not is_obeying
+            # Nor is one driven that no longer tells what it does.
+            target = STANDSTILL if self._is_torque_lost or told is None else velocity
+            target = within_limits(target, self.limits, self._robot.wheel_separation_m)
+            if self._is_due(target):
+                self._send_target(target)
+        if told is None:
+            raise DeviceSilentError(f"{self._path}: the rover has not told its motion for {self._motion_limit_s:g} s")
+        return self._reading(state, told, is_obeying)
+
+    def reset(self) -> None:
+        """See whether the vehicle arms in GUIDED again, and disarm it.
+
+        Raises:
+            LineError: The line is gone.
+            DeviceSilentError: The vehicle does not answer.
+            DeviceFaultError: It refuses, with its reason.
+        """
+        self.set_torque(True)
+        self.set_torque(False)
+
+    def close(self) -> None:
+        """Stop, disarm, and give the line back; a vehicle that somebody else drives is left to them."""
+        if self._link is not None and self._is_torque_wanted:
+            self._is_torque_wanted = False
+            with contextlib.suppress(BridgeError):
+                heartbeat = self._heartbeat(self._link.state)
+                if heartbeat.is_armed and heartbeat.mode == Mode.GUIDED:
+                    self._send_target(STANDSTILL)
+                    self._comes_to_rest()
+                    self._disarm(_CLOSE_TRIALS)
+        self._release()
+
+    def _release(self) -> None:
+        link, self._link = self._link, None
+        if link is not None:
+            release(link, as_driver=True)
+
+    @property
+    def _used_link(self) -> VehicleLink:
+        if self._link is None:
+            raise DeviceError(f"{self._path}: the rover is not open")
+        return self._link
+
+    def _find(self, link: VehicleLink) -> None:
+        if self._waits(lambda state: state.heartbeat is not None, _FIRST_HEARTBEAT_LIMIT_S):
+            self._heartbeat(link.state)
+            return
+        stranger = link.state.stranger
+        if stranger is not None:
+            raise WrongDeviceError(
+                f"{self._path}: the vehicle there is of type {stranger.kind} with autopilot {stranger.autopilot}"
+                f"{'' if self._settings.system is None else ' or has another system number'}, "
+                "not ArduPilot Rover (10, 3)"
+            )
+        raise DeviceSilentError(
+            f"{self._path}: no heartbeat of a rover within {_FIRST_HEARTBEAT_LIMIT_S:g} s; is it on, does it speak "
+            f"MAVLink 2 here{'' if self._settings.signing is None else ', and has it the same signing key'}?"
+        )
+
+    def _heartbeat(self, state: VehicleState) -> Heartbeat:
+        """The last one.
+
+        Raises:
+            DeviceSilentError: It was too long ago.
+        """
+        told = state.heartbeat
+        if told is None or time.monotonic() - told.time_s > HEARTBEAT_LIMIT_S:
+            raise DeviceSilentError(f"{self._path}: no heartbeat of the rover for {HEARTBEAT_LIMIT_S:g} s")
+        return told.content
+
+    def _fresh(self, state: VehicleState) -> Told[Motion] | None:
+        told = estimate(state)
+        is_fresh = told is not None and time.monotonic() - told.time_s <= self._motion_limit_s
+        return told if is_fresh else None
+
+    def _is_another_s(self, heartbeat: Heartbeat) -> bool:
+        return heartbeat.is_armed and heartbeat.mode != Mode.GUIDED
+
+    def _check_ours(self, heartbeat: Heartbeat) -> None:
+        if self._is_another_s(heartbeat):
+            mode = Mode(heartbeat.mode).name if heartbeat.mode in Mode else str(heartbeat.mode)
+            raise DeviceFaultError(
+                f"{self._path}: somebody else drives the rover: it is armed in mode {mode}; disarm it there first"
+            )
+
+    def _leave_at_rest(self, heartbeat: Heartbeat) -> None:
+        if heartbeat.is_armed:
+            self._send_target(STANDSTILL)
+            self._comes_to_rest()
+            self._disarm(_TRIALS)
+
+    def _disarm(self, trials: int) -> None:
+        """Stopping is not refused: what a polite command does not reach, a forced one does."""
+        try:
+            self._command(Command.ARM_DISARM, arming(False), "disarm", trials)
+        except DeviceFaultError:
+            self._command(Command.ARM_DISARM, arming(False, is_forced=True), "disarm by force", trials)
+        self._must_show(lambda heartbeat: not heartbeat.is_armed, "show that it is disarmed")
+
+    def _comes_to_rest(self) -> bool:
+        def is_at_rest(state: VehicleState) -> bool:
+            # Where it tells nothing, there is nothing to wait for.
+            told = self._fresh(state)
+            return told is None or (
+                abs(told.content.linear_m_s) < _REST_M_S and abs(told.content.angular_rad_s) < _REST_RAD_S
+            )
+
+        return self._waits(is_at_rest, _REST_LIMIT_S)
+
+    def _command(self, number: Command, parameters: tuple[float, ...], action: str, trials: int = _TRIALS) -> None:
+        """Send a command until it is answered.
+
+        Raises:
+            DeviceFaultError: It is refused.
+            WrongDeviceError: The vehicle does not know it.
+            DeviceSilentError: It is not answered.
+        """
+        link = self._used_link
+        began_s = time.monotonic()
+        for confirmation in range(trials):
+            state = link.state
+            if state.system is None or state.component is None:
+                break
+            link.send(command(state.system, state.component, number, confirmation, *parameters))
+
+            def is_answered(now: VehicleState) -> bool:
+                told = now.answers.get(number)
+                return told is not None and told.time_s >= began_s and told.content.result != Result.IN_PROGRESS
+
+            if self._waits(is_answered, _ANSWER_LIMIT_S):
+                self._check_answer(link.state, number, began_s, action)
+                return
+        raise DeviceSilentError(f"{self._path}: the rover does not answer when told to {action}")
+
+    def _check_answer(self, state: VehicleState, number: Command, began_s: float, action: str) -> None:
+        result = state.answers[number].content.result
+        if result == Result.ACCEPTED:
+            return
+        if result == Result.UNSUPPORTED:
+            raise WrongDeviceError(f"{self._path}: the rover does not know how to {action}")
+        name = Result(result).name.lower().replace("_", " ") if result in Result else f"result {result}"
+        # The reason comes as text, before the answer.
+        reasons = [
+            told.content.text
+            for told in state.texts
+            if told.time_s >= began_s and told.content.severity <= _WARNING and told.content.data
+        ]
+        reason = "; ".join(dict.fromkeys(reasons)) or "it gives no reason"
+        raise DeviceFaultError(f"{self._path}: the rover does not {action} ({name}): {reason}")
+
+    def _must_show(self, is_so: Callable[[Heartbeat], bool], what: str) -> None:
+        """Wait for the heartbeat that shows it: an accepted command is not yet a done one.
+
+        Raises:
+            DeviceFaultError: It does not come.
+        """
+
+        def is_shown(state: VehicleState) -> bool:
+            return state.heartbeat is not None and is_so(state.heartbeat.content)
+
+        if not self._waits(is_shown, _SHOWN_LIMIT_S):
+            raise DeviceFaultError(f"{self._path}: the rover has accepted the command, but does not {what}")
+
+    def _waits(self, is_so: Callable[[VehicleState], bool], limit_s: float) -> bool:
+        """Wait until the vehicle has told something, with our heartbeat going on; whether it has, in time."""
+        link = self._used_link
+        end_s = time.monotonic() + limit_s
+        while True:
+            link.keep_alive()
+            left_s = end_s - time.monotonic()
+            if link.wait(is_so, max(min(left_s, _SLICE_S), 0.0)):
+                return True
+            if left_s <= 0:
+                return False
+
+    def _is_due(self, target: Velocity) -> bool:
+        since_s = time.monotonic() - self._target_s
+        if target == self._target:
+            return since_s >= _TARGET_S
+        return target == STANDSTILL or since_s >= _NEW_TARGET_S
+
+    def _send_target(self, target: Velocity) -> None:
+        link = self._used_link
+        state = link.state
+        if state.system is None or state.component is None:
+            return
+        self._target, self._target_s = target, time.monotonic()
+        boot_ms = int((self._target_s - self._began_s) * 1000) % 2**32
+        link.send(velocity_target(state.system, state.component, boot_ms, target.linear_m_s, target.angular_rad_s))
+
+    def _reading(self, state: VehicleState, told: Told[Motion], is_obeying: bool) -> DriveReading:
+        if told.content is not self._odometry.last:
+            self._odometry = self._odometry.advanced(told.content)
+        velocity = self._odometry.velocity
+        wheels_m_s = wheel_speeds(velocity, self._robot.wheel_separation_m)
+        faults = {MotorFault.TORQUE_LOST} if self._is_torque_lost else set()
+        is_on = self._is_torque_wanted and is_obeying and not self._is_torque_lost
+        if is_on:
+            goals = [round(speed * _MM) for speed in wheel_speeds(self._target, self._robot.wheel_separation_m)]
+            if self._following.is_blocked(goals, [round(speed * _MM) for speed in wheels_m_s], told.time_s):
+                faults.add(MotorFault.BLOCKED)
+        else:
+            self._following.forget()
+        main, pack = state.battery, state.pack
+        return DriveReading(
+            time_s=told.time_s,
+            pose=self._odometry.pose,
+            velocity=velocity,
+            wheels_m_s=wheels_m_s,
+            is_torque_on=is_on,
+            faults=frozenset(faults),
+            battery_v=next((found.voltage_v for found in (main, pack) if found and found.voltage_v is not None), None),
+            battery_share=next((found.share for found in (main, pack) if found and found.share is not None), None),
+            imu={"angular_velocity_z": velocity.angular_rad_s},
+        )

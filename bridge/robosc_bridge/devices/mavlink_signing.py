@@ -1,0 +1,101 @@
+"""The key of MAVLink signing, and its time, which must never be used twice, not even across restarts.
+
+Source: mavlink.io, "Message Signing". It says who sent a packet; it hides nothing.
+"""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from robosc_bridge.errors import DeviceError
+from robosc_bridge.protocol.mavlink import KEY_LENGTH
+
+_EPOCH_S = 1_420_070_400  # 2015-01-01 in UTC.
+_UNITS_PER_S = 100_000
+_RESERVED = 60 * _UNITS_PER_S
+
+
+class SigningError(DeviceError):
+    """There is no key, or the time of the last packet cannot be kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class Signing:
+    """How packets are signed.
+
+    Attributes:
+        key_file: 32 bytes, or as many as hexadecimal text. Beside it, with the ending `.timestamp`, the time is kept.
+        link: Number of the signed stream, 0 to 255: another one for every line to the same vehicle.
+    """
+
+    key_file: Path
+    link: int = 0
+
+    def begin(self) -> "SigningTime":
+        """The key, and a time after all that were used.
+
+        Raises:
+            SigningError: There is no key, or the time cannot be kept.
+        """
+        return SigningTime(_read_key(self.key_file), self.key_file.with_name(self.key_file.name + ".timestamp"))
+
+
+class SigningTime:
+    """A time that only goes on.
+
+    It is reserved in steps ahead of what is used, so that a file is written once a minute and a program that is killed
+    has used nothing beyond what its successor begins with.
+
+    Args:
+        key: Of signing.
+        path: Where the time is kept.
+
+    Raises:
+        SigningError: It cannot be kept there.
+    """
+
+    def __init__(self, key: bytes, path: Path) -> None:
+        self.key = key
+        self._path = path
+        try:
+            self._least = int(path.read_text(encoding="ascii")) if path.exists() else 0
+        except (OSError, ValueError) as error:
+            raise SigningError(f"{path}: the time of the last signed packet cannot be read") from error
+        self._reserved = 0
+        self.reserve(self.timestamp())
+
+    def timestamp(self) -> int:
+        """Now, and never before what was used; in units of 10 us since 2015."""
+        return max(self._least, int((time.time() - _EPOCH_S) * _UNITS_PER_S))
+
+    def reserve(self, timestamp: int) -> None:
+        """See to it that no successor uses a time up to this one.
+
+        Raises:
+            SigningError: It cannot be kept.
+        """
+        if timestamp < self._reserved:
+            return
+        self._reserved = timestamp + _RESERVED
+        written = self._path.with_name(self._path.name + ".new")
+        try:
+            written.write_text(str(self._reserved), encoding="ascii")
+            written.replace(self._path)
+        except OSError as error:
+            raise SigningError(f"{self._path}: the time of signed packets cannot be kept: {error.strerror}") from error
+
+
+def _read_key(path: Path) -> bytes:
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise SigningError(f"{path}: the key of signing cannot be read: {error.strerror}") from error
+    if len(data) == KEY_LENGTH:
+        return data
+    try:
+        key = bytes.fromhex(data.decode("ascii"))
+    except ValueError:
+        key = b""
+    if len(key) != KEY_LENGTH:
+        raise SigningError(f"{path}: a key of signing is {KEY_LENGTH} bytes, or as many as hexadecimal text")
+    return key

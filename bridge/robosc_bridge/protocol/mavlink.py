@@ -1,0 +1,119 @@
+"""MAVLink 2 packets: what goes to a vehicle as bytes, what comes from it as values.
+
+pymavlink's generated codec packs, unpacks, checks and signs; it is made for that, and knows every message. Its search
+for packets is not used: behind a header in noise it takes whole packets along, and without `MAVLINK20=1` in the
+environment `mavutil` speaks MAVLink 1. Sources: mavlink.io (serialization, signing) and pymavlink 2.4.50.
+"""
+
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from robosc_bridge.protocol.framing import FrameDecoder
+from robosc_bridge.protocol.mavlink_messages import READERS, Message
+
+MAGIC = 0xFD
+_HEADER = 10
+_CHECKSUM = 2
+_SIGNATURE = 13
+_SIGNED = 1  # The only flag of what a receiver must understand.
+_RADIO_STATUS = 109  # Radios put it into the stream themselves, and have no key.
+KEY_LENGTH = 32
+
+
+class Codec:
+    """Packs what is sent by one component, and unpacks what it hears; keeps sequence number and signing time.
+
+    Used from several threads only under a lock.
+
+    Args:
+        system: Of the sender.
+        component: Of the sender.
+        key: Of signing: `KEY_LENGTH` bytes; None: packets are not signed, and signatures are not asked for.
+        link: Of the signed stream.
+        timestamp: Of the first signed packet, in units of 10 us since 2015 in UTC; each takes at least one.
+    """
+
+    def __init__(
+        self, system: int, component: int, key: bytes | None = None, link: int = 0, timestamp: int = 0
+    ) -> None:
+        self._codec: Any = dialect.MAVLink(None, srcSystem=system, srcComponent=component)
+        if key is not None:
+            if len(key) != KEY_LENGTH:
+                raise ValueError(f"a key of MAVLink signing has {KEY_LENGTH} bytes, not {len(key)}")
+            signing = self._codec.signing
+            signing.secret_key = key
+            signing.link_id = link
+            signing.timestamp = timestamp
+            signing.sign_outgoing = True
+            signing.allow_unsigned_callback = lambda codec, number: number == _RADIO_STATUS
+
+    @property
+    def is_signing(self) -> bool:
+        """Whether it has a key."""
+        return self._codec.signing.secret_key is not None
+
+    @property
+    def timestamp(self) -> int:
+        """Of the next signed packet; what is heard may move it forward."""
+        return int(self._codec.signing.timestamp)
+
+    def not_before(self, timestamp: int) -> None:
+        """Let time pass: the library moves the timestamp by packets alone."""
+        self._codec.signing.timestamp = max(self._codec.signing.timestamp, timestamp)
+
+    def encode(self, make: Callable[[Any], Any]) -> bytes:
+        """The next packet.
+
+        Args:
+            make: Makes the message, with the library's codec.
+        """
+        packet = bytes(make(self._codec).pack(self._codec))
+        self._codec.seq = (self._codec.seq + 1) % 256
+        return packet
+
+    def decode(self, packet: bytes) -> Any | None:
+        """The library's message; None: checksum, contents or signature are wrong."""
+        signing = self._codec.signing
+        heard = dict(signing.stream_timestamps)
+        try:
+            return self._codec.decode(bytearray(packet))
+        except dialect.MAVError:
+            # It notes the time of a packet before it checks who signed it: one forged or damaged packet from the far
+            # future would shut out all that come.
+            signing.stream_timestamps = heard
+            return None
+
+
+class Decoder(FrameDecoder[Message]):
+    """Finds packets of MAVLink 2; those of MAVLink 1 and of messages that the dialect does not know are skipped.
+
+    Args:
+        codec: That checks and unpacks them.
+    """
+
+    first_byte: ClassVar[int] = MAGIC
+    header_length: ClassVar[int] = _HEADER
+
+    def __init__(self, codec: Codec) -> None:
+        super().__init__()
+        self._codec = codec
+
+    def _length(self, data: bytes, at: int) -> int:
+        flags = data[at + 2]
+        # Without its message's extra byte, a checksum cannot be checked.
+        if flags & ~_SIGNED or int.from_bytes(data[at + 7 : at + 10], "little") not in dialect.mavlink_map:
+            return 0
+        return _HEADER + data[at + 1] + _CHECKSUM + (_SIGNATURE if flags & _SIGNED else 0)
+
+    def _frame(self, data: bytes, at: int, length: int) -> Message | None:
+        found = self._codec.decode(data[at : at + length])
+        if found is None:
+            return None
+        number = found.get_msgId()
+        try:
+            content = READERS[number](found) if number in READERS else None
+        except ValueError:
+            return None
+        return Message(found.get_srcSystem(), found.get_srcComponent(), content)

@@ -1,0 +1,377 @@
+"""What a vehicle tells, as values in the axes of REP 103, and what it is told.
+
+MAVLink counts yaw clockwise, y to the right and z down; here it is counter-clockwise, left and up. Sources: mavlink.io
+(common messages) and ArduPilot Rover (`GCS_MAVLink_Rover.cpp`, `mode_guided.cpp`).
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+GROUND_ROVER = 10
+ARDUPILOT = 3
+GROUND_STATIONS = frozenset({6})
+ARMED = 128
+
+_ONBOARD_CONTROLLER = 18
+_NO_AUTOPILOT = 8
+_ACTIVE = 4
+_BODY_NED = 8
+# All but the speeds and the turn rate is to be ignored; that of accelerations must be said.
+_VELOCITY_AND_TURN_RATE = 0x05E7
+_CUSTOM_MODE = 1
+_FORCE = 21196
+_LOCAL_NED, _LOCAL_FRD, _BODY_FRD = 1, 20, 12
+_UNKNOWN = 65535
+_CHUNK = 50
+
+
+class Mode(IntEnum):
+    """Of ArduPilot Rover."""
+
+    MANUAL = 0
+    ACRO = 1
+    STEERING = 3
+    HOLD = 4
+    LOITER = 5
+    FOLLOW = 6
+    SIMPLE = 7
+    DOCK = 8
+    CIRCLE = 9
+    AUTO = 10
+    RTL = 11
+    SMART_RTL = 12
+    GUIDED = 15
+    INITIALISING = 16
+
+
+class Command(IntEnum):
+    """What a vehicle can be asked for, with its number."""
+
+    SET_MODE = 176
+    ARM_DISARM = 400
+    SET_MESSAGE_INTERVAL = 511
+
+
+class Result(IntEnum):
+    """How a command was answered."""
+
+    ACCEPTED = 0
+    TEMPORARILY_REJECTED = 1
+    DENIED = 2
+    UNSUPPORTED = 3
+    FAILED = 4
+    IN_PROGRESS = 5
+
+
+class Telemetry(IntEnum):
+    """Messages that a vehicle sends again and again, with their numbers."""
+
+    SYS_STATUS = 1
+    ATTITUDE = 30
+    LOCAL_POSITION = 32
+    DISTANCE_SENSOR = 132
+    BATTERY_STATUS = 147
+    OBSTACLE_DISTANCE = 330
+    ODOMETRY = 331
+
+
+@dataclass(frozen=True, slots=True)
+class Heartbeat:
+    """That somebody is there, and how."""
+
+    kind: int
+    autopilot: int
+    is_armed: bool
+    mode: int
+
+
+@dataclass(frozen=True, slots=True)
+class Attitude:
+    """Heading and turn rate, counter-clockwise.
+
+    Attributes:
+        boot_s: Since the vehicle started.
+        heading_rad: From north.
+        turn_rad_s: Its rate.
+    """
+
+    boot_s: float
+    heading_rad: float
+    turn_rad_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class LocalPosition:
+    """Place and velocity in the world: x north, y west, in metres (per second)."""
+
+    boot_s: float
+    x_m: float
+    y_m: float
+    x_m_s: float
+    y_m_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Place and velocity as one estimate: x ahead of some first heading, y to its left.
+
+    Attributes:
+        x_m: Place.
+        y_m: The same.
+        heading_rad: Counter-clockwise.
+        linear_m_s: Of the body, forward.
+        angular_rad_s: Of the body, counter-clockwise.
+        resets: Counts how often the estimate has jumped.
+    """
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+    linear_m_s: float
+    angular_rad_s: float
+    resets: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class BatteryState:
+    """Of the first battery; None: not told.
+
+    Attributes:
+        is_main: Whether it is the summary that every vehicle sends.
+        voltage_v: Of the whole pack.
+        share: 0 to 1.
+    """
+
+    is_main: bool
+    voltage_v: float | None
+    share: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A text, or a piece of a long one.
+
+    Attributes:
+        severity: 0 emergency to 7 debug.
+        data: As it came, without the zeros at its end; a piece may end within a character.
+        number: Of the long text; 0: it is a whole one.
+        chunk: Which piece.
+    """
+
+    severity: int
+    data: bytes
+    number: int = 0
+    chunk: int = 0
+
+    @property
+    def text(self) -> str:
+        """For a person."""
+        return self.data.decode("utf-8", errors="replace")
+
+    @property
+    def is_last(self) -> bool:
+        """Whether no piece follows."""
+        return self.number == 0 or len(self.data) < _CHUNK
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """To a command; targets of 0: to everybody."""
+
+    command: int
+    result: int
+    target_system: int
+    target_component: int
+
+
+@dataclass(frozen=True, slots=True)
+class ObstacleRing:
+    """Distances around, clockwise.
+
+    Attributes:
+        distances_cm: Of each sector: `most_cm` + 1: nothing there; 65535: unknown.
+        increment_deg: Between sectors; negative: counter-clockwise.
+        offset_deg: Of the middle of the first one, clockwise.
+        least_cm: Shortest that is valid.
+        most_cm: Longest.
+        is_body_fixed: Whether counted from the front; else from north.
+    """
+
+    distances_cm: tuple[int, ...]
+    increment_deg: float
+    offset_deg: float
+    least_cm: int
+    most_cm: int
+    is_body_fixed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SectorDistance:
+    """One distance.
+
+    Attributes:
+        orientation: 0 ahead, and on clockwise in eighths of a turn, as ArduPilot has it; others are no such direction.
+        distance_cm: What was measured.
+        least_cm: Shortest that is valid.
+        most_cm: Longest.
+        width_deg: Of what it sees; 0: unknown.
+    """
+
+    orientation: int
+    distance_cm: int
+    least_cm: int
+    most_cm: int
+    width_deg: float
+
+
+type Content = (
+    Heartbeat | Attitude | LocalPosition | Motion | BatteryState | Text | Answer | ObstacleRing | SectorDistance | None
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """What was said by whom; content None: nothing that is used here."""
+
+    system: int
+    component: int
+    content: Content
+
+
+def _finite(*values: float) -> tuple[float, ...]:
+    if not all(map(math.isfinite, values)):
+        raise ValueError("no numbers")
+    return values
+
+
+def _heartbeat(told: Any) -> Heartbeat:
+    return Heartbeat(told.type, told.autopilot, bool(told.base_mode & ARMED), told.custom_mode)
+
+
+def _attitude(told: Any) -> Attitude:
+    yaw_rad, rate_rad_s = _finite(told.yaw, told.yawspeed)
+    return Attitude(told.time_boot_ms / 1000, -yaw_rad, -rate_rad_s)
+
+
+def _local_position(told: Any) -> LocalPosition:
+    north_m, east_m, north_m_s, east_m_s = _finite(told.x, told.y, told.vx, told.vy)
+    return LocalPosition(told.time_boot_ms / 1000, north_m, -east_m, north_m_s, -east_m_s)
+
+
+def _odometry(told: Any) -> Motion | None:
+    if told.frame_id not in (_LOCAL_NED, _LOCAL_FRD) or told.child_frame_id != _BODY_FRD:
+        return None
+    w, x, y, z, *_ = _finite(*told.q, told.x, told.y, told.vx, told.yawspeed)
+    yaw_rad = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    return Motion(told.x, -told.y, -yaw_rad, told.vx, -told.yawspeed, told.reset_counter)
+
+
+def _share(percent: int) -> float | None:
+    return None if percent < 0 else min(percent, 100) / 100
+
+
+def _sys_status(told: Any) -> BatteryState:
+    voltage_v = None if told.voltage_battery in (0, _UNKNOWN) else told.voltage_battery / 1000
+    return BatteryState(True, voltage_v, _share(told.battery_remaining))
+
+
+def _battery_status(told: Any) -> BatteryState | None:
+    if told.id != 0:
+        return None
+    cells_mv = [cell_mv for cell_mv in told.voltages if cell_mv != _UNKNOWN]
+    return BatteryState(False, sum(cells_mv) / 1000 if any(cells_mv) else None, _share(told.battery_remaining))
+
+
+def _text(told: Any) -> Text:
+    # The library's own `text` is ASCII: one character for each byte that is none, of a length of its own.
+    return Text(told.severity, bytes(told._text_raw).partition(b"\0")[0], told.id, told.chunk_seq)
+
+
+def _answer(told: Any) -> Answer:
+    return Answer(told.command, told.result, told.target_system, told.target_component)
+
+
+def _obstacle_ring(told: Any) -> ObstacleRing:
+    fine_deg, offset_deg = _finite(told.increment_f, told.angle_offset)
+    increment_deg = fine_deg or float(told.increment)
+    if not 0.01 <= abs(increment_deg) <= 180.0 or abs(offset_deg) > 720.0:
+        raise ValueError("no such angle")
+    is_body_fixed = told.frame == _BODY_FRD
+    distances_cm = tuple(told.distances)
+    return ObstacleRing(distances_cm, increment_deg, offset_deg, told.min_distance, told.max_distance, is_body_fixed)
+
+
+def _distance(told: Any) -> SectorDistance:
+    (width_rad,) = _finite(told.horizontal_fov)
+    width_deg = min(max(math.degrees(width_rad), 0.0), 360.0)
+    return SectorDistance(told.orientation, told.current_distance, told.min_distance, told.max_distance, width_deg)
+
+
+READERS: Mapping[int, Callable[[Any], Content]] = {
+    0: _heartbeat,
+    Telemetry.SYS_STATUS: _sys_status,
+    Telemetry.ATTITUDE: _attitude,
+    Telemetry.LOCAL_POSITION: _local_position,
+    77: _answer,
+    Telemetry.DISTANCE_SENSOR: _distance,
+    Telemetry.BATTERY_STATUS: _battery_status,
+    253: _text,
+    Telemetry.OBSTACLE_DISTANCE: _obstacle_ring,
+    Telemetry.ODOMETRY: _odometry,
+}
+"""How the contents of a message are read, by its number; a `ValueError` says that they cannot be."""
+
+
+def own_heartbeat(codec: Any) -> Any:
+    """That a companion computer is there."""
+    return codec.heartbeat_encode(_ONBOARD_CONTROLLER, _NO_AUTOPILOT, 0, 0, _ACTIVE)
+
+
+def command(
+    system: int, component: int, number: Command, confirmation: int, *parameters: float
+) -> Callable[[Any], Any]:
+    """A command.
+
+    Args:
+        system: Of the vehicle.
+        component: Of it.
+        number: Which command.
+        confirmation: How often it was sent before.
+        parameters: Its first ones; the others are 0.
+    """
+    values = (*parameters, *(0.0,) * (7 - len(parameters)))
+    return lambda codec: codec.command_long_encode(system, component, number, confirmation, *values)
+
+
+def arming(is_armed: bool, is_forced: bool = False) -> tuple[float, ...]:
+    """Parameters of `Command.ARM_DISARM`."""
+    return (float(is_armed), float(_FORCE if is_forced else 0))
+
+
+def entering(mode: Mode) -> tuple[float, ...]:
+    """Parameters of `Command.SET_MODE`."""
+    return (float(_CUSTOM_MODE), float(mode))
+
+
+def velocity_target(
+    system: int, component: int, boot_ms: int, linear_m_s: float, angular_rad_s: float
+) -> Callable[[Any], Any]:
+    """What a rover in GUIDED follows until another comes or 3 s have passed.
+
+    Args:
+        system: Of the vehicle.
+        component: Of it.
+        boot_ms: Since the sender started.
+        linear_m_s: Forward.
+        angular_rad_s: Counter-clockwise.
+    """
+    # Adding zero makes the negative zero, whose bytes are not all zero, a positive one.
+    speeds = (linear_m_s + 0.0, 0.0, 0.0)
+    unused = (0.0, 0.0, 0.0)
+    return lambda codec: codec.set_position_target_local_ned_encode(
+        boot_ms, system, component, _BODY_NED, _VELOCITY_AND_TURN_RATE,
+        *unused, *speeds, *unused, 0.0, -angular_rad_s + 0.0,
+    )  # fmt: skip

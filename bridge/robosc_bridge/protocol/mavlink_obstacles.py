@@ -1,0 +1,85 @@
+"""Distances around a vehicle as bins of one degree.
+
+A sector is as near as what is nearest in it, so its distance counts for every bin that it reaches into.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from robosc_bridge.protocol.mavlink_messages import ObstacleRing, SectorDistance
+from robosc_bridge.protocol.turns import BINS, wrapped_deg
+
+_UNKNOWN_CM = 65535
+_EIGHTHS = 8
+_EIGHTH_DEG = 45.0
+_TINY_DEG = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Sector:
+    """A part of the surroundings.
+
+    Attributes:
+        middle_deg: Counter-clockwise from the front, within [0, 360).
+        width_deg: Of all of it.
+        range_m: NaN: nothing is there, or it is unknown.
+    """
+
+    middle_deg: float
+    width_deg: float
+    range_m: float
+
+
+def _range_m(distance_cm: int, least_cm: int, most_cm: int) -> float:
+    is_valid = distance_cm != _UNKNOWN_CM and distance_cm > 0 and least_cm <= distance_cm <= most_cm
+    return distance_cm / 100 if is_valid else math.nan
+
+
+def ring_sectors(ring: ObstacleRing, heading_rad: float | None) -> tuple[Sector, ...] | None:
+    """The sectors of a ring, without those that go around a second time.
+
+    Args:
+        ring: As it was told.
+        heading_rad: Of the vehicle, counter-clockwise from north; None: unknown.
+
+    Returns:
+        None: it counts from north, and nobody knows where that is.
+    """
+    if ring.is_body_fixed:
+        turned_deg = 0.0
+    elif heading_rad is None:
+        return None
+    else:
+        turned_deg = math.degrees(heading_rad)
+    width_deg = abs(ring.increment_deg)
+    count = min(len(ring.distances_cm), math.ceil(360.0 / width_deg - _TINY_DEG))
+    return tuple(
+        Sector(
+            wrapped_deg(-(ring.offset_deg + index * ring.increment_deg) - turned_deg),
+            width_deg,
+            _range_m(distance_cm, ring.least_cm, ring.most_cm),
+        )
+        for index, distance_cm in enumerate(ring.distances_cm[:count])
+    )
+
+
+def sensor_sector(told: SectorDistance) -> Sector | None:
+    """The sector of a single sensor; None: it does not look around."""
+    if told.orientation >= _EIGHTHS:
+        return None
+    range_m = _range_m(told.distance_cm, told.least_cm, told.most_cm)
+    return Sector(wrapped_deg(-told.orientation * _EIGHTH_DEG), told.width_deg or _EIGHTH_DEG, range_m)
+
+
+def nearest_in_sectors(sectors: Iterable[Sector]) -> tuple[float, ...]:
+    """The smallest range of each of `BINS` bins, NaN where there is none; bin k covers [k - 0.5, k + 0.5)."""
+    nearest = [math.inf] * BINS
+    for sector in sectors:
+        if math.isnan(sector.range_m):
+            continue
+        first = math.floor(sector.middle_deg - sector.width_deg / 2 + 0.5 + _TINY_DEG)
+        last = math.ceil(sector.middle_deg + sector.width_deg / 2 + 0.5 - _TINY_DEG) - 1
+        for k in range(first, min(last, first + BINS - 1) + 1):
+            nearest[k % BINS] = min(nearest[k % BINS], sector.range_m)
+    return tuple(math.nan if math.isinf(range_m) else range_m for range_m in nearest)

@@ -1,0 +1,191 @@
+"""Lines over a network that are used like a `SerialLine`: a reader waits in `poll`, and nothing waits without a limit.
+
+Addresses are written as MAVLink programs do:
+
+    udpin:HOST:PORT     listen; answers go to the peer that was chosen among those that were heard
+    udpout:HOST:PORT    send there, and hear what comes back
+    tcp:HOST:PORT       connect to a server
+"""
+
+import contextlib
+import errno
+import os
+import select
+import socket
+import threading
+import time
+
+from robosc_bridge.errors import LineBusyError, LineDeniedError, LineError, LineLostError, LineMissingError
+
+SCHEMES = ("udpin", "udpout", "tcp")
+_CONNECT_LIMIT_S = 1.0
+_DATAGRAM = 65535
+
+
+def is_network_address(address: str) -> bool:
+    """Whether it is one of the kinds above, and no port's path."""
+    return address.partition(":")[0] in SCHEMES
+
+
+class NetworkLine:
+    """An open socket.
+
+    Args:
+        address: As above. A host's name is looked up by the system, which may take its time; a number is not.
+
+    Attributes:
+        path: The address.
+        is_datagram: Whether a read is one whole datagram.
+
+    Raises:
+        LineMissingError: Nobody serves there, or there is no such host.
+        LineBusyError: Another program listens there.
+        LineDeniedError: This user may not.
+        LineError: It is no address, or cannot be used.
+    """
+
+    def __init__(self, address: str) -> None:
+        self.path = address
+        scheme, place = _parsed(address)
+        self.is_datagram = scheme != "tcp"
+        self._is_listening = scheme == "udpin"
+        self._peer: tuple[str, int] | None = None
+        self._sender: tuple[str, int] | None = None
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM if self.is_datagram else socket.SOCK_STREAM)
+        try:
+            self._socket.settimeout(_CONNECT_LIMIT_S)
+            if self._is_listening:
+                self._socket.bind(place)
+            else:
+                self._socket.connect(place)
+            self._socket.setblocking(False)
+            if not self.is_datagram:
+                # A command to stop waits for nothing.
+                self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        except OSError as error:
+            self._socket.close()
+            raise _not_opened(address, error) from error
+        self._woken, self._waker = os.pipe()
+        os.set_blocking(self._waker, False)
+        self._poll = select.poll()
+        self._poll.register(self._socket.fileno(), select.POLLIN)
+        self._poll.register(self._woken, select.POLLIN)
+        self._guard = threading.Lock()
+        self._is_open = True
+
+    @property
+    def port(self) -> int:
+        """Of its own end."""
+        return int(self._socket.getsockname()[1])
+
+    def read(self, limit_s: float) -> bytes:
+        """What has come, waiting for the first of it.
+
+        Args:
+            limit_s: Longest wait; 0: not at all.
+
+        Returns:
+            Nothing when nothing came in time, or `wake` was called.
+
+        Raises:
+            LineLostError: The connection is gone.
+        """
+        self._check_open()
+        readable = dict(self._poll.poll(max(limit_s, 0.0) * 1000))
+        if self._woken in readable:
+            os.read(self._woken, 4096)
+        if self._socket.fileno() not in readable:
+            return b""
+        try:
+            data, self._sender = self._socket.recvfrom(_DATAGRAM)
+        except (BlockingIOError, ConnectionRefusedError):
+            # Refused: of a datagram that was sent before; nobody listens there yet.
+            return b""
+        except OSError as error:
+            raise LineLostError(self.path, f"the connection is gone: {error.strerror}") from error
+        if not data and not self.is_datagram:
+            raise LineLostError(self.path, "the other end has closed the connection")
+        return data
+
+    def answer_sender(self) -> None:
+        """From now on, what is written goes to where the last datagram came from; only for who listens."""
+        self._peer = self._sender
+
+    def write(self, data: bytes, limit_s: float = 0.1) -> None:
+        """Send all of it; while a listener has no peer, it goes nowhere.
+
+        Args:
+            data: What to send.
+            limit_s: Longest wait for the line to take it.
+
+        Raises:
+            LineLostError: The connection is gone, or does not take what is written.
+        """
+        self._check_open()
+        try:
+            if self._is_listening:
+                if self._peer is not None:
+                    self._socket.sendto(data, self._peer)
+            elif self.is_datagram:
+                self._socket.send(data)
+            else:
+                self._write_stream(data, limit_s)
+        except (BlockingIOError, ConnectionRefusedError) as error:
+            # A datagram may be lost on any part of its way; a stream may not.
+            if not self.is_datagram:
+                raise LineLostError(self.path, "the connection is gone") from error
+        except (OSError, ValueError) as error:
+            # ValueError: it was closed meanwhile.
+            raise LineLostError(self.path, f"nothing can be sent: {error}") from error
+
+    def _write_stream(self, data: bytes, limit_s: float) -> None:
+        left = memoryview(data)
+        end_s = time.monotonic() + limit_s
+        poll = select.poll()
+        poll.register(self._socket.fileno(), select.POLLOUT)
+        while left:
+            if not poll.poll(max(end_s - time.monotonic(), 0.0) * 1000):
+                raise LineLostError(self.path, "the connection takes no more bytes")
+            with contextlib.suppress(BlockingIOError):
+                left = left[self._socket.send(left) :]
+
+    def wake(self) -> None:
+        """Let a `read` that waits in another thread return; safe at any time."""
+        with self._guard:
+            if self._is_open:
+                with contextlib.suppress(BlockingIOError):
+                    os.write(self._waker, b"\0")
+
+    def close(self) -> None:
+        """Give it back; never raises, and may be called again."""
+        with self._guard:
+            if not self._is_open:
+                return
+            self._is_open = False
+            self._socket.close()
+            os.close(self._woken)
+            os.close(self._waker)
+
+    def _check_open(self) -> None:
+        if not self._is_open:
+            raise LineLostError(self.path, "the line is closed")
+
+
+def _parsed(address: str) -> tuple[str, tuple[str, int]]:
+    scheme, _, place = address.partition(":")
+    host, _, port = place.rpartition(":")
+    if scheme not in SCHEMES or not host or not port.isascii() or not port.isdecimal() or int(port) > 65535:
+        raise LineError(address, f"this is no address; it is written {'|'.join(SCHEMES)}:HOST:PORT")
+    return scheme, (host, int(port))
+
+
+def _not_opened(address: str, error: OSError) -> LineError:
+    if isinstance(error, (ConnectionRefusedError, TimeoutError)):
+        return LineMissingError(address, "nobody serves there")
+    if isinstance(error, socket.gaierror):
+        return LineMissingError(address, "there is no such host")
+    if isinstance(error, PermissionError):
+        return LineDeniedError(address, "this user may not use this port")
+    if error.errno in (errno.EADDRINUSE, errno.EADDRNOTAVAIL):
+        return LineBusyError(address, "another program listens there, or it is no address of this computer")
+    return LineError(address, f"cannot be used: {error.strerror}")

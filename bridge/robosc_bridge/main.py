@@ -18,12 +18,16 @@ from robosc.model import check
 from robosc.model.structure import Deployment, Model
 from robosc_bridge.configuration import init, load, schema, tie
 from robosc_bridge.configuration.template import DriveDriver, Robot, ScannerDriver
-from robosc_bridge.daemon.assembly import assemble
+from robosc_bridge.daemon.assembly import assemble, check_settings
+from robosc_bridge.daemon.keyboard import Keyboard
+from robosc_bridge.daemon.loop import Key
 from robosc_bridge.daemon.supervisors import MODEL_SUFFIX, NoSupervisorError, Source, obtain
 from robosc_bridge.devices.registry import Kind, available_drivers
 from robosc_bridge.errors import BridgeError
 
 OK, FAULT, WRONG_USE = 0, 1, 2
+
+_SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 
 _EPILOG = "exit status: 0 all is well, or the bridge was told to end; 1 a fault stopped it; 2 wrong use or files"
 
@@ -99,6 +103,7 @@ def _model(file: Path) -> Model:
 def _check(arguments: argparse.Namespace) -> int:
     loaded = load(arguments.config)
     ties = tie(_model(arguments.model), loaded.configuration, loaded.document)
+    check_settings(loaded.configuration, ties)
     sys.stdout.write(f"{arguments.config}: {len(ties.communications)} communications are tied\n")
     return OK
 
@@ -131,6 +136,9 @@ def _drivers(arguments: argparse.Namespace) -> int:
 
 
 def _run(arguments: argparse.Namespace) -> int:
+    for number in _SIGNALS:
+        # Until there is something to bring to rest.
+        signal.signal(number, lambda *_: sys.exit(OK))
     level = logging.DEBUG if arguments.verbose else logging.INFO
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", stream=sys.stderr, level=level)
     tell = logging.getLogger("robosc_bridge").info
@@ -144,9 +152,12 @@ def _run(arguments: argparse.Namespace) -> int:
         log = open_event_log(configuration.log.folder, supervisor.model.name, time.time())
     try:
         machine = assemble(configuration, ties, supervisor, log, starts_itself=True)
-        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        for number in _SIGNALS:
             signal.signal(number, lambda *_: machine.quit())
-        have_ended = machine.run()
+        with Keyboard(lambda key: machine.daemon.post(Key(key))) as keyboard:
+            if not keyboard.is_there:
+                tell("there is no terminal: no key stops the robot")
+            have_ended = machine.run()
     finally:
         log.close()
     return OK if have_ended and not machine.daemon.problem else FAULT

@@ -3,11 +3,21 @@
 import math
 from dataclasses import dataclass
 
+import msgspec
+
 from robosc.execution.clock import SystemClock
 from robosc.execution.event_log import EventLog
+from robosc.execution.settings import Settings, SettingsError, require_settings_of
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
-from robosc_bridge.configuration.channels import Channel, GrpcChannel, LineChannel, LineLostChannel, channel_name
+from robosc_bridge.configuration.channels import (
+    Channel,
+    FaultChannel,
+    GrpcChannel,
+    LineChannel,
+    LineLostChannel,
+    channel_name,
+)
 from robosc_bridge.configuration.structure import Configuration, Scanner
 from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.device_thread import DeviceThread
@@ -26,7 +36,11 @@ EXCHANGE_S = 0.02
 RESTART_S = 3.0
 """After so long without a full turn a LiDAR's motor is restarted, as its official driver does."""
 
-_THREAD_LIMIT_S = 5.0
+LONGEST_PERIOD_S = 0.9
+"""The safety layer waits for the loop for two seconds at most, and for two periods at least."""
+
+# Longer than anything that a device's thread does at once, such as calibrating a gyroscope.
+_THREAD_LIMIT_S = 10.0
 _NOT_SERVED: tuple[type[Channel], ...] = (GrpcChannel, LineChannel, LineLostChannel)
 
 
@@ -41,6 +55,8 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
         AssemblyError: They do not go together.
     """
     robot, chosen = ROBOTS[configuration.robot], configuration.safety
+    if configuration.execution.period_s > LONGEST_PERIOD_S:
+        raise AssemblyError(f"execution.period_s may be {LONGEST_PERIOD_S:g} at most")
     can = robot.limits(robot.motor.velocity_limit_raw)
     linear = chosen.linear_acceleration_m_s2
     angular = chosen.angular_acceleration_rad_s2
@@ -64,6 +80,22 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
         )
     except ValueError as error:
         raise AssemblyError(f"safety: {error}") from error
+
+
+def check_settings(configuration: Configuration, ties: Ties) -> Settings:
+    """The executor's settings; whatever else `assemble` would refuse is found as well, but for the devices.
+
+    Raises:
+        AssemblyError: Something does not fit; says what.
+    """
+    _require_served(configuration, ties)
+    safety_limits(configuration)
+    settings = ties.settings(configuration.execution)
+    try:
+        require_settings_of(settings, str(Deployment.CONTROLLER))
+    except SettingsError as error:
+        raise AssemblyError(f"execution: {error}") from error
+    return settings
 
 
 def drive_base(configuration: Configuration) -> DriveBase:
@@ -129,6 +161,13 @@ def _require_served(configuration: Configuration, ties: Ties) -> None:
         for item, _ in ties.tied_to(kind)
     ]
     remote = configuration.remote
+    if configuration.safety.operator_link_timeout_s is not None:
+        missing.append("'safety.operator_link_timeout_s'")
+    missing += [
+        f"'{item.name}' ('{item.identifier}') is tied to 'fault' of a camera"
+        for item, tied in ties.tied_to(FaultChannel)
+        if isinstance(tied, FaultChannel) and tied.device == "camera"
+    ]
     missing += [f"'remote.{name}'" for name in ("grpc_address", "mavlink_url") if getattr(remote, name) is not None]
     if missing:
         raise AssemblyError(f"not served by this version of the bridge: {'; '.join(missing)}")
@@ -145,19 +184,30 @@ def assemble(
     """
     if supervisor.deployment is not Deployment.CONTROLLER:
         raise AssemblyError("the supervisor is for a supervision layer; the bridge runs controllers")
-    _require_served(configuration, ties)
+    settings = check_settings(configuration, ties)
     clock = SystemClock()
-    safety = SafetyLayer(safety_limits(configuration))
-    job = Job(
-        supervisor, ties, ties.settings(configuration.execution), configuration.scanner is not None, starts_itself
-    )
-    skills = configuration.skills
-    daemon = Daemon(job, safety, Rotate(skills.rotate), EmergencyStop(skills.emergency_stop), clock, log)
+    limits = safety_limits(configuration)
+    safety = SafetyLayer(limits)
+    job = Job(supervisor, ties, settings, configuration.scanner is not None, starts_itself)
+    rotate = configuration.skills.rotate
+    # A turn has a time limit, which goes by its speed.
+    speed_rad_s = min(rotate.speed_rad_s, limits.angular_rad_s)
+    slowest_rad_s = min(rotate.slowest_rad_s, speed_rad_s)
+    rotate = msgspec.structs.replace(rotate, speed_rad_s=speed_rad_s, slowest_rad_s=slowest_rad_s)
+    stop = EmergencyStop(configuration.skills.emergency_stop)
+    daemon = Daemon(job, safety, Rotate(rotate), stop, clock, log)
     worker = DriveWorker(drive_base(configuration), safety, daemon.post, EXCHANGE_S, clock.monotonic)
     drive = DeviceThread(worker, clock.monotonic)
-    daemon.connect(drive.hurry, worker.reset)
     scanner = None
     if configuration.scanner is not None:
-        listener = ScannerWorker(range_scanner(configuration.scanner), safety, daemon.post, RESTART_S, clock.monotonic)
+        listener = ScannerWorker(
+            range_scanner(configuration.scanner),
+            safety,
+            daemon.post,
+            configuration.safety.scan_timeout_s,
+            RESTART_S,
+            clock.monotonic,
+        )
         scanner = DeviceThread(listener, clock.monotonic)
+    daemon.connect(drive.hurry, worker.reset, lambda: drive.is_alive and (scanner is None or scanner.is_alive))
     return Machine(daemon, drive, scanner)

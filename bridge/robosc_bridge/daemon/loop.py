@@ -17,16 +17,22 @@ from robosc.execution.settings import Settings
 from robosc.supervisor import Supervisor
 from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.motion import Motion
-from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone
+from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice
 from robosc_bridge.daemon.robot import Robot
 from robosc_bridge.devices.interface import DriveReading, Scan, Velocity
-from robosc_bridge.safety import SafetyLayer
+from robosc_bridge.safety import LATCHING, Reason, SafetyLayer
 from robosc_bridge.skills import EmergencyStop, Rotate
 
 _log = logging.getLogger(__name__)
 
 STOP_LIMIT_S = 3.0
 """How long the motors may take to let go."""
+
+
+# They end by themselves, and belong to every start and stop.
+_ORDINARY = frozenset({Reason.STANDBY, Reason.TORQUE_AWAITED, Reason.COMMAND_SILENT})
+# An operator's stop is no fault; what is wrong with the supervisor is told by itself.
+_GRAVE = frozenset(LATCHING) - {Reason.OPERATOR_STOP, Reason.SUPERVISOR_FAULT}
 
 
 class State(StrEnum):
@@ -114,7 +120,14 @@ class Daemon:
         self._inbox: queue.SimpleQueue[Report | Command | Key] = queue.SimpleQueue()
         self._motion = Motion(rotate, self._command)
         self._robot = Robot(
-            job.ties, self._motion, emergency_stop, self._operator_stop, self._operator_resume, clock.monotonic
+            job.ties,
+            self._motion,
+            emergency_stop,
+            self._operator_stop,
+            self._operator_resume,
+            self._turn_failed,
+            job.settings.service_timeout_s,
+            clock.monotonic,
         )
         self._executor: Executor | None = None
         self._due_s = clock.monotonic()
@@ -126,11 +139,17 @@ class Daemon:
         self._after_stop = State.STANDBY
         self._hurry: Callable[[], None] = lambda: None
         self._reset_drive: Callable[[], None] = lambda: None
+        self._are_alive: Callable[[], bool] = lambda: True
+        self._is_drive_lost = False
+        self._failed_turn = ""
 
-    def connect(self, hurry: Callable[[], None], reset_drive: Callable[[], None]) -> None:
-        """Tell how the drive base's thread is told to hurry, and to reset its motors."""
+    def connect(
+        self, hurry: Callable[[], None], reset_drive: Callable[[], None], are_alive: Callable[[], bool]
+    ) -> None:
+        """Tell how the drive base's thread is told to hurry and to reset its motors, and whether all threads live."""
         self._hurry = hurry
         self._reset_drive = reset_drive
+        self._are_alive = are_alive
 
     def post(self, item: Report | Command | Key) -> None:
         """Tell the loop something; from any thread or signal handler, never waits."""
@@ -165,7 +184,9 @@ class Daemon:
         if now_s >= self._due_s:
             self._decide(now_s)
         self._look_at_state(now_s)
-        if self.state is State.RUNNING:
+        if self.state is State.RUNNING and self._executor is not None:
+            # In a safe stop nothing moves, whatever identifiers are released.
+            self._motion.pause(bool(self._executor.reasons), now_s)
             self._motion.refresh(now_s)
 
     def _decide(self, now_s: float) -> None:
@@ -186,6 +207,8 @@ class Daemon:
                 self._has_torque = item.is_torque_on
                 if self._executor is not None:
                     self._robot.saw_drive(item, self._executor)
+                else:
+                    self._robot.watch_buttons(item.buttons)
             case Scan():
                 self._scan = item
                 if self._executor is not None:
@@ -194,6 +217,8 @@ class Daemon:
                 self._device_came(device)
             case DeviceDown():
                 self._device_went(item)
+            case SafetyNotice():
+                self._heed(item)
             case ResetDone(problem):
                 _log.log(logging.ERROR if problem else logging.INFO, "reset: %s", problem or "done")
             case Key(key):
@@ -204,32 +229,46 @@ class Daemon:
 
     def _device_came(self, device: Device) -> None:
         _log.info("the %s is there", device)
-        self._is_up[device] = True
-        if self._executor is not None:
+        was_up, self._is_up[device] = self._is_up[device], True
+        if self._executor is not None and not was_up:
             self._robot.saw_device(device, f"the {device} is back", self._executor, is_lost=False)
-        if device is Device.DRIVE and self.state is State.FAULT:
+        if device is Device.DRIVE and self.state is State.FAULT and self._is_drive_lost:
             # Nothing moves before somebody says so.
+            self._is_drive_lost = False
             self.problem = ""
             self.state = State.STANDBY
 
     def _device_went(self, report: DeviceDown) -> None:
-        self._is_up[report.device] = False
+        was_up, self._is_up[report.device] = self._is_up[report.device], False
         if report.is_first:
             _log.error("%s: %s", report.device, report.problem)
         if report.device is Device.SCANNER:
             self._scan = None
         else:
             self._has_torque = False
-        if self._executor is None:
+        if self._executor is None or not was_up:
             return
         self._robot.saw_device(report.device, report.problem, self._executor, is_lost=True)
         if report.device is Device.DRIVE:
+            self._is_drive_lost = True
             self._fault(f"the drive base is lost: {report.problem}")
+
+    def _heed(self, notice: SafetyNotice) -> None:
+        """Tell a person why nothing moves; what only a person can end ends the run."""
+        for warning in notice.warnings:
+            _log.warning("%s", warning)
+        for reason in notice.reasons:
+            _log.log(logging.DEBUG if reason in _ORDINARY else logging.WARNING, "%s", reason)
+        grave = [reason for reason in notice.reasons if reason in _GRAVE]
+        if grave and self.state is State.RUNNING:
+            self._fault(" ".join(grave))
 
     def _obey(self, command: Command) -> None:
         match command:
             case Command.START if self.state is State.STANDBY:
                 self._begin()
+            case Command.STOP:
+                self._robot.stop("the operator has stopped the robot", self._executor)
             case Command.STANDBY if self.state in (State.RUNNING, State.FAULT):
                 self._end("standby", State.STANDBY)
             case Command.QUIT if self.state is not State.STOPPING or self._after_stop is not State.OVER:
@@ -237,7 +276,7 @@ class Daemon:
             case Command.RESET:
                 self._reset()
             case _:
-                pass  # A stop has had its effect already; the others mean nothing in this state.
+                pass  # They mean nothing in this state.
 
     def _reset(self) -> None:
         remaining = self._safety.reset()
@@ -255,6 +294,7 @@ class Daemon:
         self.problem = ""
         self.state = State.RUNNING
         self._safety.enable()
+        self._robot.begin()
         self._executor.start()
         if self._scan is not None:
             # It must not decide on nothing while the last one is at hand.
@@ -277,6 +317,11 @@ class Daemon:
         self.problem = problem
 
     def _look_at_state(self, now_s: float) -> None:
+        if self.state is State.RUNNING and not self._are_alive():
+            self._fault("a device's thread has ended")
+        if self._failed_turn and self.state is State.RUNNING:
+            self._fault(f"a turn has failed, and no message of the model tells it so: {self._failed_turn}")
+        self._failed_turn = ""
         match self.state:
             case State.STARTING if all(self._is_up.values()) and (self._scan or not self._job.needs_scanner):
                 self.state = State.STANDBY
@@ -288,7 +333,8 @@ class Daemon:
                 self._fault("; ".join(self._executor.reasons))
             case State.STOPPING if not self._has_torque or not self._is_up[Device.DRIVE] or now_s >= self._stop_end_s:
                 if self._has_torque and self._is_up[Device.DRIVE]:
-                    _log.error("the motors have not let go within %g s", STOP_LIMIT_S)
+                    self.problem = self.problem or f"the motors have not let go within {STOP_LIMIT_S:g} s"
+                    _log.error("%s", self.problem)
                 self._executor = None
                 self.state = self._after_stop
                 _log.info("%s", self.state)
@@ -302,10 +348,16 @@ class Daemon:
     def _operator_stop(self) -> None:
         self._safety.operator_stop()
         self._hurry()
+        # What was wanted before does not move the robot afterwards.
+        self._robot.stop("the operator has stopped the robot", None)
 
-    def _operator_resume(self) -> None:
+    def _operator_resume(self) -> bool:
         remaining = self._safety.reset()
         if remaining:
             _log.error("the robot cannot go on: %s", " ".join(remaining))
         elif self.state is State.RUNNING:
             self._safety.enable()
+        return not remaining
+
+    def _turn_failed(self, reason: str) -> None:
+        self._failed_turn = reason or "it was ended"

@@ -23,6 +23,7 @@ class Motion:
         self._rotate = rotate
         self._command = command
         self._wish = STANDSTILL
+        self._is_paused = False
 
     @property
     def is_turning(self) -> bool:
@@ -56,6 +57,14 @@ class Motion:
         self._pass(STANDSTILL, now_s)
         return True
 
+    def pause(self, is_paused: bool, now_s: float) -> None:
+        """Stand still while the executor is in a safe stop; a velocity is forgotten, a turn goes on afterwards."""
+        if is_paused and not self._rotate.is_turning:
+            self._wish = STANDSTILL
+        if is_paused != self._is_paused:
+            self._is_paused = is_paused
+            self._pass(self._wish, now_s)
+
     def saw(self, reading: DriveReading) -> None:
         """The drive base told where it is: a turn goes on."""
         if self._rotate.is_turning:
@@ -77,4 +86,4 @@ class Motion:
 
     def _pass(self, velocity: Velocity, now_s: float) -> None:
         self._wish = velocity
-        self._command(velocity, now_s)
+        self._command(STANDSTILL if self._is_paused else velocity, now_s)

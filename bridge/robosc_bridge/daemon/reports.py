@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from robosc_bridge.devices.interface import DriveReading, Scan
+from robosc_bridge.safety import Caution, Reason
 
 
 class Device(StrEnum):
@@ -15,7 +16,7 @@ class Device(StrEnum):
 
 @dataclass(frozen=True)
 class DeviceUp:
-    """A device was opened.
+    """A device works: the drive base was opened, or the scanner has made a full turn.
 
     Attributes:
         device: Which one.
@@ -26,12 +27,12 @@ class DeviceUp:
 
 @dataclass(frozen=True)
 class DeviceDown:
-    """A device cannot be opened, or failed and was closed; it will be tried again.
+    """A device cannot be opened, failed and was closed, or is silent; it will be tried again.
 
     Attributes:
         device: Which one.
         problem: What is wrong, one line for a person.
-        retry_s: In how many seconds it is tried again.
+        retry_s: In how many seconds it is tried again; 0: it is still being listened to.
         is_first: Whether it was up before, or was never tried: what follows only repeats it.
     """
 
@@ -52,4 +53,17 @@ class ResetDone:
     problem: str = ""
 
 
-Report = DeviceUp | DeviceDown | ResetDone | DriveReading | Scan
+@dataclass(frozen=True)
+class SafetyNotice:
+    """Why the safety layer lets nothing through, or something else about it, has changed.
+
+    Attributes:
+        reasons: Why nothing may move; empty: it may.
+        warnings: What a person should know.
+    """
+
+    reasons: tuple[Reason, ...]
+    warnings: tuple[Caution, ...]
+
+
+Report = DeviceUp | DeviceDown | ResetDone | SafetyNotice | DriveReading | Scan

@@ -22,6 +22,9 @@ from robosc_bridge.skills import EmergencyStop, StopEvent
 
 _log = logging.getLogger(__name__)
 
+_SERVICE_SHARE = 0.9
+"""How much of a call's time a turn may take."""
+
 _BUMPERS = {"front": ("bumper_1",), "back": ("bumper_2",), "any": ("bumper_1", "bumper_2")}
 
 
@@ -50,10 +53,13 @@ class Supervised(Protocol):
 class _Turn:
     """A turn under way: who wants to know of its end."""
 
-    def __init__(self, asked: Communication, channel: channels.RotateChannel, number: int | None) -> None:
+    def __init__(
+        self, asked: Communication, channel: channels.RotateChannel, number: int | None, end_s: float = math.inf
+    ) -> None:
         self.asked = asked
         self.channel = channel
         self.number = number
+        self.end_s = end_s
 
 
 class Robot:
@@ -64,7 +70,9 @@ class Robot:
         motion: What moves the wheels.
         emergency_stop: The operator's stop.
         on_stop: Called when the operator stops the robot: the safety layer hears of it first.
-        on_resume: Called when the operator lets it go on.
+        on_resume: Called when the operator lets it go on; whether it can.
+        on_failed_turn: Called with the reason when a turn has failed of which the model hears nothing.
+        service_timeout_s: When the executor takes a call for failed; None: never.
         clock: What the time is, in seconds.
     """
 
@@ -74,7 +82,9 @@ class Robot:
         motion: Motion,
         emergency_stop: EmergencyStop,
         on_stop: Callable[[], None],
-        on_resume: Callable[[], None],
+        on_resume: Callable[[], bool],
+        on_failed_turn: Callable[[str], None],
+        service_timeout_s: float | None,
         clock: Callable[[], float],
     ) -> None:
         self._ties = ties
@@ -82,12 +92,19 @@ class Robot:
         self._emergency_stop = emergency_stop
         self._on_stop = on_stop
         self._on_resume = on_resume
+        self._on_failed_turn = on_failed_turn
+        self._service_timeout_s = math.inf if service_timeout_s is None else service_timeout_s
         self._clock = clock
         self._by_name = {item.name: item for item in ties.communications}
         self._by_identifier = {item.identifier: item for item in reversed(ties.communications)}
         self._owed: deque[Callable[[Supervised], None]] = deque()
         self._turn: _Turn | None = None
         self._buttons: Mapping[str, bool] = {}
+
+    def begin(self) -> None:
+        """A new run of an executor: what an earlier one asked for is none of its business."""
+        self._owed.clear()
+        self._turn = None
 
     # The executor's side.
 
@@ -111,12 +128,12 @@ class Robot:
         item = self._by_name[communication]
         match self._ties.channels[communication]:
             case channels.DriveChannel():
-                self._end_turn("another motion was asked for")
+                self._end_turn("another motion was asked for", is_own=True)
                 self._motion.drive(_velocity(message), self._clock())
             case channels.StopChannel():
                 self._stop()
             case channels.RotateChannel() as channel:
-                self._end_turn("another turn was asked for")
+                self._end_turn("another turn was asked for", is_own=True)
                 self._begin_turn(_Turn(item, channel, None), message)
             case channels.LogChannel():
                 _log.info("%s: %s", item.identifier, message)
@@ -124,12 +141,17 @@ class Robot:
                 pass  # `none`: dropped on purpose.
 
     def publish_default(self, identifier: str) -> None:
-        """The all-default message: on the drive, a standstill."""
-        item = self._by_identifier[identifier]
-        if isinstance(self._ties.channels[item.name], channels.DriveChannel | channels.StopChannel):
-            self._stop()
-        elif isinstance(self._ties.channels[item.name], channels.LogChannel):
-            _log.info("%s: default", identifier)
+        """The all-default message: on the drive, a standstill, which a turn by an angle does not mind."""
+        match self._ties.channels[self._by_identifier[identifier].name]:
+            case channels.DriveChannel():
+                if not self._motion.is_turning:
+                    self._motion.stop(self._clock())
+            case channels.StopChannel() | channels.RotateChannel():
+                self._stop()
+            case channels.LogChannel():
+                _log.info("%s: default", identifier)
+            case _:
+                pass  # `none`: dropped on purpose.
 
     def call(self, communication: str, request_id: int, message: Any) -> None:
         """Do what a service is called for."""
@@ -139,7 +161,9 @@ class Robot:
                 self._stop()
                 self._owed.append(lambda executor: executor.on_reply(request_id, _done("")))
             case channels.RotateChannel() as channel if self._turn is None:
-                self._begin_turn(_Turn(item, channel, request_id), message)
+                # Before the executor believes that it failed, it must have.
+                end_s = self._clock() + self._service_timeout_s * _SERVICE_SHARE
+                self._begin_turn(_Turn(item, channel, request_id, end_s), message)
             case _:
                 self._owed.append(lambda executor: executor.on_call_failed(request_id, "another turn is under way"))
 
@@ -161,8 +185,15 @@ class Robot:
             self._motion.stop(self._clock(), "it was cancelled")
             self._owed.append(lambda executor: executor.on_goal_ended(goal_id, "cancelled"))
 
+    def stop(self, reason: str, executor: Supervised | None) -> None:
+        """Stand still; a turn under way has failed."""
+        self._end_turn(reason)
+        self._motion.stop(self._clock(), reason)
+        if executor is not None:
+            self.settle(executor)
+
     def _stop(self) -> None:
-        self._end_turn("the robot was told to stop")
+        self._end_turn("the robot was told to stop", is_own=True)
         self._motion.stop(self._clock())
 
     def _begin_turn(self, turn: _Turn, message: Any) -> None:
@@ -170,10 +201,11 @@ class Robot:
         self._turn = turn
         self._motion.turn(math.radians(angle) if turn.channel.unit == "degrees" else angle, self._clock())
 
-    def _end_turn(self, reason: str) -> None:
+    def _end_turn(self, reason: str, *, is_own: bool = False) -> None:
+        """End a turn; `is_own`: because the model itself asked for another motion, so that it knows."""
         if self._turn is not None:
             self._motion.stop(self._clock(), reason)
-            self._look_at_turn()
+            self._look_at_turn(is_own=is_own)
 
     # The devices' side.
 
@@ -190,6 +222,14 @@ class Robot:
                 case channels.BatteryChannel(unit=unit):
                     executor.receive(identifier, battery_data(reading, is_percent=unit == "percent"))
         self.settle(executor)
+
+    def watch_buttons(self, buttons: Mapping[str, bool]) -> None:
+        """Heed the operator's buttons while no supervisor is executed."""
+        held = [name for name, is_held in buttons.items() if is_held]
+        if self._emergency_stop.update(held_buttons=held) is StopEvent.STOP:
+            self._on_stop()
+        # What was pressed meanwhile is no event for the next run, but bumpers are told at its start.
+        self._buttons = {}
 
     def saw_scan(self, scan: Scan, executor: Supervised) -> None:
         """A full turn of the LiDAR."""
@@ -244,8 +284,11 @@ class Robot:
                         executor.receive(identifier, shaped(item, touched))
 
     def _saw_stop(self, event: StopEvent | None, executor: Supervised) -> None:
-        if event is not None:
-            (self._on_stop if event is StopEvent.STOP else self._on_resume)()
+        if event is StopEvent.STOP:
+            self._on_stop()
+        if event is StopEvent.RESUME and not self._on_resume():
+            self._emergency_stop.is_stopped = True
+            return
         for identifier, channel in self._told((channels.EmergencyStopChannel,)):
             if event is not None and isinstance(channel, channels.EmergencyStopChannel) and channel.event == event:
                 executor.receive(identifier, None)
@@ -260,18 +303,25 @@ class Robot:
                 seen.add(item.identifier)
                 yield item.identifier, channel
 
-    def _look_at_turn(self) -> None:
+    def _look_at_turn(self, *, is_own: bool = False) -> None:
         """Whether a turn has ended: who asked for it is told so, later."""
         turn = self._turn
+        if turn is not None and self._motion.is_turning and self._clock() >= turn.end_s:
+            self._motion.stop(self._clock(), "the turn takes longer than a call may")
         if turn is None or self._motion.is_turning:
             return
         self._turn = None
         has_arrived, reason, number = self._motion.has_arrived, self._motion.reason, turn.number
+        if not has_arrived:
+            _log.warning("the turn asked for by %s has failed: %s", turn.asked.identifier, reason)
         if number is None:
+            told = len(self._owed)
             outcomes = ("done", "any") if has_arrived else ("failed", "any")
             for identifier, channel in self._told((channels.RotatedChannel,)):
                 if isinstance(channel, channels.RotatedChannel) and channel.outcome in outcomes:
                     self._owed.append(lambda executor, name=identifier: executor.receive(name, None))  # type: ignore[misc]
+            if not has_arrived and not is_own and len(self._owed) == told:
+                self._on_failed_turn(reason)
         elif turn.asked.kind is CommunicationKind.ACTION:
             outcome = "succeeded" if has_arrived else "aborted"
             self._owed.append(lambda executor: executor.on_goal_ended(number, outcome, _done(reason)))

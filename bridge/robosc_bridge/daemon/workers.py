@@ -11,9 +11,10 @@ from collections.abc import Callable
 from typing import Protocol
 
 from robosc_bridge.daemon.backoff import Backoff
-from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone
-from robosc_bridge.devices.interface import DriveBase, DriveReading, RangeScanner, Velocity
+from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice
+from robosc_bridge.devices.interface import DriveBase, DriveReading, RangeScanner, Scan, Velocity
 from robosc_bridge.errors import BridgeError, DeviceSilentError
+from robosc_bridge.safety import Caution, Reason
 
 _LISTEN_S = 0.2
 """How long a scanner is listened to at once."""
@@ -23,6 +24,9 @@ SILENT_LIMIT = 3
 
 _log = logging.getLogger(__name__)
 
+
+_CLOSED_S = 0.1
+"""How often the safety layer is asked while there is no drive base: it must notice that nothing holds any more."""
 
 VALID_LIMIT = 8
 """A turn with fewer valid ranges shows nothing: the LiDAR is covered, or something is too near."""
@@ -38,6 +42,14 @@ class Command(Protocol):
     @property
     def is_torque_wanted(self) -> bool:
         """Whether the motors are to hold."""
+
+    @property
+    def reasons(self) -> tuple[Reason, ...]:
+        """Why it may not move."""
+
+    @property
+    def warnings(self) -> tuple[Caution, ...]:
+        """What a person should know."""
 
 
 class Gate(Protocol):
@@ -104,7 +116,8 @@ class DriveWorker:
         self._has_torque = False
         self._is_reset_wanted = False
         self._silent = 0
-        self._due_s = 0.0
+        self._due_s = self._open_at_s = -math.inf
+        self._notice = SafetyNotice((), ())
 
     def reset(self) -> None:
         """Let the next step reboot motors that have switched themselves off; called from other threads."""
@@ -115,8 +128,12 @@ class DriveWorker:
         try:
             if self._is_open:
                 self._exchange(now_s)
-            else:
+            elif now_s >= self._open_at_s:
+                self._ask(now_s)
                 self._open(now_s)
+            else:
+                self._ask(now_s)
+                return min(self._open_at_s, now_s + _CLOSED_S)
         except DeviceSilentError as error:
             self._silent += 1
             if not self._is_open or self._silent >= SILENT_LIMIT:
@@ -142,20 +159,30 @@ class DriveWorker:
         if self._is_reset_wanted:
             self._is_reset_wanted = False
             self._reset()
-        command = self._gate.output(now_s)
+        command = self._ask(now_s)
         if command.is_torque_wanted != self._has_torque:
             self._base.set_torque(command.is_torque_wanted)
             self._has_torque = command.is_torque_wanted
             # That took a while: what was to be done then may be wrong now.
-            command = self._gate.output(self._clock())
+            command = self._ask(self._clock())
         reading = self._base.exchange(command.velocity)
         self._silent = 0
         self._gate.saw_drive(reading)
         self._report(reading)
-        self._due_s += self._period_s
+        # One that came early, because it was hurried, is no reason for a long pause.
+        self._due_s = min(self._due_s, now_s) + self._period_s
         if self._due_s <= now_s:
             # Too late for one cycle or more: they are left out.
             self._due_s = now_s + self._period_s
+
+    def _ask(self, now_s: float) -> Command:
+        """What the safety layer says; what it says anew about why is reported."""
+        command = self._gate.output(now_s)
+        notice = SafetyNotice(command.reasons, command.warnings)
+        if notice != self._notice:
+            self._notice = notice
+            self._report(notice)
+        return command
 
     def _reset(self) -> None:
         self._has_torque = False
@@ -169,18 +196,20 @@ class DriveWorker:
     def _failed(self, problem: str) -> float:
         self._is_open = self._has_torque = False
         self._gate.drive_failed()
-        self._base.close()
         is_first = self._backoff.is_fresh
         retry_s = self._backoff.failed()
         self._report(DeviceDown(Device.DRIVE, problem, retry_s, is_first))
-        return self._clock() + retry_s
+        _closed(self._base)
+        now_s = self._clock()
+        self._open_at_s = now_s + retry_s
+        return min(self._open_at_s, now_s + _CLOSED_S)
 
     def wake(self) -> None:
         """Nothing: no step waits longer than its line's limit."""
 
     def close(self) -> None:
         """Stop the wheels, torque off, give the line back."""
-        self._base.close()
+        _closed(self._base)
 
 
 class ScannerWorker:
@@ -190,7 +219,8 @@ class ScannerWorker:
         scanner: The scanner.
         gate: The safety layer.
         report: Takes what is told; must not wait.
-        restart_after_s: After so long without a full turn its motor is restarted, again and again.
+        silent_after_s: After so long without a full turn it counts as lost.
+        restart_after_s: After so long its motor is restarted, again and again.
         clock: What the time is, in seconds.
         backoff: Pauses between attempts to open it.
     """
@@ -202,6 +232,7 @@ class ScannerWorker:
         scanner: RangeScanner,
         gate: Gate,
         report: Callable[[Report], None],
+        silent_after_s: float,
         restart_after_s: float,
         clock: Callable[[], float],
         backoff: Backoff | None = None,
@@ -209,11 +240,13 @@ class ScannerWorker:
         self._scanner = scanner
         self._gate = gate
         self._report = report
+        self._silent_after_s = silent_after_s
         self._restart_after_s = restart_after_s
         self._clock = clock
         self._backoff = backoff or Backoff()
         self._is_open = False
-        self._restart_at_s = 0.0
+        self._is_turning = False
+        self._heard_s = self._restart_at_s = 0.0
 
     def step(self, now_s: float) -> float:
         """Open it, or listen for a turn."""
@@ -223,8 +256,8 @@ class ScannerWorker:
             else:
                 self._scanner.open()
                 self._is_open = True
-                self._restart_at_s = self._clock() + self._restart_after_s
-                self._report(DeviceUp(Device.SCANNER))
+                self._heard_s = self._clock()
+                self._restart_at_s = self._heard_s + self._restart_after_s
         except BridgeError as error:
             return self._failed(str(error))
         except Exception as error:  # Without a scanner, the safety layer stops the wheels.
@@ -234,22 +267,32 @@ class ScannerWorker:
 
     def _listen(self) -> None:
         scan = self._scanner.receive(_LISTEN_S)
-        if scan is not None:
-            self._backoff.succeeded()
-            if sum(not math.isnan(value) for value in scan.ranges_m) >= VALID_LIMIT:
-                self._gate.saw_scan(scan.time_s)
-            self._report(scan)
-            self._restart_at_s = scan.time_s + self._restart_after_s
-        elif self._clock() >= self._restart_at_s:
+        if scan is not None and sum(not math.isnan(value) for value in scan.ranges_m) >= VALID_LIMIT:
+            self._heard(scan)
+        elif self._is_turning and self._clock() - self._heard_s > self._silent_after_s:
+            self._is_turning = False
+            what = f"no full turn with valid ranges for {self._silent_after_s:g} s"
+            self._report(DeviceDown(Device.SCANNER, what, 0.0, is_first=True))
+        if scan is None and self._clock() >= self._restart_at_s:
             self._scanner.restart()
             self._restart_at_s = self._clock() + self._restart_after_s
 
+    def _heard(self, scan: Scan) -> None:
+        self._backoff.succeeded()
+        self._gate.saw_scan(scan.time_s)
+        if not self._is_turning:
+            self._is_turning = True
+            self._report(DeviceUp(Device.SCANNER))
+        self._report(scan)
+        self._heard_s = scan.time_s
+        self._restart_at_s = scan.time_s + self._restart_after_s
+
     def _failed(self, problem: str) -> float:
-        self._is_open = False
-        self._scanner.close()
+        self._is_open = self._is_turning = False
         is_first = self._backoff.is_fresh
         retry_s = self._backoff.failed()
         self._report(DeviceDown(Device.SCANNER, problem, retry_s, is_first))
+        _closed(self._scanner)
         return self._clock() + retry_s
 
     def wake(self) -> None:
@@ -258,4 +301,12 @@ class ScannerWorker:
 
     def close(self) -> None:
         """Stop its motor, give the line back."""
-        self._scanner.close()
+        _closed(self._scanner)
+
+
+def _closed(device: DriveBase | RangeScanner) -> None:
+    """Close a device, whatever its driver does: its thread must go on."""
+    try:
+        device.close()
+    except Exception:
+        _log.exception("a driver failed when its device was closed")

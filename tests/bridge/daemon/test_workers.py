@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import pytest
 
 from robosc_bridge.daemon.backoff import Backoff
-from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone
+from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice
 from robosc_bridge.daemon.workers import SILENT_LIMIT, VALID_LIMIT, DriveWorker, ScannerWorker
 from robosc_bridge.devices.interface import (
     BINS,
@@ -21,6 +21,7 @@ from robosc_bridge.devices.interface import (
     Velocity,
 )
 from robosc_bridge.errors import DeviceFaultError, DeviceSilentError, LineLostError, LineMissingError
+from robosc_bridge.safety import Caution, Reason
 
 PERIOD_S = 0.02
 FORWARD = Velocity(0.1, 0.0)
@@ -40,6 +41,8 @@ class Clock:
 class Output:
     velocity: Velocity
     is_torque_wanted: bool
+    reasons: tuple[Reason, ...] = ()
+    warnings: tuple[Caution, ...] = ()
 
 
 class Gate:
@@ -97,7 +100,7 @@ class Base:
         self._called("reset")
 
     def close(self) -> None:
-        self.calls.append("close")
+        self._called("close")
 
 
 class Scene:
@@ -115,6 +118,15 @@ class Scene:
     def step(self) -> float:
         """One step; in how many seconds the next is due."""
         return self.worker.step(self.clock.now_s) - self.clock.now_s
+
+    def until_open(self) -> float:
+        """Steps until it is tried to open the base again; how long that was."""
+        begin_s = self.clock.now_s
+        self.base.calls.clear()
+        while "open" not in self.base.calls:
+            self.clock.now_s += self.step()
+            assert self.clock.now_s < begin_s + 100.0
+        return self.clock.now_s - begin_s
 
     def taken(self) -> list[object]:
         calls, self.base.calls = self.base.calls, []
@@ -141,6 +153,7 @@ def test_it_is_opened_and_rests_until_it_is_let(scene: Scene) -> None:
 
 def test_torque_comes_before_motion_and_goes_after_it(scene: Scene) -> None:
     scene.up()
+    scene.gate.asked.clear()
     scene.gate.next = Output(FORWARD, True)
     scene.base.torque_takes_s = 0.7
     scene.step()
@@ -165,20 +178,51 @@ def test_cycles_keep_their_places_in_time_and_late_ones_are_left_out(scene: Scen
 
 def test_a_port_that_is_missing_is_tried_again_with_longer_pauses(scene: Scene) -> None:
     scene.base.failing["open"] = LineMissingError("/dev/x", "there is no such port")
-    pauses = [scene.step() for _ in range(4)]
-    assert pauses == pytest.approx([0.5, 1.0, 1.5, 1.5])
+    scene.step()
+    scene.until_open()
+    scene.until_open()
+    scene.until_open()
     problem = "/dev/x: there is no such port"
     assert scene.reports == [
         DeviceDown(Device.DRIVE, problem, retry_s, is_first=number == 0)
         for number, retry_s in enumerate((0.5, 1.0, 1.5, 1.5))
     ]
-    del scene.base.failing["open"]
-    scene.reports.clear()
-    scene.taken()
+    # Meanwhile the safety layer is asked all the time.
+    assert len(scene.gate.asked) > 20
+
+
+def test_after_it_was_open_the_pauses_begin_anew(scene: Scene) -> None:
     scene.up()
-    # From the shortest again.
     scene.base.failing["exchange"] = LineLostError("/dev/x", "the line is gone")
-    assert scene.step() == pytest.approx(0.5)
+    assert scene.step() == pytest.approx(0.1)
+    assert scene.until_open() == pytest.approx(0.5)
+
+
+def test_a_hurried_exchange_is_no_reason_for_a_pause(scene: Scene) -> None:
+    scene.up()
+    for _ in range(100):
+        scene.clock.now_s += 0.001
+        assert scene.step() <= PERIOD_S + 1e-9
+
+
+def test_what_the_safety_layer_says_anew_is_reported_once(scene: Scene) -> None:
+    scene.up()
+    scene.gate.next = Output(STANDSTILL, True, (Reason.SCAN_STALE,), (Caution.BATTERY,))
+    scene.step()
+    scene.step()
+    notice = SafetyNotice((Reason.SCAN_STALE,), (Caution.BATTERY,))
+    assert [item for item in scene.reports if isinstance(item, SafetyNotice)] == [notice]
+    scene.gate.next = Output(STANDSTILL, True)
+    scene.step()
+    assert scene.reports[-2] == SafetyNotice((), ())
+
+
+def test_a_driver_that_fails_when_it_is_closed_does_not_end_the_thread(scene: Scene) -> None:
+    scene.up()
+    scene.base.failing["exchange"] = scene.base.failing["close"] = ZeroDivisionError("a bug")
+    scene.step()
+    assert isinstance(scene.reports[-1], DeviceDown)
+    scene.worker.close()
 
 
 @pytest.mark.parametrize(
@@ -191,15 +235,15 @@ def test_whatever_breaks_it_is_closed_and_opened_anew_with_torque_off(scene: Sce
     scene.taken()
     scene.reports.clear()
     scene.base.failing["exchange"] = error
-    assert scene.step() == pytest.approx(0.5)
+    scene.step()
     assert scene.taken() == [("exchange", FORWARD), "close"]
     assert scene.gate.failures == 1
     (report,) = scene.reports
     assert isinstance(report, DeviceDown)
     assert str(error) in report.problem
     scene.base.failing.clear()
-    scene.reports.clear()
-    scene.up()
+    scene.until_open()
+    scene.taken()
     scene.step()
     assert scene.taken() == [("torque", True), ("exchange", FORWARD)]
 
@@ -216,9 +260,8 @@ def test_a_missing_answer_is_noise_and_three_in_a_row_are_a_loss(scene: Scene) -
     assert "close" not in scene.taken()
     assert scene.gate.failures == 2 * (SILENT_LIMIT - 1)
     scene.base.failing["exchange"] = DeviceSilentError("no answer")
-    for _ in range(SILENT_LIMIT - 1):
+    for _ in range(SILENT_LIMIT):
         scene.step()
-    assert scene.step() == pytest.approx(0.5)
     assert scene.taken()[-1] == "close"
 
 
@@ -310,7 +353,7 @@ class ScannerScene:
         self.scanner = Scanner(self.clock)
         self.reports: list[Report] = []
         self.worker = ScannerWorker(
-            self.scanner, self.gate, self.reports.append, 1.0, self.clock, Backoff(first_s=0.5, limit_s=1.5)
+            self.scanner, self.gate, self.reports.append, 0.6, 1.0, self.clock, Backoff(first_s=0.5, limit_s=1.5)
         )
 
     def step(self) -> float:
@@ -319,9 +362,15 @@ class ScannerScene:
     def up(self) -> None:
         self.step()
         assert self.scanner.calls == ["open"]
-        assert self.reports == [DeviceUp(Device.SCANNER)]
+        assert self.reports == []
+        # It is there with its first turn.
+        first = scan(self.clock.now_s)
+        self.scanner.coming = [first]
+        self.step()
+        assert self.reports == [DeviceUp(Device.SCANNER), first]
         self.scanner.calls.clear()
         self.reports.clear()
+        self.gate.scans.clear()
 
 
 @pytest.fixture
@@ -344,8 +393,19 @@ def test_a_turn_that_shows_nothing_is_none_for_safety(turning: ScannerScene, val
     shown = replace(scan(100.1), ranges_m=(1.0,) * valid + (math.nan,) * (BINS - valid))
     turning.scanner.coming = [shown]
     turning.step()
-    assert turning.reports == [shown]
+    assert turning.reports == ([shown] if counts else [])
     assert turning.gate.scans == ([100.1] if counts else [])
+
+
+def test_a_silent_scanner_is_told_once_and_its_first_turn_again(turning: ScannerScene) -> None:
+    for _ in range(8):
+        turning.step()
+    told = [item for item in turning.reports if isinstance(item, DeviceDown)]
+    assert told == [DeviceDown(Device.SCANNER, "no full turn with valid ranges for 0.6 s", 0.0, is_first=True)]
+    turning.reports.clear()
+    turning.scanner.coming = [scan(turning.clock.now_s)]
+    turning.step()
+    assert turning.reports[0] == DeviceUp(Device.SCANNER)
 
 
 def test_a_motor_that_falls_silent_is_restarted_again_and_again(turning: ScannerScene) -> None:
@@ -374,8 +434,8 @@ def test_a_scanner_that_is_unplugged_is_opened_again(turning: ScannerScene, erro
     assert report.is_first
     assert turning.scanner.calls == ["close"]
     turning.scanner.calls.clear()
-    turning.reports.clear()
-    turning.up()
+    turning.step()
+    assert turning.scanner.calls == ["open"]
     # It was opened, but has not turned yet: the pauses go on growing.
     turning.scanner.coming = [error]
     assert turning.step() == pytest.approx(1.0)

@@ -21,10 +21,13 @@ pytestmark = [
 CARRIER = Path(__file__).parents[1] / "models" / "carrier" / "carrier.rscd"
 
 
-def test_a_recorded_run(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
-    supervisor = example_supervisor("line_follower/line_follower")
-    scenario = for_node(supervisor, read_recorded("line_follower"))
-    scenario = replace(scenario, actions=scenario.actions + ODD_MESSAGES)
+# The navigation example asks for interfaces that no index of packages has.
+@pytest.mark.parametrize("robot", ["line_follower", "maze_solver", "object_finder", "ball_pusher", "person_follower"])
+def test_a_recorded_run(robot: str, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    supervisor = example_supervisor(f"{robot}/{robot}")
+    scenario = for_node(supervisor, read_recorded(robot))
+    if robot == "line_follower":
+        scenario = replace(scenario, actions=scenario.actions + ODD_MESSAGES)
     workspace = built_once(supervisor, tmp_path_factory)
     compare(ros1_cpp_target(supervisor, workspace, tmp_path), scenario, observe(supervisor, scenario))
 

@@ -19,7 +19,8 @@ PACKAGES = ("geometry_msgs", "sensor_msgs", "std_srvs", "test_msgs")
 pytestmark = pytest.mark.skipif(missing(*PACKAGES) is not None, reason=str(missing(*PACKAGES)))
 
 
-@pytest.mark.parametrize("robot", ["maze_solver", "object_finder"])
+# The navigation example asks for interfaces that no package index has.
+@pytest.mark.parametrize("robot", ["line_follower", "maze_solver", "object_finder", "ball_pusher", "person_follower"])
 def test_a_recorded_run(robot: str, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
     supervisor = example_supervisor(f"{robot}/{robot}")
     scenario = for_node(supervisor, read_recorded(robot))

@@ -258,7 +258,9 @@ class Daemon:
         for warning in notice.warnings:
             _log.warning("%s", warning)
         for reason in notice.reasons:
-            _log.log(logging.DEBUG if reason in _ORDINARY else logging.WARNING, "%s", reason)
+            # Before the start, nothing has told anything yet.
+            is_news = self.state is State.RUNNING and reason not in _ORDINARY
+            _log.log(logging.WARNING if is_news else logging.DEBUG, "%s", reason)
         grave = [reason for reason in notice.reasons if reason in _GRAVE]
         if grave and self.state is State.RUNNING:
             self._fault(" ".join(grave))

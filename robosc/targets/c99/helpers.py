@@ -29,7 +29,7 @@ def _integer(name: str, operator: str) -> tuple[str, str]:
 
 
 def _double(name: str, operator: str) -> tuple[str, str]:
-    return f"{name}_d", f"static double {name}_d({_D})\n{{\n    return finite(a {operator} b);\n}}"
+    return f"{name}_d", f"static double {name}_d({_D})\n{{\n    return finite_d(a {operator} b);\n}}"
 
 
 def _choice(letter: str, c_type: str, unknown: str) -> tuple[str, str]:
@@ -65,9 +65,9 @@ HELPERS: dict[str, str] = dict(
             f"    return (a < {_MINIMUM} || a > {_MAXIMUM}) ? INT64_MIN : a;\n}}",
         ),
         (
-            "finite",
+            "finite_d",
             "/* A finite result of arithmetic, else unknown. */\n"
-            "static double finite(double a)\n{\n    return isfinite(a) ? a : (double)NAN;\n}",
+            "static double finite_d(double a)\n{\n    return isfinite(a) ? a : (double)NAN;\n}",
         ),
         (
             "not_b",
@@ -95,18 +95,18 @@ HELPERS: dict[str, str] = dict(
         (
             "divide_d",
             f"static double divide_d({_D})\n{{\n"
-            "    return (isnan(a) || isnan(b) || b == 0.0) ? (double)NAN : finite(a / b);\n}",
+            "    return (isnan(a) || isnan(b) || b == 0.0) ? (double)NAN : finite_d(a / b);\n}",
         ),
         (
             "negate_i",
             "static int64_t negate_i(int64_t a)\n{\n    return a == INT64_MIN ? INT64_MIN : whole(-a);\n}",
         ),
-        ("negate_d", "static double negate_d(double a)\n{\n    return finite(-a);\n}"),
+        ("negate_d", "static double negate_d(double a)\n{\n    return finite_d(-a);\n}"),
         (
             "abs_i",
             "static int64_t abs_i(int64_t a)\n{\n    return a == INT64_MIN ? INT64_MIN : whole(a < 0 ? -a : a);\n}",
         ),
-        ("abs_d", "static double abs_d(double a)\n{\n    return finite(fabs(a));\n}"),
+        ("abs_d", "static double abs_d(double a)\n{\n    return finite_d(fabs(a));\n}"),
         *_extreme("min", "<="),
         *_extreme("max", ">="),
         (

@@ -243,6 +243,17 @@ def test_a_notice_that_ends_by_itself_is_no_fault(scene: Scene) -> None:
     assert scene.daemon.state is State.RUNNING
 
 
+def test_why_nothing_moves_is_told_while_it_runs_and_not_before(scene: Scene, caplog: pytest.LogCaptureFixture) -> None:
+    notice = SafetyNotice((Reason.SCAN_STALE, Reason.COMMAND_SILENT), ())
+    scene.daemon.post(notice)
+    scene.daemon.turn()
+    assert not [item for item in caplog.records if item.levelname == "WARNING"]
+    scene.up()
+    scene.daemon.post(notice)
+    scene.daemon.turn()
+    assert [item.message for item in caplog.records if item.levelname == "WARNING"] == [Reason.SCAN_STALE]
+
+
 def test_a_thread_that_has_ended_is_a_fault(scene: Scene) -> None:
     scene.up()
     scene.is_alive = False

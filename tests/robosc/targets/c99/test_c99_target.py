@@ -379,6 +379,18 @@ def test_texts_are_escaped() -> None:
 
 
 @needs_gcc
+@pytest.mark.parametrize("robot", ["ball_pusher", "line_follower", "maze_solver", "object_finder", "person_follower"])
+def test_it_compiles_beside_what_a_c_library_adds_to_the_standard(robot: str, tmp_path: Path) -> None:
+    """As catkin and most builds compile it: with names that the headers declare beyond C99, such as `finite`."""
+    files = generate(example_supervisor(f"{robot}/{robot}"), "c99")
+    for path, text in files.items():
+        (tmp_path / path).write_text(text, encoding="utf-8")
+    sources = [path for path in files if path.endswith(".c")]
+    command = [str(GCC), "-std=gnu17", "-D_GNU_SOURCE", "-Wall", "-Wextra", "-Werror", "-c", *sources]
+    subprocess.run(command, cwd=tmp_path, check=True)
+
+
+@needs_gcc
 @pytest.mark.parametrize("name", EXAMPLE_NAMES)
 def test_the_example_program_runs(name: str, tmp_path: Path) -> None:
     supervisor = example_supervisor(name)

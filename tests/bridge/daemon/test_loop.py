@@ -162,6 +162,8 @@ def test_nothing_moves_before_all_devices_are_there(scene: Scene) -> None:
     assert states == [(State.STARTING, False)] * 3
     scene.live(1.0, 2.0)
     assert (scene.daemon.state, scene.out) == (State.RUNNING, Velocity(0.1, 0.0))
+    # The scan from before the start was heeded: nothing was decided on what is not known.
+    assert "turn.request" not in scene.events()
 
 
 def test_in_standby_it_waits_with_torque_off_until_somebody_says_start() -> None:
@@ -221,6 +223,8 @@ def test_a_turn_waits_for_a_silent_scanner_and_goes_on(scene: Scene) -> None:
     assert scene.out.angular_rad_s > 0.0
     scene.live(1.5)
     assert (scene.out, scene.daemon.state) == (STANDSTILL, State.RUNNING)
+    # Not the safety layer alone: nothing is asked of it.
+    assert scene.daemon._wish == STANDSTILL
     heading_rad = scene.heading_rad
     scene.live(0.5)
     assert scene.heading_rad == heading_rad
@@ -264,6 +268,8 @@ def test_a_thread_that_has_ended_is_a_fault(scene: Scene) -> None:
 def test_a_velocity_from_before_an_operators_stop_does_not_move_the_robot_afterwards(scene: Scene) -> None:
     scene.up()
     scene.daemon.post(Key("space"))
+    scene.daemon.turn()
+    assert scene.daemon._wish == STANDSTILL
     scene.live(0.1, 2.0)
     # Meanwhile something came into the way: nothing asks for a velocity any more.
     scene.live(0.4, 0.3)

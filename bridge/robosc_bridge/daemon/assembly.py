@@ -21,7 +21,8 @@ from robosc_bridge.configuration.channels import (
 from robosc_bridge.configuration.structure import Configuration, Scanner
 from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.device_thread import DeviceThread
-from robosc_bridge.daemon.loop import Command, Daemon, Job
+from robosc_bridge.daemon.loop import Daemon, Job
+from robosc_bridge.daemon.states import Command
 from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
 from robosc_bridge.devices.interface import DriveBase, RangeScanner
 from robosc_bridge.devices.registry import make_drive_base, make_range_scanner

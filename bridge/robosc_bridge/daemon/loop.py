@@ -7,7 +7,6 @@ import logging
 import queue
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import StrEnum
 
 from robosc.execution.clock import Clock
 from robosc.execution.event_log import EventLog
@@ -19,6 +18,7 @@ from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.motion import Motion
 from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice
 from robosc_bridge.daemon.robot import Robot
+from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.devices.interface import DriveReading, Scan, Velocity
 from robosc_bridge.safety import LATCHING, Reason, SafetyLayer
 from robosc_bridge.skills import EmergencyStop, Rotate
@@ -33,27 +33,6 @@ STOP_LIMIT_S = 3.0
 _ORDINARY = frozenset({Reason.STANDBY, Reason.TORQUE_AWAITED, Reason.COMMAND_SILENT})
 # An operator's stop is no fault; what is wrong with the supervisor is told by itself.
 _GRAVE = frozenset(LATCHING) - {Reason.OPERATOR_STOP, Reason.SUPERVISOR_FAULT}
-
-
-class State(StrEnum):
-    """What the daemon is doing."""
-
-    STARTING = "starting"
-    STANDBY = "standby"
-    RUNNING = "running"
-    STOPPING = "stopping"
-    FAULT = "fault"
-    OVER = "over"
-
-
-class Command(StrEnum):
-    """What an operator may want."""
-
-    START = "start"
-    STANDBY = "standby"
-    STOP = "stop"
-    RESET = "reset"
-    QUIT = "quit"
 
 
 @dataclass(frozen=True)

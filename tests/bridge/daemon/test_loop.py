@@ -9,8 +9,9 @@ from robosc.execution.clock import ManualClock
 from robosc.execution.event_log import MemoryLog
 from robosc.supervisor import make_supervisor
 from robosc_bridge.configuration import parse, tie
-from robosc_bridge.daemon.loop import STOP_LIMIT_S, Command, Daemon, Job, Key, State
+from robosc_bridge.daemon.loop import STOP_LIMIT_S, Daemon, Job, Key
 from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, SafetyNotice
+from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.devices.interface import BINS, STANDSTILL, DriveReading, Pose, RawScan, Scan, Velocity
 from robosc_bridge.safety import Caution, Reason, SafetyLayer, SafetyLimits
 from robosc_bridge.skills import EmergencyStop, Rotate

@@ -1,0 +1,182 @@
+"""What the daemon shows to whoever watches it: the latest snapshot, and entries of the event log since the last look.
+
+The loop writes, any number of watchers read, each from a thread of its own; nobody waits for anybody. Who reads too
+slowly loses entries and is told how many, never the latest snapshot.
+"""
+
+import threading
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from robosc.execution.event_log import Entry, EventLog
+from robosc_bridge.daemon.reports import Device
+from robosc_bridge.daemon.states import State
+from robosc_bridge.devices.interface import DriveReading, Scan
+from robosc_bridge.safety import Caution, Reason
+
+MAXIMUM_WAITING = 1000
+"""Entries that are kept for a watcher."""
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """What the daemon is doing, as the loop saw it at the end of a turn. Nobody changes any part of it.
+
+    Attributes:
+        number: Grows with each snapshot.
+        time_s: When, in seconds since 1970-01-01 UTC.
+        state: What it is doing.
+        problem: The fault that has stopped it; empty: none.
+        reasons: Why the safety layer lets nothing move.
+        warnings: What a person should know though it does.
+        stops: Why the executor requests nothing; empty: it may, or nothing is executed.
+        devices: Whether each device that belongs to the robot works.
+        components: State and variables of each component with a behaviour, `{name: {"state": s, "variables": {v:
+            value}}}`; empty: nothing is executed.
+        enabled: Names of the requests that are allowed now, in the model's order.
+        reading: What the drive base told last; None: nothing yet, or it is lost.
+        scan: The LiDAR's last full turn; None: the same.
+        overruns: How many decisions were left out because the one before took too long.
+    """
+
+    number: int
+    time_s: float
+    state: State
+    problem: str
+    reasons: tuple[Reason, ...]
+    warnings: tuple[Caution, ...]
+    stops: tuple[str, ...]
+    devices: Mapping[Device, bool]
+    components: Mapping[str, Mapping[str, Any]]
+    enabled: tuple[str, ...]
+    reading: DriveReading | None
+    scan: Scan | None
+    overruns: int
+
+
+@dataclass(frozen=True)
+class Update:
+    """What a watcher has not seen yet.
+
+    Attributes:
+        snapshot: The latest; None: there was none yet.
+        entries: Of the event log, in their order, since the last look.
+        lost: How many entries before these were dropped because nobody looked.
+    """
+
+    snapshot: Snapshot | None
+    entries: tuple[Entry, ...]
+    lost: int
+
+
+class Subscription:
+    """One watcher's view of a feed; made by `Feed.subscribe`."""
+
+    def __init__(self, feed: "Feed", wake: Callable[[], None], limit: int) -> None:
+        self._feed = feed
+        self._wake = wake
+        self._lock = threading.Lock()
+        self._entries: deque[Entry] = deque(maxlen=limit)
+        self._lost = 0
+
+    def take(self) -> Update:
+        """What came since the last look; never waits."""
+        with self._lock:
+            entries, lost = tuple(self._entries), self._lost
+            self._entries.clear()
+            self._lost = 0
+        return Update(self._feed.snapshot, entries, lost)
+
+    def close(self) -> None:
+        """See nothing any more; may be called again."""
+        self._feed.drop(self)
+
+    def put(self, entry: Entry | None) -> None:
+        """For the feed: keep an entry, if it is one, and wake the watcher."""
+        if entry is not None:
+            with self._lock:
+                self._lost += len(self._entries) == self._entries.maxlen
+                self._entries.append(entry)
+        self._wake()
+
+
+class Feed:
+    """The latest snapshot and the entries for each watcher."""
+
+    def __init__(self) -> None:
+        self._snapshot: Snapshot | None = None
+        # Replaced as a whole, so that the loop can go through it without a lock.
+        self._subscriptions: tuple[Subscription, ...] = ()
+        self._lock = threading.Lock()
+
+    @property
+    def snapshot(self) -> Snapshot | None:
+        """The latest; None: there was none yet."""
+        return self._snapshot
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether anybody wants entries."""
+        return bool(self._subscriptions)
+
+    def show(self, snapshot: Snapshot) -> None:
+        """There is a new snapshot."""
+        self._snapshot = snapshot
+        for subscription in self._subscriptions:
+            subscription.put(None)
+
+    def tell(self, entry: Entry) -> None:
+        """There is a new entry, whose values nobody changes any more."""
+        for subscription in self._subscriptions:
+            subscription.put(entry)
+
+    def subscribe(self, wake: Callable[[], None], limit: int = MAXIMUM_WAITING) -> Subscription:
+        """Watch from now on.
+
+        Args:
+            wake: Called from the loop's thread when there is something new; neither waits nor raises.
+            limit: Entries that may wait for `take`; the oldest are dropped beyond it.
+        """
+        subscription = Subscription(self, wake, limit)
+        with self._lock:
+            self._subscriptions = (*self._subscriptions, subscription)
+        return subscription
+
+    def drop(self, subscription: Subscription) -> None:
+        """End a subscription."""
+        with self._lock:
+            self._subscriptions = tuple(item for item in self._subscriptions if item is not subscription)
+
+
+class WatchedLog:
+    """An event log whose entries are shown as well.
+
+    Args:
+        log: Where they are written.
+        feed: Where they are shown.
+    """
+
+    def __init__(self, log: EventLog, feed: Feed) -> None:
+        self._log = log
+        self._feed = feed
+
+    @property
+    def is_active(self) -> bool:
+        """Whether anybody wants entries."""
+        return self._log.is_active or self._feed.is_watched
+
+    @property
+    def dropped(self) -> int:
+        """Entries that were lost on their way to where they are written."""
+        return self._log.dropped
+
+    def write(self, entry: Entry) -> None:
+        """Write it and show it."""
+        self._log.write(entry)
+        self._feed.tell(entry)
+
+    def close(self) -> None:
+        """Finish what was written."""
+        self._log.close()

@@ -1,0 +1,72 @@
+"""What a remote face may do with the daemon, from any thread, without waiting for it."""
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Protocol
+
+from robosc.model.structure import Model
+from robosc_bridge.configuration.ties import Ties
+from robosc_bridge.daemon.feed import Feed
+from robosc_bridge.daemon.programs import FromProgram
+from robosc_bridge.daemon.states import Command, Order
+
+
+class Inbox(Protocol):
+    """Where the loop is told things."""
+
+    def __call__(self, item: Order | FromProgram, /) -> None:
+        """Tell it something; never waits."""
+
+
+class Operations:
+    """The daemon as remote faces see it.
+
+    Args:
+        model: What is executed.
+        ties: What its communications are tied to.
+        is_layer: Whether the supervisor is a supervision layer.
+        feed: What the daemon shows.
+        post: Tells the loop something.
+        operator_seen: Tells the safety layer that the operator is there.
+
+    Attributes:
+        model: What is executed.
+        ties: What its communications are tied to.
+        is_layer: Whether the supervisor is a supervision layer.
+        feed: What the daemon shows.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        ties: Ties,
+        feed: Feed,
+        post: Inbox,
+        operator_seen: Callable[[], None],
+        *,
+        is_layer: bool,
+    ) -> None:
+        self.model = model
+        self.ties = ties
+        self.is_layer = is_layer
+        self.feed = feed
+        self._post = post
+        self._operator_seen = operator_seen
+
+    def order(self, command: Command, by: str) -> "Future[str]":
+        """Want something; a stop takes effect before this returns.
+
+        Returns:
+            Why it cannot be, one sentence, or nothing ("") once it is done; it may never come if the daemon ends.
+        """
+        answer: Future[str] = Future()
+        self._post(Order(command, by, answer.set_result))
+        return answer
+
+    def tell(self, item: FromProgram) -> None:
+        """Tell the loop what a program says."""
+        self._post(item)
+
+    def operator_seen(self) -> None:
+        """The link to the operator works."""
+        self._operator_seen()

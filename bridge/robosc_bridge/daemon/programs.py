@@ -1,0 +1,271 @@
+"""What programs and operators on the other side of a remote face tell the loop, and what the loop tells them.
+
+A program is whatever is connected: it may answer services and actions of the model that are tied to `grpc`, take and
+give messages there, and, where the supervisor is a supervision layer, be the existing controller or operator whose
+requests the layer lets through or holds back. Data is plain: None, booleans, numbers, texts, lists, and dicts with
+texts as keys. Whatever a program sends is untrusted: what makes no sense is answered with `Refused` and does nothing.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+# What the loop tells a program, as the model's other side.
+
+
+@dataclass(frozen=True)
+class MessageSent:
+    """The model sent a message on an identifier that is tied to `grpc`; every program is told."""
+
+    name: str
+    identifier: str
+    data: Any
+
+
+@dataclass(frozen=True)
+class CallMade:
+    """The model calls a service that this program serves; a `Replied` or `CallFailed` with the number is awaited."""
+
+    name: str
+    number: int
+    data: Any
+
+
+@dataclass(frozen=True)
+class GoalMade:
+    """The model asks for an action that this program serves; `GoalAccepted`, then a `GoalEnded` are awaited."""
+
+    name: str
+    number: int
+    data: Any
+
+
+@dataclass(frozen=True)
+class CancelMade:
+    """The model wants a goal of this program to end."""
+
+    name: str
+    number: int
+
+
+# What the loop tells a program, as the caller of a supervision layer.
+
+
+@dataclass(frozen=True)
+class PassedOn:
+    """The robot sent a message, after the supervisor has seen it; every program is told."""
+
+    identifier: str
+    data: Any
+
+
+@dataclass(frozen=True)
+class Blocked:
+    """A request of this program on an identifier was held back."""
+
+    identifier: str
+
+
+@dataclass(frozen=True)
+class Answered:
+    """A call of this program is answered; `data` is None for the default answer of one held back or failed."""
+
+    call_id: str
+    data: Any
+    is_default: bool
+
+
+@dataclass(frozen=True)
+class GoalTaken:
+    """A goal of this program was let through; a `GoalOver` follows."""
+
+    goal_id: str
+
+
+@dataclass(frozen=True)
+class GoalRejected:
+    """A goal of this program was held back."""
+
+    goal_id: str
+
+
+@dataclass(frozen=True)
+class FeedbackPassed:
+    """How far a goal of this program is."""
+
+    goal_id: str
+    data: Any
+
+
+@dataclass(frozen=True)
+class GoalOver:
+    """A goal of this program has ended: `succeeded`, `aborted` or `cancelled`."""
+
+    goal_id: str
+    outcome: str
+    data: Any
+
+
+@dataclass(frozen=True)
+class Refused:
+    """What this program sent makes no sense, one sentence; it changed nothing."""
+
+    why: str
+
+
+ToProgram = (
+    MessageSent
+    | CallMade
+    | GoalMade
+    | CancelMade
+    | PassedOn
+    | Blocked
+    | Answered
+    | GoalTaken
+    | GoalRejected
+    | FeedbackPassed
+    | GoalOver
+    | Refused
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """One connected program.
+
+    Attributes:
+        name: Who it is, for the log.
+        tell: Called by the loop's thread with each thing it is told; neither waits nor raises.
+        serves: Names of the model's services and actions, tied to `grpc`, that it answers.
+        may_request: Whether it may be the caller of a supervision layer.
+    """
+
+    name: str
+    tell: Callable[[ToProgram], None]
+    serves: frozenset[str] = field(default_factory=frozenset)
+    may_request: bool = False
+
+
+# What a program tells the loop.
+
+
+@dataclass(frozen=True)
+class Attached:
+    """A program is there: the first thing it tells. What another one serves already, it does not serve."""
+
+    program: Program
+
+
+@dataclass(frozen=True)
+class Detached:
+    """A program is gone: what the model asked it for has failed, and the goals it asked a layer for are cancelled."""
+
+    program: Program
+
+
+@dataclass(frozen=True)
+class Told:
+    """A message for the model, on an identifier of an outgoing message that is tied to `grpc`."""
+
+    program: Program
+    identifier: str
+    data: Any
+
+
+@dataclass(frozen=True)
+class Replied:
+    """The answer to a `CallMade`."""
+
+    program: Program
+    number: int
+    data: Any
+
+
+@dataclass(frozen=True)
+class CallFailed:
+    """A `CallMade` cannot be answered."""
+
+    program: Program
+    number: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class GoalAccepted:
+    """A `GoalMade` is under way."""
+
+    program: Program
+    number: int
+
+
+@dataclass(frozen=True)
+class FeedbackGiven:
+    """How far a `GoalMade` is."""
+
+    program: Program
+    number: int
+    data: Any
+
+
+@dataclass(frozen=True)
+class GoalEnded:
+    """A `GoalMade` has ended: `succeeded`, `aborted`, `cancelled` or `rejected`."""
+
+    program: Program
+    number: int
+    outcome: str
+    data: Any
+
+
+@dataclass(frozen=True)
+class Requested:
+    """As the caller of a layer: a message for the robot."""
+
+    program: Program
+    identifier: str
+    data: Any
+
+
+@dataclass(frozen=True)
+class Called:
+    """As the caller of a layer: a call of a service, with an id of the program's own."""
+
+    program: Program
+    service: str
+    call_id: str
+    data: Any
+
+
+@dataclass(frozen=True)
+class GoalSent:
+    """As the caller of a layer: a goal of an action, with an id of the program's own."""
+
+    program: Program
+    action: str
+    goal_id: str
+    data: Any
+
+
+@dataclass(frozen=True)
+class CancelWanted:
+    """As the caller of a layer: a goal of its own is to end."""
+
+    program: Program
+    action: str
+    goal_id: str
+
+
+FromProgram = (
+    Attached
+    | Detached
+    | Told
+    | Replied
+    | CallFailed
+    | GoalAccepted
+    | FeedbackGiven
+    | GoalEnded
+    | Requested
+    | Called
+    | GoalSent
+    | CancelWanted
+)

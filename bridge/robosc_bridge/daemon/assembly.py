@@ -21,7 +21,10 @@ from robosc_bridge.configuration.channels import (
 from robosc_bridge.configuration.structure import Configuration, Scanner
 from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.device_thread import DeviceThread
-from robosc_bridge.daemon.loop import Daemon, Job
+from robosc_bridge.daemon.feed import Feed
+from robosc_bridge.daemon.jobs import Job
+from robosc_bridge.daemon.loop import Daemon
+from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
 from robosc_bridge.devices.interface import DriveBase, RangeScanner
@@ -131,11 +134,13 @@ class Machine:
         daemon: The loop, run by whoever calls `run`.
         drive: The drive base's thread.
         scanner: The LiDAR's; None: there is none.
+        operations: The daemon as remote faces see it.
     """
 
     daemon: Daemon
     drive: DeviceThread
     scanner: DeviceThread | None
+    operations: Operations
 
     def run(self) -> bool:
         """Start the threads, run the loop to its end, and stop them; whether all gave back their devices in time."""
@@ -152,6 +157,11 @@ class Machine:
     def quit(self) -> None:
         """Let `run` end; from any thread or signal handler."""
         self.daemon.post(Command.QUIT)
+
+
+def is_remote(configuration: Configuration) -> bool:
+    """Whether somebody elsewhere can reach the bridge."""
+    return configuration.remote.grpc_address is not None or configuration.remote.mavlink_url is not None
 
 
 def _require_served(configuration: Configuration, ties: Ties) -> None:
@@ -189,14 +199,16 @@ def assemble(
     clock = SystemClock()
     limits = safety_limits(configuration)
     safety = SafetyLayer(limits)
-    job = Job(supervisor, ties, settings, configuration.scanner is not None, starts_itself)
+    # Who can be reached can be told to start again.
+    job = Job(supervisor, ties, settings, configuration.scanner is not None, starts_itself, is_remote(configuration))
     rotate = configuration.skills.rotate
     # A turn has a time limit, which goes by its speed.
     speed_rad_s = min(rotate.speed_rad_s, limits.angular_rad_s)
     slowest_rad_s = min(rotate.slowest_rad_s, speed_rad_s)
     rotate = msgspec.structs.replace(rotate, speed_rad_s=speed_rad_s, slowest_rad_s=slowest_rad_s)
     stop = EmergencyStop(configuration.skills.emergency_stop)
-    daemon = Daemon(job, safety, Rotate(rotate), stop, clock, log)
+    feed = Feed()
+    daemon = Daemon(job, safety, Rotate(rotate), stop, clock, log, feed)
     worker = DriveWorker(drive_base(configuration), safety, daemon.post, EXCHANGE_S, clock.monotonic)
     drive = DeviceThread(worker, clock.monotonic)
     scanner = None
@@ -211,4 +223,7 @@ def assemble(
         )
         scanner = DeviceThread(listener, clock.monotonic)
     daemon.connect(drive.hurry, worker.reset, lambda: drive.is_alive and (scanner is None or scanner.is_alive))
-    return Machine(daemon, drive, scanner)
+    operations = Operations(
+        supervisor.model, ties, feed, daemon.post, lambda: safety.operator_seen(clock.monotonic()), is_layer=False
+    )
+    return Machine(daemon, drive, scanner, operations)

@@ -1,6 +1,8 @@
 """From a configuration to a daemon with its devices' threads."""
 
+import contextlib
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import msgspec
@@ -21,6 +23,7 @@ from robosc_bridge.configuration.channels import (
 from robosc_bridge.configuration.structure import Configuration, Scanner
 from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.device_thread import DeviceThread
+from robosc_bridge.daemon.faces import Face, is_remote
 from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.jobs import Job
 from robosc_bridge.daemon.loop import Daemon
@@ -45,7 +48,8 @@ LONGEST_PERIOD_S = 0.9
 
 # Longer than anything that a device's thread does at once, such as calibrating a gyroscope.
 _THREAD_LIMIT_S = 10.0
-_NOT_SERVED: tuple[type[Channel], ...] = (GrpcChannel, LineChannel, LineLostChannel)
+_NOT_SERVED: tuple[type[Channel], ...] = (LineChannel, LineLostChannel)
+_FACES_NOT_SERVED = ("grpc_address", "mavlink_url")
 
 
 class AssemblyError(BridgeError):
@@ -142,26 +146,32 @@ class Machine:
     scanner: DeviceThread | None
     operations: Operations
 
-    def run(self) -> bool:
-        """Start the threads, run the loop to its end, and stop them; whether all gave back their devices in time."""
+    def run(self, faces: Sequence[Face] = ()) -> bool:
+        """Start the remote faces and the threads, run the loop to its end, and stop them.
+
+        Returns:
+            Whether all threads gave back their devices in time.
+
+        Raises:
+            BridgeError: A face cannot be started; no device was opened then.
+        """
         threads = [self.drive, *([self.scanner] if self.scanner else [])]
-        for thread in threads:
-            thread.start()
-        try:
-            self.daemon.run()
-        finally:
-            # The drive base first: whatever else hangs, the wheels stop.
-            ended = [thread.stop(_THREAD_LIMIT_S) for thread in threads]
+        with contextlib.ExitStack() as stack:
+            for face in faces:
+                stack.callback(face.stop)
+                face.start()
+            for thread in threads:
+                thread.start()
+            try:
+                self.daemon.run()
+            finally:
+                # The drive base first: whatever else hangs, the wheels stop.
+                ended = [thread.stop(_THREAD_LIMIT_S) for thread in threads]
         return all(ended)
 
     def quit(self) -> None:
         """Let `run` end; from any thread or signal handler."""
         self.daemon.post(Command.QUIT)
-
-
-def is_remote(configuration: Configuration) -> bool:
-    """Whether somebody elsewhere can reach the bridge."""
-    return configuration.remote.grpc_address is not None or configuration.remote.mavlink_url is not None
 
 
 def _require_served(configuration: Configuration, ties: Ties) -> None:
@@ -171,17 +181,19 @@ def _require_served(configuration: Configuration, ties: Ties) -> None:
         for kind in _NOT_SERVED
         for item, _ in ties.tied_to(kind)
     ]
-    remote = configuration.remote
-    if configuration.safety.operator_link_timeout_s is not None:
-        missing.append("'safety.operator_link_timeout_s'")
     missing += [
         f"'{item.name}' ('{item.identifier}') is tied to 'fault' of a camera"
         for item, tied in ties.tied_to(FaultChannel)
         if isinstance(tied, FaultChannel) and tied.device == "camera"
     ]
-    missing += [f"'remote.{name}'" for name in ("grpc_address", "mavlink_url") if getattr(remote, name) is not None]
+    missing += [f"'remote.{name}'" for name in _FACES_NOT_SERVED if getattr(configuration.remote, name) is not None]
     if missing:
         raise AssemblyError(f"not served by this version of the bridge: {'; '.join(missing)}")
+    needing = [f"'{item.name}' ('{item.identifier}')" for item, _ in ties.tied_to(GrpcChannel)]
+    if needing and configuration.remote.grpc_address is None:
+        raise AssemblyError(f"tied to 'grpc', which needs 'remote.grpc_address': {', '.join(needing)}")
+    if configuration.safety.operator_link_timeout_s is not None and not is_remote(configuration):
+        raise AssemblyError("'safety.operator_link_timeout_s' needs 'remote.grpc_address' or 'remote.mavlink_url'")
 
 
 def assemble(
@@ -196,6 +208,8 @@ def assemble(
     if supervisor.deployment is not Deployment.CONTROLLER:
         raise AssemblyError("the supervisor is for a supervision layer; the bridge runs controllers")
     settings = check_settings(configuration, ties)
+    if not starts_itself and not is_remote(configuration):
+        raise AssemblyError("to wait in standby, the bridge needs 'remote.grpc_address' or 'remote.mavlink_url'")
     clock = SystemClock()
     limits = safety_limits(configuration)
     safety = SafetyLayer(limits)

@@ -74,6 +74,20 @@ def obtain(source: Source, tell: Callable[[str], None] = lambda text: None) -> S
     return _served(bundle, source.server, source, tell)
 
 
+def deployment_of(file: Path) -> Deployment:
+    """Where a file's supervisor says that it is to stand; a model may stand anywhere, and is taken for a controller.
+
+    Raises:
+        NoSupervisorError: A supervisor's file cannot be read.
+    """
+    if file.suffix != SUPERVISOR_SUFFIX:
+        return Deployment.CONTROLLER
+    try:
+        return decode(_bytes(file)).deployment
+    except RoboscError as error:
+        raise NoSupervisorError(f"{file}: {error}") from error
+
+
 def _bundle(model: Path) -> Bundle:
     try:
         return load_bundle(model)

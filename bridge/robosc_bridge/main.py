@@ -21,7 +21,7 @@ from robosc_bridge.configuration.template import DriveDriver, Robot, ScannerDriv
 from robosc_bridge.daemon.assembly import assemble, check_settings
 from robosc_bridge.daemon.keyboard import Keyboard
 from robosc_bridge.daemon.loop import Key
-from robosc_bridge.daemon.supervisors import MODEL_SUFFIX, NoSupervisorError, Source, obtain
+from robosc_bridge.daemon.supervisors import MODEL_SUFFIX, NoSupervisorError, Source, obtain, trusted_keys
 from robosc_bridge.devices.registry import Kind, available_drivers
 from robosc_bridge.errors import BridgeError
 
@@ -50,7 +50,9 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     run = commands.add_parser("run", help="execute a supervisor on a robot's devices", epilog=_EPILOG)
-    _model_argument(run, "the model (.rscd), or a supervisor (.rsup) with its model beside it, called alike")
+    _model_argument(
+        run, "the model (.rscd), or a supervisor (.rsup): signed, or with its model beside it, called alike"
+    )
     _configuration_argument(run)
     run.add_argument("--server", metavar="HOST:PORT", help="a synthesis server that makes the supervisor of the model")
     run.add_argument("--keep", metavar="FOLDER", type=Path, help="folder for what the server made last")
@@ -104,6 +106,7 @@ def _check(arguments: argparse.Namespace) -> int:
     loaded = load(arguments.config)
     ties = tie(_model(arguments.model), loaded.configuration, loaded.document)
     check_settings(loaded.configuration, ties)
+    trusted_keys(loaded.configuration.supervisor.trusted_keys)
     sys.stdout.write(f"{arguments.config}: {len(ties.communications)} communications are tied\n")
     return OK
 
@@ -145,7 +148,8 @@ def _run(arguments: argparse.Namespace) -> int:
     loaded = load(arguments.config)
     configuration = loaded.configuration
     server = arguments.server or configuration.supervisor.server
-    supervisor = obtain(Source(arguments.model, Deployment.CONTROLLER, server, arguments.keep), tell)
+    trusted = trusted_keys(configuration.supervisor.trusted_keys)
+    supervisor = obtain(Source(arguments.model, Deployment.CONTROLLER, server, arguments.keep, trusted), tell)
     ties = tie(supervisor.model, configuration, loaded.document)
     log: EventLog = NullLog()
     if configuration.log.folder is not None:

@@ -25,6 +25,9 @@ from support.models import bundle_of
 LIMIT_S = 15.0
 """Longer than anything takes that works."""
 
+PATIENT = "{answer_limit_s: 0.3}"
+"""Options of a drive whose answers come for certain, on a machine that may be busy."""
+
 # Its supervisor always wants to move: whatever stops the wheels is not it.
 MODEL = """
 robot Runner {
@@ -259,7 +262,7 @@ class _Messages(logging.Handler):
 
 def configured(robot: SimulatedTurtleBot3, base: str, lidar: str, sections: Mapping[str, str], name: str) -> str:
     """A configuration for a simulated robot; sections in YAML by name add to it."""
-    options = sections.get("options", "{}")
+    options = sections.get("options", PATIENT)
     rest = "".join(f"{key}: {text}\n" for key, text in sections.items() if key != "options")
     return (
         f"robot: {name}\ndrive: {{driver: {base}, port: {robot.base_path}, options: {options}}}\n"
@@ -283,7 +286,7 @@ def driven(
         lidar: Its LiDAR.
         velocity: That its supervisor wants, always.
         before: What happens to the robot before the bridge starts.
-        sections: Of the configuration, in YAML; `options`: of the drive.
+        sections: Of the configuration, in YAML; `options`: of the drive (default: `PATIENT`).
     """
     text = MODEL.replace("LINEAR", str(velocity[0])).replace("ANGULAR", str(velocity[1]))
     made = make_supervisor(bundle_of(text))

@@ -150,6 +150,10 @@ class SupervisorSource(_Section, frozen=True):
         _Address | None,
         Meta(description="HOST:PORT of the synthesis server; null: none is asked."),
     ] = None
+    trusted_keys: Annotated[
+        tuple[_Text, ...],
+        Meta(description="Whose signatures are believed: public keys (`ssh-ed25519 AAAA...`), or files with them."),
+    ] = ()
 
 
 class Log(_Section, frozen=True):

@@ -1,6 +1,7 @@
 """`robosc-bridge`: run a supervisor on a robot's devices, and what is needed before that."""
 
 import argparse
+import dataclasses
 import json
 import logging
 import signal
@@ -17,13 +18,14 @@ from robosc.language import load_bundle
 from robosc.model import check
 from robosc.model.structure import Deployment, Model
 from robosc_bridge.configuration import init, load, schema, tie
-from robosc_bridge.configuration.template import DriveDriver, Robot, ScannerDriver
+from robosc_bridge.configuration.structure import TURTLEBOTS
+from robosc_bridge.configuration.template import DriveDriver, ScannerDriver
 from robosc_bridge.daemon.assembly import assemble, check_settings
 from robosc_bridge.daemon.faces import make_faces
 from robosc_bridge.daemon.keyboard import Keyboard
 from robosc_bridge.daemon.loop import Key
 from robosc_bridge.daemon.supervisors import MODEL_SUFFIX, NoSupervisorError, Source, obtain, trusted_keys
-from robosc_bridge.devices.registry import Kind, available_drivers
+from robosc_bridge.drivers import Kind, available_drivers
 from robosc_bridge.errors import BridgeError
 
 OK, FAULT, WRONG_USE = 0, 1, 2
@@ -70,7 +72,7 @@ def _parser() -> argparse.ArgumentParser:
 
     first = commands.add_parser("init", help="write a first configuration for a robot and a model", epilog=_EPILOG)
     _model_argument(first, "the model (.rscd)")
-    first.add_argument("--robot", choices=get_args(Robot), default="burger")
+    first.add_argument("--robot", choices=TURTLEBOTS, default="burger")
     first.add_argument("--drive", choices=get_args(DriveDriver), default="opencr")
     first.add_argument("--scanner", choices=get_args(ScannerDriver), default="lds02")
     first.add_argument("-o", "--output", metavar="FILE", type=Path, help="where to; standard output if it is left out")
@@ -134,7 +136,7 @@ def _schema(arguments: argparse.Namespace) -> int:
 def _drivers(arguments: argparse.Namespace) -> int:
     found = [(kind, info) for kind in Kind for info in available_drivers(kind)]
     if arguments.json:
-        items = [{"kind": str(kind), "name": info.name, "description": info.description} for kind, info in found]
+        items = [{"kind": str(kind), **dataclasses.asdict(info)} for kind, info in found]
         sys.stdout.write(json.dumps(items, indent=2) + "\n")
     else:
         for kind, info in found:

@@ -260,12 +260,12 @@ class _Messages(logging.Handler):
         self.texts.append(record.getMessage())
 
 
-def configured(robot: SimulatedTurtleBot3, base: str, lidar: str, sections: Mapping[str, str], name: str) -> str:
+def configured(robot: SimulatedTurtleBot3, base: str, lidar: str, sections: Mapping[str, str]) -> str:
     """A configuration for a simulated robot; sections in YAML by name add to it."""
-    options = sections.get("options", PATIENT)
-    rest = "".join(f"{key}: {text}\n" for key, text in sections.items() if key != "options")
+    options = sections.get("options", PATIENT if base != "mavlink-rover" else "{}")
+    rest = "".join(f"{key}: {text}\n" for key, text in {"robot": "burger", **sections}.items() if key != "options")
     return (
-        f"robot: {name}\ndrive: {{driver: {base}, port: {robot.base_path}, options: {options}}}\n"
+        f"drive: {{driver: {base}, port: {robot.base_path}, options: {options}}}\n"
         f"scanner: {{driver: {lidar}, port: {robot.scanner_path}}}\n{rest}{CHANNELS}"
     )
 
@@ -286,7 +286,7 @@ def driven(
         lidar: Its LiDAR.
         velocity: That its supervisor wants, always.
         before: What happens to the robot before the bridge starts.
-        sections: Of the configuration, in YAML; `options`: of the drive (default: `PATIENT`).
+        sections: Of the configuration, in YAML; `options`: of the drive (default: `PATIENT` where it is asked).
     """
     text = MODEL.replace("LINEAR", str(velocity[0])).replace("ANGULAR", str(velocity[1]))
     made = make_supervisor(bundle_of(text))
@@ -298,7 +298,7 @@ def driven(
         trace = Recorded(robot.base_line.device, robot)
         robot.base_line.device = trace
         before(robot)
-        configuration = parse(configured(robot, base, lidar, sections, "burger").encode(), "test.yaml").configuration
+        configuration = parse(configured(robot, base, lidar, sections).encode(), "test.yaml").configuration
         log = HangingLog()
         ties = tie(made.supervisor.model, configuration)
         machine = assemble(configuration, ties, made.supervisor, log, starts_itself=True)

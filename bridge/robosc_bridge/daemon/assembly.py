@@ -33,7 +33,8 @@ from robosc_bridge.daemon.states import Command
 from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
 from robosc_bridge.devices.interface import DriveBase, RangeScanner
 from robosc_bridge.devices.registry import make_drive_base, make_range_scanner
-from robosc_bridge.devices.robots import ROBOTS
+from robosc_bridge.devices.robots import ROBOTS, Body, Robot
+from robosc_bridge.drivers import facts_of
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.safety import SafetyLayer, SafetyLimits
 from robosc_bridge.skills import EmergencyStop, Rotate
@@ -63,10 +64,10 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
     Raises:
         AssemblyError: They do not go together.
     """
-    robot, chosen = ROBOTS[configuration.robot], configuration.safety
+    robot, chosen = _robot(configuration), configuration.safety
     if configuration.execution.period_s > LONGEST_PERIOD_S:
         raise AssemblyError(f"execution.period_s may be {LONGEST_PERIOD_S:g} at most")
-    can = robot.limits(robot.motor.velocity_limit_raw)
+    can = robot.limits if isinstance(robot, Body) else robot.limits(robot.motor.velocity_limit_raw)
     linear = chosen.linear_acceleration_m_s2
     angular = chosen.angular_acceleration_rad_s2
     try:
@@ -114,6 +115,15 @@ def check_settings(configuration: Configuration, ties: Ties, deployment: Deploym
     return settings
 
 
+def _robot(configuration: Configuration) -> Robot | Body:
+    """The robot, as its drive needs it."""
+    chosen, facts = configuration.robot, facts_of(configuration.drive.driver)
+    if isinstance(chosen, str):
+        known = ROBOTS[chosen]
+        return known if facts is not None and facts.needs_turtlebot3 else known.body
+    return Body(chosen.linear_m_s, chosen.angular_rad_s, chosen.wheel_separation_m)
+
+
 def drive_base(configuration: Configuration) -> DriveBase:
     """The drive base, not opened yet.
 
@@ -123,9 +133,7 @@ def drive_base(configuration: Configuration) -> DriveBase:
     """
     drive = configuration.drive
     try:
-        return make_drive_base(
-            drive.driver, **{"path": drive.port, "robot": ROBOTS[configuration.robot], **drive.options}
-        )
+        return make_drive_base(drive.driver, **{"path": drive.port, "robot": _robot(configuration), **drive.options})
     except (TypeError, ValueError) as error:
         raise AssemblyError(f"driver '{drive.driver}': {error}") from error
 

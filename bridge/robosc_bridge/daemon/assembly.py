@@ -12,16 +12,14 @@ from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc_bridge.configuration.channels import (
     Channel,
-    FaultChannel,
     GrpcChannel,
-    LineChannel,
-    LineLostChannel,
     channel_name,
 )
 from robosc_bridge.configuration.structure import Configuration, Scanner
 from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.device_thread import DeviceThread
 from robosc_bridge.daemon.loop import Daemon, Job
+from robosc_bridge.daemon.sight import camera_worker, needs_camera, sight_problems
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
 from robosc_bridge.devices.interface import DriveBase, RangeScanner
@@ -42,7 +40,7 @@ LONGEST_PERIOD_S = 0.9
 
 # Longer than anything that a device's thread does at once, such as calibrating a gyroscope.
 _THREAD_LIMIT_S = 10.0
-_NOT_SERVED: tuple[type[Channel], ...] = (GrpcChannel, LineChannel, LineLostChannel)
+_NOT_SERVED: tuple[type[Channel], ...] = (GrpcChannel,)
 
 
 class AssemblyError(BridgeError):
@@ -92,6 +90,9 @@ def check_settings(configuration: Configuration, ties: Ties) -> Settings:
     _require_served(configuration, ties)
     safety_limits(configuration)
     settings = ties.settings(configuration.execution)
+    problems = sight_problems(configuration.skills.line, ties, settings)
+    if problems:
+        raise AssemblyError("; ".join(problems))
     try:
         require_settings_of(settings, str(Deployment.CONTROLLER))
     except SettingsError as error:
@@ -131,15 +132,17 @@ class Machine:
         daemon: The loop, run by whoever calls `run`.
         drive: The drive base's thread.
         scanner: The LiDAR's; None: there is none.
+        camera: The camera's; None: nothing is tied to what it shows.
     """
 
     daemon: Daemon
     drive: DeviceThread
     scanner: DeviceThread | None
+    camera: DeviceThread | None = None
 
     def run(self) -> bool:
         """Start the threads, run the loop to its end, and stop them; whether all gave back their devices in time."""
-        threads = [self.drive, *([self.scanner] if self.scanner else [])]
+        threads = [thread for thread in (self.drive, self.scanner, self.camera) if thread]
         for thread in threads:
             thread.start()
         try:
@@ -164,11 +167,6 @@ def _require_served(configuration: Configuration, ties: Ties) -> None:
     remote = configuration.remote
     if configuration.safety.operator_link_timeout_s is not None:
         missing.append("'safety.operator_link_timeout_s'")
-    missing += [
-        f"'{item.name}' ('{item.identifier}') is tied to 'fault' of a camera"
-        for item, tied in ties.tied_to(FaultChannel)
-        if isinstance(tied, FaultChannel) and tied.device == "camera"
-    ]
     missing += [f"'remote.{name}'" for name in ("grpc_address", "mavlink_url") if getattr(remote, name) is not None]
     if missing:
         raise AssemblyError(f"not served by this version of the bridge: {'; '.join(missing)}")
@@ -189,7 +187,9 @@ def assemble(
     clock = SystemClock()
     limits = safety_limits(configuration)
     safety = SafetyLayer(limits)
-    job = Job(supervisor, ties, settings, configuration.scanner is not None, starts_itself)
+    job = Job(
+        supervisor, ties, settings, configuration.scanner is not None, starts_itself, needs_camera=needs_camera(ties)
+    )
     rotate = configuration.skills.rotate
     # A turn has a time limit, which goes by its speed.
     speed_rad_s = min(rotate.speed_rad_s, limits.angular_rad_s)
@@ -210,5 +210,9 @@ def assemble(
             clock.monotonic,
         )
         scanner = DeviceThread(listener, clock.monotonic)
-    daemon.connect(drive.hurry, worker.reset, lambda: drive.is_alive and (scanner is None or scanner.is_alive))
-    return Machine(daemon, drive, scanner)
+    camera = None
+    if job.needs_camera:
+        camera = DeviceThread(camera_worker(configuration.skills.line, daemon.post, clock.monotonic), clock.monotonic)
+    threads = [thread for thread in (drive, scanner, camera) if thread]
+    daemon.connect(drive.hurry, worker.reset, lambda: all(thread.is_alive for thread in threads))
+    return Machine(daemon, drive, scanner, camera)

@@ -16,7 +16,7 @@ from robosc.execution.settings import Settings
 from robosc.supervisor import Supervisor
 from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.motion import Motion
-from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice
+from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice, Sighting
 from robosc_bridge.daemon.robot import Robot
 from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.devices.interface import DriveReading, Scan, Velocity
@@ -51,6 +51,7 @@ class Job:
         ties: What its communications are tied to.
         settings: Of the executor.
         needs_scanner: Whether a LiDAR must be there before it starts.
+        needs_camera: Whether a camera must.
         starts_itself: Whether it starts as soon as the devices are there; else it stays in standby.
         stays_after_fault: Whether it waits for somebody to start it again after a fault; else it ends.
     """
@@ -61,6 +62,7 @@ class Job:
     needs_scanner: bool
     starts_itself: bool
     stays_after_fault: bool = False
+    needs_camera: bool = False
 
 
 class Daemon:
@@ -111,7 +113,12 @@ class Daemon:
         self._executor: Executor | None = None
         self._due_s = clock.monotonic()
         self._wish = Velocity()
-        self._is_up = {Device.DRIVE: False, Device.SCANNER: not job.needs_scanner}
+        self._is_up = {
+            Device.DRIVE: False,
+            Device.SCANNER: not job.needs_scanner,
+            Device.CAMERA: not job.needs_camera,
+        }
+        self._awaited: tuple[Device, ...] = ()
         self._scan: Scan | None = None
         self._has_torque = False
         self._stop_end_s = 0.0
@@ -192,6 +199,9 @@ class Daemon:
                 self._scan = item
                 if self._executor is not None:
                     self._robot.saw_scan(item, self._executor)
+            case Sighting():
+                if self._executor is not None:
+                    self._robot.saw_line(item, self._executor)
             case DeviceUp(device):
                 self._device_came(device)
             case DeviceDown():
@@ -223,7 +233,7 @@ class Daemon:
             _log.error("%s: %s", report.device, report.problem)
         if report.device is Device.SCANNER:
             self._scan = None
-        else:
+        if report.device is Device.DRIVE:
             self._has_torque = False
         if self._executor is None or not was_up:
             return
@@ -303,6 +313,8 @@ class Daemon:
         if self._failed_turn and self.state is State.RUNNING:
             self._fault(f"a turn has failed, and no message of the model tells it so: {self._failed_turn}")
         self._failed_turn = ""
+        if self.state is State.STARTING:
+            self._tell_what_is_awaited()
         match self.state:
             case State.STARTING if all(self._is_up.values()) and (self._scan or not self._job.needs_scanner):
                 self.state = State.STANDBY
@@ -319,6 +331,12 @@ class Daemon:
                 self._executor = None
                 self.state = self._after_stop
                 _log.info("%s", self.state)
+
+    def _tell_what_is_awaited(self) -> None:
+        awaited = tuple(device for device, is_up in self._is_up.items() if not is_up)
+        if awaited and awaited != self._awaited:
+            _log.info("waiting for the %s", " and the ".join(awaited))
+        self._awaited = awaited
 
     def _command(self, velocity: Velocity, now_s: float) -> None:
         self._safety.command(velocity, now_s)

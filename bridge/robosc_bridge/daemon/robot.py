@@ -16,7 +16,7 @@ from robosc_bridge.configuration import channels
 from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.motion import Motion
 from robosc_bridge.daemon.readings import battery_data, imu_data, odometry_data, scan_data, shaped
-from robosc_bridge.daemon.reports import Device
+from robosc_bridge.daemon.reports import Device, Sighting
 from robosc_bridge.devices.interface import DriveReading, Scan, Velocity
 from robosc_bridge.skills import EmergencyStop, StopEvent
 
@@ -236,6 +236,13 @@ class Robot:
         data = scan_data(scan)
         for identifier, _ in self._told((channels.ScannerChannel,)):
             executor.receive(identifier, data)
+        self.settle(executor)
+
+    def saw_line(self, sighting: Sighting, executor: Supervised) -> None:
+        """The camera shows the line, or none."""
+        correction = sighting.correction_rad_s
+        for identifier, _ in self._told((channels.LineLostChannel if correction is None else channels.LineChannel,)):
+            executor.receive(identifier, shaped(self._by_identifier[identifier], correction))
         self.settle(executor)
 
     def saw_device(self, device: Device, text: str, executor: Supervised, *, is_lost: bool) -> None:

@@ -76,6 +76,8 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
             operator_timeout_s=chosen.operator_link_timeout_s,
             battery_warn_v=chosen.battery_warning_v,
             battery_stop_v=chosen.battery_stop_v,
+            min_valid_share=chosen.min_valid_share,
+            is_stopped_when_blind=chosen.stops_when_blind,
         )
     except ValueError as error:
         raise AssemblyError(f"safety: {error}") from error
@@ -208,6 +210,7 @@ def assemble(
             configuration.safety.scan_timeout_s,
             RESTART_S,
             clock.monotonic,
+            bad_frames_share=configuration.safety.bad_frames_share,
         )
         scanner = DeviceThread(listener, clock.monotonic)
     camera = None

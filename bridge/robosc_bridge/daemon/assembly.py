@@ -1,6 +1,8 @@
 """From a configuration to a daemon with its devices' threads."""
 
+import contextlib
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import msgspec
@@ -11,14 +13,16 @@ from robosc.execution.settings import Settings, SettingsError, require_settings_
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc_bridge.configuration.channels import (
-    Channel,
     GrpcChannel,
-    channel_name,
 )
 from robosc_bridge.configuration.structure import Configuration, Scanner
 from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.device_thread import DeviceThread
-from robosc_bridge.daemon.loop import Daemon, Job
+from robosc_bridge.daemon.faces import Face, is_remote
+from robosc_bridge.daemon.feed import Feed
+from robosc_bridge.daemon.jobs import Job
+from robosc_bridge.daemon.loop import Daemon
+from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.sight import camera_worker, needs_camera, sight_problems
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
@@ -40,7 +44,7 @@ LONGEST_PERIOD_S = 0.9
 
 # Longer than anything that a device's thread does at once, such as calibrating a gyroscope.
 _THREAD_LIMIT_S = 10.0
-_NOT_SERVED: tuple[type[Channel], ...] = (GrpcChannel,)
+_FACES_NOT_SERVED = ("grpc_address", "mavlink_url")
 
 
 class AssemblyError(BridgeError):
@@ -135,23 +139,36 @@ class Machine:
         drive: The drive base's thread.
         scanner: The LiDAR's; None: there is none.
         camera: The camera's; None: nothing is tied to what it shows.
+        operations: The daemon as remote faces see it.
     """
 
     daemon: Daemon
     drive: DeviceThread
     scanner: DeviceThread | None
-    camera: DeviceThread | None = None
+    camera: DeviceThread | None
+    operations: Operations
 
-    def run(self) -> bool:
-        """Start the threads, run the loop to its end, and stop them; whether all gave back their devices in time."""
+    def run(self, faces: Sequence[Face] = ()) -> bool:
+        """Start the remote faces and the threads, run the loop to its end, and stop them.
+
+        Returns:
+            Whether all threads gave back their devices in time.
+
+        Raises:
+            BridgeError: A face cannot be started; no device was opened then.
+        """
         threads = [thread for thread in (self.drive, self.scanner, self.camera) if thread]
-        for thread in threads:
-            thread.start()
-        try:
-            self.daemon.run()
-        finally:
-            # The drive base first: whatever else hangs, the wheels stop.
-            ended = [thread.stop(_THREAD_LIMIT_S) for thread in threads]
+        with contextlib.ExitStack() as stack:
+            for face in faces:
+                stack.callback(face.stop)
+                face.start()
+            for thread in threads:
+                thread.start()
+            try:
+                self.daemon.run()
+            finally:
+                # The drive base first: whatever else hangs, the wheels stop.
+                ended = [thread.stop(_THREAD_LIMIT_S) for thread in threads]
         return all(ended)
 
     def quit(self) -> None:
@@ -161,17 +178,14 @@ class Machine:
 
 def _require_served(configuration: Configuration, ties: Ties) -> None:
     """What is asked for must be there; all that is not is listed."""
-    missing = [
-        f"'{item.name}' ('{item.identifier}') is tied to '{channel_name(kind)}'"
-        for kind in _NOT_SERVED
-        for item, _ in ties.tied_to(kind)
-    ]
-    remote = configuration.remote
-    if configuration.safety.operator_link_timeout_s is not None:
-        missing.append("'safety.operator_link_timeout_s'")
-    missing += [f"'remote.{name}'" for name in ("grpc_address", "mavlink_url") if getattr(remote, name) is not None]
+    missing = [f"'remote.{name}'" for name in _FACES_NOT_SERVED if getattr(configuration.remote, name) is not None]
     if missing:
         raise AssemblyError(f"not served by this version of the bridge: {'; '.join(missing)}")
+    needing = [f"'{item.name}' ('{item.identifier}')" for item, _ in ties.tied_to(GrpcChannel)]
+    if needing and configuration.remote.grpc_address is None:
+        raise AssemblyError(f"tied to 'grpc', which needs 'remote.grpc_address': {', '.join(needing)}")
+    if configuration.safety.operator_link_timeout_s is not None and not is_remote(configuration):
+        raise AssemblyError("'safety.operator_link_timeout_s' needs 'remote.grpc_address' or 'remote.mavlink_url'")
 
 
 def assemble(
@@ -186,11 +200,20 @@ def assemble(
     if supervisor.deployment is not Deployment.CONTROLLER:
         raise AssemblyError("the supervisor is for a supervision layer; the bridge runs controllers")
     settings = check_settings(configuration, ties)
+    if not starts_itself and not is_remote(configuration):
+        raise AssemblyError("to wait in standby, the bridge needs 'remote.grpc_address' or 'remote.mavlink_url'")
     clock = SystemClock()
     limits = safety_limits(configuration)
     safety = SafetyLayer(limits)
+    # Who can be reached can be told to start again.
     job = Job(
-        supervisor, ties, settings, configuration.scanner is not None, starts_itself, needs_camera=needs_camera(ties)
+        supervisor,
+        ties,
+        settings,
+        configuration.scanner is not None,
+        starts_itself,
+        is_remote(configuration),
+        needs_camera(ties),
     )
     rotate = configuration.skills.rotate
     # A turn has a time limit, which goes by its speed.
@@ -198,7 +221,8 @@ def assemble(
     slowest_rad_s = min(rotate.slowest_rad_s, speed_rad_s)
     rotate = msgspec.structs.replace(rotate, speed_rad_s=speed_rad_s, slowest_rad_s=slowest_rad_s)
     stop = EmergencyStop(configuration.skills.emergency_stop)
-    daemon = Daemon(job, safety, Rotate(rotate), stop, clock, log)
+    feed = Feed()
+    daemon = Daemon(job, safety, Rotate(rotate), stop, clock, log, feed)
     worker = DriveWorker(drive_base(configuration), safety, daemon.post, EXCHANGE_S, clock.monotonic)
     drive = DeviceThread(worker, clock.monotonic)
     scanner = None
@@ -218,4 +242,7 @@ def assemble(
         camera = DeviceThread(camera_worker(configuration.skills.line, daemon.post, clock.monotonic), clock.monotonic)
     threads = [thread for thread in (drive, scanner, camera) if thread]
     daemon.connect(drive.hurry, worker.reset, lambda: all(thread.is_alive for thread in threads))
-    return Machine(daemon, drive, scanner, camera)
+    operations = Operations(
+        supervisor.model, ties, feed, daemon.post, lambda: safety.operator_seen(clock.monotonic()), is_layer=False
+    )
+    return Machine(daemon, drive, scanner, camera, operations)

@@ -13,6 +13,7 @@ from robosc_bridge.simulated.floor import Track, oval, parse_track
 from robosc_bridge.simulated.lidar import LIDARS, Lds01, Lds02, Lds03, Lidar
 from robosc_bridge.simulated.line import Faults, SimulatedLine
 from robosc_bridge.simulated.opencr import OpenCr
+from robosc_bridge.simulated.recorder import Record, Recorder, Tap, read_records
 from robosc_bridge.simulated.robots import BODIES, Body
 from robosc_bridge.simulated.rover import Rover
 from robosc_bridge.simulated.servo import HardwareError, Servo
@@ -38,12 +39,15 @@ __all__ = [
     "Lidar",
     "Mount",
     "OpenCr",
+    "Record",
+    "Recorder",
     "Rover",
     "Servo",
     "ServoBus",
     "SimulatedCamera",
     "SimulatedLine",
     "SimulatedTurtleBot3",
+    "Tap",
     "Timebase",
     "Track",
     "Walls",
@@ -53,6 +57,7 @@ __all__ = [
     "oval",
     "parse_track",
     "parse_walls",
+    "read_records",
     "room",
     "wheel_servos",
 ]

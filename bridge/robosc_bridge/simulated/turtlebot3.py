@@ -13,6 +13,7 @@ from robosc_bridge.simulated.floor import Track
 from robosc_bridge.simulated.lidar import LIDARS, Lidar
 from robosc_bridge.simulated.line import Faults, SimulatedLine
 from robosc_bridge.simulated.opencr import OpenCr
+from robosc_bridge.simulated.recorder import Recorder
 from robosc_bridge.simulated.robots import BODIES
 from robosc_bridge.simulated.rover import Rover
 from robosc_bridge.simulated.servo import Servo
@@ -53,6 +54,7 @@ class SimulatedTurtleBot3:
         noise_m: Standard deviation of what the LiDAR measures.
         line: On the floor; with one, there is a camera.
         camera_link: Where the camera's socket is to be; with a place, there is a camera, also without a line.
+        recorder: Takes all bytes, as of the lines `base` and `scanner`; None: nobody does.
 
     Attributes:
         time: That all of it lives by.
@@ -90,6 +92,7 @@ class SimulatedTurtleBot3:
         noise_m: float = 0.0,
         line: Track | None = None,
         camera_link: Path | None = None,
+        recorder: Recorder | None = None,
     ) -> None:
         for kind, name, known in (("robot", robot, BODIES), ("base", base, BASES), ("LiDAR", lidar, LIDARS)):
             if name not in known:
@@ -110,10 +113,11 @@ class SimulatedTurtleBot3:
         else:
             device = self.rover = Rover(self.world)
         self.scanner: Lidar = LIDARS[lidar](self.world, seed=seed, noise_m=noise_m)
-        self.base_line = SimulatedLine(device, self.time, base_link, seed)
+        base_tap, scanner_tap = (None if recorder is None else recorder.tap(line) for line in ("base", "scanner"))
+        self.base_line = SimulatedLine(device, self.time, base_link, seed, base_tap)
         self.camera: SimulatedCamera | None = None
         try:
-            self.scanner_line = SimulatedLine(self.scanner, self.time, scanner_link, seed + 1)
+            self.scanner_line = SimulatedLine(self.scanner, self.time, scanner_link, seed + 1, scanner_tap)
             try:
                 if line is not None or camera_link is not None:
                     self.camera = SimulatedCamera(self.world, line, camera_link)

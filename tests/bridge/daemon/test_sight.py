@@ -11,7 +11,8 @@ from robosc_bridge.configuration import parse, tie
 from robosc_bridge.configuration.structure import Configuration
 from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.assembly import AssemblyError, assemble, check_settings
-from robosc_bridge.daemon.loop import Daemon, Job
+from robosc_bridge.daemon.jobs import Job
+from robosc_bridge.daemon.loop import Daemon
 from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, Sighting
 from robosc_bridge.daemon.sight import needs_camera
 from robosc_bridge.daemon.states import State
@@ -102,9 +103,9 @@ def test_it_waits_for_the_camera_and_says_so(caplog: pytest.LogCaptureFixture) -
     scene.told(DeviceUp(Device.CAMERA))
     assert [*states, scene.daemon.state] == [State.STARTING, State.RUNNING]
     assert [record.message for record in caplog.records] == [
-        "waiting for the drive and the camera",
+        "waiting: the drive base is not there",
         "the drive is there",
-        "waiting for the camera",
+        "waiting: the camera is not there",
         "camera: /dev/video0: there is no such camera",
         "the camera is there",
         "standby",

@@ -50,6 +50,7 @@ class Track:
             raise ValueError(
                 f"the line on the floor is spread over {span_m[0]:g} m by {span_m[1]:g} m: that is too far"
             )
+        self._middle = Walls((*start, *end) for start, end in pairwise(self.points))
         self._is_line = np.zeros(np.ceil(span_m / _CELL_M).astype(int) + 1, dtype=np.bool_)
         for start, end in pairwise(table):
             self._draw(start, end)
@@ -85,7 +86,7 @@ class Track:
 
     def distance_m(self, x_m: float, y_m: float) -> float:
         """From a point to the middle of the line."""
-        return Walls((*start, *end) for start, end in pairwise(self.points)).distance_m(x_m, y_m)
+        return self._middle.distance_m(x_m, y_m)
 
 
 def oval(straight_m: float = 1.0, radius_m: float = 0.5, width_m: float = WIDTH_M) -> Track:

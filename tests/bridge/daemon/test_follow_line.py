@@ -31,7 +31,8 @@ def configuration(folder: Path, robot: SimulatedTurtleBot3) -> Path:
         text=True,
         check=True,
     )
-    ports = iter((robot.base_path, robot.scanner_path))
+    # The simulator is threads of this process, on a machine that may be busy.
+    ports = iter((f"{robot.base_path}\n  options: {{answer_limit_s: 0.5}}", robot.scanner_path))
     text = re.sub(r"^  port: .*$", lambda _: f"  port: {next(ports)}", made.stdout, flags=re.MULTILINE)
     text = re.sub(r"^    camera: .*$", f"    camera: simulated:{robot.camera.path}", text, flags=re.MULTILINE)
     # A machine on which tests run is not one for robots.
@@ -76,7 +77,7 @@ class Follower:
         while not condition():
             assert self.process.poll() is None, self.log
             assert time.monotonic() < end_s, f"waited {limit_s} s in vain for {what}\n{self.log}"
-            time.sleep(0.01)
+            time.sleep(0.03)
             now = self.robot.world.pose
             self.driven_m += math.dist(self._at[:2], now[:2])
             self.aside_m = max(self.aside_m, self.track.distance_m(*now[:2]))

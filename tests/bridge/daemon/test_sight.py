@@ -173,6 +173,7 @@ def test_a_simulator_without_a_place_is_refused() -> None:
     with pytest.raises(AssemblyError, match="as simulated:PATH"):
         check_settings(*tied("skills: {line: {camera: simulated}}\n"), Deployment.CONTROLLER)
     check_settings(*tied("skills: {line: {camera: 'simulated:/tmp/x'}}\n"), Deployment.CONTROLLER)
-    check_settings(
+    without_line = tied("skills: {line: {camera: simulated}}\n", line="{channel: none}", **NONE)
+    check_settings(*without_line, Deployment.CONTROLLER)
         *tied("skills: {line: {camera: simulated}}\n", line="{channel: none}", **NONE), Deployment.CONTROLLER
     )

@@ -8,6 +8,12 @@ import grpc.aio
 from google.protobuf.message import DecodeError
 
 _MALFORMED = object()
+
+
+class MalformedError(Exception):
+    """What a stream of requests raises for one that is no message; whoever reads them lets it pass."""
+
+
 _REFUSAL = (grpc.StatusCode.INVALID_ARGUMENT, "the request is no message of this service")
 
 
@@ -54,13 +60,17 @@ def _checked(answer: Callable[[Any, Any], Awaitable[Any]]) -> Callable[[Any, Any
 
 
 def _checked_each(answer: Callable[[Any, Any], Awaitable[Any]]) -> Callable[[Any, Any], Awaitable[Any]]:
-    async def requests(given: AsyncIterator[Any], context: Any) -> AsyncIterator[Any]:
+    async def requests(given: AsyncIterator[Any]) -> AsyncIterator[Any]:
         async for request in given:
             if request is _MALFORMED:
-                await context.abort(*_REFUSAL)
+                raise MalformedError
             yield request
 
     async def checked(given: AsyncIterator[Any], context: Any) -> Any:
-        return await answer(requests(given, context), context)
+        try:
+            return await answer(requests(given), context)
+        except MalformedError:
+            # Here and not where it is read: that may be another task, which cannot end the call.
+            await context.abort(*_REFUSAL)
 
     return checked

@@ -76,10 +76,14 @@ def _path(text: str | None) -> Path | None:
 
 
 class RemoteFace:
-    """A server that listens; made by `serve`.
+    """A server in a thread of its own; `serve` makes one that listens.
+
+    Args:
+        operations: The daemon.
+        settings: Where and how it listens.
 
     Attributes:
-        address: `HOST:PORT` that it listens on.
+        address: `HOST:PORT` that it listens on; empty: it does not yet.
     """
 
     def __init__(self, operations: Operations, settings: RemoteSettings) -> None:
@@ -88,7 +92,7 @@ class RemoteFace:
         self._settings = settings
         self._failure: BaseException | None = None
         self._is_ready = threading.Event()
-        self._loop = asyncio.new_event_loop()
+        self._loop: asyncio.AbstractEventLoop | None = None
         self._end = asyncio.Event()
         self._thread = threading.Thread(target=self._run, name="remote face", daemon=True)
 
@@ -104,10 +108,11 @@ class RemoteFace:
         if self._failure is not None:
             self._thread.join(_STOP_LIMIT_S)
             raise RemoteError(f"remote: {self._failure}") from self._failure
+        _log.info("the remote face listens on %s", self.address)
 
     def stop(self) -> None:
         """End every call and give the port back; may be called again."""
-        if self._thread.is_alive():
+        if self._loop is not None and self._thread.is_alive():
             try:
                 self._loop.call_soon_threadsafe(self._end.set)
             except RuntimeError:
@@ -118,8 +123,7 @@ class RemoteFace:
 
     def _run(self) -> None:
         try:
-            with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
-                runner.run(self._serve())
+            asyncio.run(self._serve())
         except (SecurityError, ValueError, OSError) as error:
             self._failure = error
         except Exception as error:
@@ -129,6 +133,7 @@ class RemoteFace:
             self._is_ready.set()
 
     async def _serve(self) -> None:
+        self._loop = asyncio.get_running_loop()
         settings = self._settings
         security = settings.security
         guard = Guard(

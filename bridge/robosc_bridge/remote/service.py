@@ -37,8 +37,8 @@ DEFAULT_RATE_HZ, LEAST_RATE_HZ, MOST_RATE_HZ = 10.0, 0.1, 100.0
 SIGN_OF_LIFE_S = 1.0
 """A watcher hears something at least so often, also of a loop that hangs."""
 
-COMMAND_LIMIT_S = 15.0
-"""Longer than the motors may take to hold or to let go."""
+COMMAND_LIMIT_S = 20.0
+"""Longer than the motors may take to be restarted."""
 
 HELLO_LIMIT_S = 5.0
 """Time for the first message of a program."""

@@ -21,7 +21,7 @@ from robosc_api.security import Credentials, SecurityError, open_channel
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_api.v1 import bridge_pb2_grpc
 
-STOP_LIMIT_S, STATUS_LIMIT_S, COMMAND_LIMIT_S = 3.0, 5.0, 20.0
+STOP_LIMIT_S, STATUS_LIMIT_S, COMMAND_LIMIT_S = 3.0, 5.0, 25.0
 
 _OPTIONS = (
     ("grpc.max_receive_message_length", 16 * 2**20),

@@ -12,6 +12,7 @@ from robosc.execution.event_log import EventLog
 from robosc.execution.settings import Settings, SettingsError, require_settings_of
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
+from robosc_api.security import SecurityError, check_listening
 from robosc_bridge.configuration.channels import (
     Channel,
     FaultChannel,
@@ -34,6 +35,7 @@ from robosc_bridge.devices.interface import DriveBase, RangeScanner
 from robosc_bridge.devices.registry import make_drive_base, make_range_scanner
 from robosc_bridge.devices.robots import ROBOTS
 from robosc_bridge.errors import BridgeError
+from robosc_bridge.remote import settings_of
 from robosc_bridge.safety import SafetyLayer, SafetyLimits
 from robosc_bridge.skills import EmergencyStop, Rotate
 
@@ -194,6 +196,12 @@ def _require_served(configuration: Configuration, ties: Ties) -> None:
         raise AssemblyError(f"tied to 'grpc', which needs 'remote.grpc_address': {', '.join(needing)}")
     if configuration.safety.operator_link_timeout_s is not None and not is_remote(configuration):
         raise AssemblyError("'safety.operator_link_timeout_s' needs 'remote.grpc_address' or 'remote.mavlink_url'")
+    face = settings_of(configuration)
+    if face is not None:
+        try:
+            check_listening(face.address, face.security)
+        except (SecurityError, ValueError) as error:
+            raise AssemblyError(f"remote: {error}") from error
 
 
 def assemble(

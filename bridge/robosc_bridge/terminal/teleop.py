@@ -81,8 +81,10 @@ def teleop(client: BridgeClient) -> int:
 
     Raises:
         RefusedError: The bridge does not let this caller drive.
-        UnreachableError: The connection is lost; the bridge then lets the wheels stop by itself.
+        UnreachableError: There is no terminal; or the connection is lost, and the bridge stops the wheels by itself.
     """
+    if not os.isatty(sys.stdin.fileno()):
+        raise UnreachableError("keys are typed in a terminal, and there is none")
     topic = client.drive_topic()
     teller = _Teller()
     operator = client.operate(f"teleop of {os.environ.get('USER', 'somebody')}"[:100], teller.told)
@@ -160,14 +162,8 @@ class _Teller:
 
 @contextmanager
 def _raw_keys() -> Iterator[int]:
-    """The terminal's input, key by key, as long as it lasts; the number of its file.
-
-    Raises:
-        UnreachableError: There is no terminal.
-    """
+    """The terminal's input, key by key, as long as it lasts; the number of its file."""
     number = sys.stdin.fileno()
-    if not os.isatty(number):
-        raise UnreachableError("keys are typed in a terminal, and there is none")
     before = termios.tcgetattr(number)
     tty.setraw(number)
     try:

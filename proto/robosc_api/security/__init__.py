@@ -17,7 +17,7 @@ from robosc_api.security.arguments import (
 from robosc_api.security.client import Credentials, open_channel
 from robosc_api.security.errors import SecurityError
 from robosc_api.security.guard import CALLER, Guard, Rule
-from robosc_api.security.listening import ServerSecurity, add_port
+from robosc_api.security.listening import ServerSecurity, add_port, check_listening
 from robosc_api.security.tokens import Scope, TokenFile, make_token
 
 __all__ = [
@@ -33,6 +33,7 @@ __all__ = [
     "add_port",
     "add_server_arguments",
     "add_token_arguments",
+    "check_listening",
     "credentials_of",
     "is_loopback_host",
     "is_loopback_peer",

@@ -45,7 +45,28 @@ def add_port(server: Any, address: str, security: ServerSecurity) -> str:
     Raises:
         SecurityError: It may not listen there like this, a file is wrong, or the address is in use or not ours.
     """
+    check_listening(address, security)
     host, port = split(address)
+    # gRPC's parser of addresses wants IPv6 in brackets, and takes a name that is a number for something else.
+    name = joined(host, port)
+    try:
+        is_secure = security.certificate is not None
+        got = server.add_secure_port(name, _credentials(security)) if is_secure else server.add_insecure_port(name)
+    except RuntimeError:
+        got = 0
+    if got == 0:
+        raise SecurityError(f"cannot listen on {name}: the address is in use or not this machine's")
+    return joined(host, got)
+
+
+def check_listening(address: str, security: ServerSecurity) -> None:
+    """What can be known before it listens, without a look at the files.
+
+    Raises:
+        SecurityError: It may not listen there like this.
+        ValueError: The address is none.
+    """
+    host, _ = split(address)
     is_secure = security.certificate is not None
     if is_secure != (security.key is not None):
         raise SecurityError("a certificate and its key belong together: one of them is missing")
@@ -56,15 +77,6 @@ def add_port(server: Any, address: str, security: ServerSecurity) -> str:
             f"{address} can be reached from other machines, and without TLS whoever is between reads and changes "
             "everything: give a certificate and key, or say that it is to be insecure"
         )
-    # gRPC's parser of addresses wants IPv6 in brackets, and takes a name that is a number for something else.
-    name = joined(host, port)
-    try:
-        got = server.add_secure_port(name, _credentials(security)) if is_secure else server.add_insecure_port(name)
-    except RuntimeError:
-        got = 0
-    if got == 0:
-        raise SecurityError(f"cannot listen on {name}: the address is in use or not this machine's")
-    return joined(host, got)
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,6 +35,7 @@ from robosc_bridge.daemon.supervisors import (
 )
 from robosc_bridge.drivers import Kind, available_drivers
 from robosc_bridge.errors import BridgeError
+from robosc_bridge.terminal.commands import add_commands
 
 OK, FAULT, WRONG_USE = 0, 1, 2
 
@@ -94,6 +95,7 @@ def _parser() -> argparse.ArgumentParser:
     drivers = commands.add_parser("drivers", help="list the drivers of drive bases and range scanners")
     drivers.add_argument("--json", action="store_true", help="for programs")
     drivers.set_defaults(run=_drivers)
+    add_commands(commands)
     return parser
 
 

@@ -13,6 +13,7 @@ from robosc.execution.runner import DeploymentError
 from robosc.execution.settings import Settings, SettingsError, require_settings_of
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
+from robosc_api.security import SecurityError, check_listening
 from robosc_bridge.configuration.channels import (
     GrpcChannel,
 )
@@ -32,6 +33,7 @@ from robosc_bridge.devices.registry import make_drive_base, make_range_scanner
 from robosc_bridge.devices.robots import ROBOTS, Body, Robot
 from robosc_bridge.drivers import facts_of
 from robosc_bridge.errors import BridgeError
+from robosc_bridge.remote import settings_of
 from robosc_bridge.safety import SafetyLayer, SafetyLimits
 from robosc_bridge.skills import EmergencyStop, Rotate
 
@@ -46,7 +48,7 @@ LONGEST_PERIOD_S = 0.9
 
 # Longer than anything that a device's thread does at once, such as calibrating a gyroscope.
 _THREAD_LIMIT_S = 10.0
-_FACES_NOT_SERVED = ("grpc_address", "mavlink_url")
+_FACES_NOT_SERVED = ("mavlink_url",)
 
 
 class AssemblyError(BridgeError):
@@ -202,6 +204,12 @@ def _require_served(configuration: Configuration, ties: Ties) -> None:
         raise AssemblyError(f"tied to 'grpc', which needs 'remote.grpc_address': {', '.join(needing)}")
     if configuration.safety.operator_link_timeout_s is not None and not is_remote(configuration):
         raise AssemblyError("'safety.operator_link_timeout_s' needs 'remote.grpc_address' or 'remote.mavlink_url'")
+    face = settings_of(configuration)
+    if face is not None:
+        try:
+            check_listening(face.address, face.security)
+        except (SecurityError, ValueError) as error:
+            raise AssemblyError(f"remote: {error}") from error
 
 
 def assemble(

@@ -4,6 +4,7 @@ from typing import Protocol
 
 from robosc_bridge.configuration.structure import Configuration
 from robosc_bridge.daemon.operations import Operations
+from robosc_bridge.remote import RemoteFace, settings_of
 
 
 class Face(Protocol):
@@ -28,4 +29,7 @@ def is_remote(configuration: Configuration) -> bool:
 def make_faces(configuration: Configuration, operations: Operations) -> tuple[Face, ...]:
     """The remote faces that are configured, not started yet."""
     faces: list[Face] = []
+    remote = settings_of(configuration)
+    if remote is not None:
+        faces.append(RemoteFace(operations, remote))
     return tuple(faces)

@@ -175,5 +175,3 @@ def test_a_simulator_without_a_place_is_refused() -> None:
     check_settings(*tied("skills: {line: {camera: 'simulated:/tmp/x'}}\n"), Deployment.CONTROLLER)
     without_line = tied("skills: {line: {camera: simulated}}\n", line="{channel: none}", **NONE)
     check_settings(*without_line, Deployment.CONTROLLER)
-        *tied("skills: {line: {camera: simulated}}\n", line="{channel: none}", **NONE), Deployment.CONTROLLER
-    )

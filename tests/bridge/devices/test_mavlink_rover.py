@@ -22,7 +22,6 @@ from robosc_bridge.devices.interface import (
     Velocity,
 )
 from robosc_bridge.devices.mavlink_rover import MavlinkRover, RoverBody
-from robosc_bridge.devices.mavlink_signing import Signing
 from robosc_bridge.devices.registry import make_drive_base, make_range_scanner
 from robosc_bridge.errors import (
     DeviceError,
@@ -34,6 +33,7 @@ from robosc_bridge.errors import (
     LineMissingError,
     WrongDeviceError,
 )
+from robosc_bridge.protocol.mavlink_signing import Signing
 from robosc_bridge.simulated import BODIES, DatagramLine, Rover, SimulatedLine, Timebase, Walls, World, room
 from robosc_bridge.simulated.rover import AUTO, GUIDED, HOLD, MANUAL
 from support.wire import wait_until

@@ -26,6 +26,7 @@ from robosc_bridge.protocol.mavlink_messages import (
     command,
     entering,
     own_heartbeat,
+    vehicle_message,
     velocity_target,
 )
 
@@ -39,8 +40,8 @@ TARGET = (
 KEY = bytes(range(32))
 
 
-def _decoder() -> Decoder:
-    return Decoder(Codec(255, 190))
+def _decoder() -> Decoder[Message]:
+    return Decoder(Codec(255, 190), vehicle_message)
 
 
 def _said(make: Any) -> Any:
@@ -216,7 +217,7 @@ def test_a_signed_packet_is_longer_by_its_signature_and_counts_once() -> None:
     packet = Codec(1, 1, KEY, timestamp=1000).encode(own_heartbeat)
     assert len(packet) == 34
     assert packet[2] == 1
-    decoder = Decoder(Codec(255, 190, KEY, timestamp=1000))
+    decoder = Decoder(Codec(255, 190, KEY, timestamp=1000), vehicle_message)
     assert len(decoder.feed(packet)) == 1
     assert decoder.feed(packet) == []
     assert decoder.counts.bad_frames >= 1
@@ -224,18 +225,18 @@ def test_a_signed_packet_is_longer_by_its_signature_and_counts_once() -> None:
 
 @pytest.mark.parametrize("key", [None, bytes(32)])
 def test_what_is_not_signed_with_the_key_does_not_count(key: bytes | None) -> None:
-    decoder = Decoder(Codec(255, 190, KEY))
+    decoder = Decoder(Codec(255, 190, KEY), vehicle_message)
     assert decoder.feed(Codec(1, 1, key).encode(own_heartbeat)) == []
 
 
 def test_a_radio_has_no_key() -> None:
     status = Codec(51, 68).encode(lambda codec: codec.radio_status_encode(1, 2, 3, 4, 5, 6, 7))
-    assert len(Decoder(Codec(255, 190, KEY)).feed(status)) == 1
+    assert len(Decoder(Codec(255, 190, KEY), vehicle_message).feed(status)) == 1
 
 
 def test_a_forged_packet_from_the_future_shuts_nobody_out() -> None:
     vehicle = Codec(1, 1, KEY, timestamp=1000)
-    decoder = Decoder(Codec(255, 190, KEY, timestamp=1000))
+    decoder = Decoder(Codec(255, 190, KEY, timestamp=1000), vehicle_message)
     assert decoder.feed(Codec(1, 1, bytes(32), timestamp=2**47).encode(own_heartbeat)) == []
     assert len(decoder.feed(vehicle.encode(own_heartbeat))) == 1
     damaged = bytearray(vehicle.encode(own_heartbeat))
@@ -251,7 +252,7 @@ def test_time_goes_on_by_packets_by_the_clock_and_by_what_is_heard() -> None:
     codec.not_before(5000)
     codec.not_before(4000)
     assert codec.timestamp == 5000
-    Decoder(codec).feed(Codec(1, 1, KEY, timestamp=9000).encode(own_heartbeat))
+    Decoder(codec, vehicle_message).feed(Codec(1, 1, KEY, timestamp=9000).encode(own_heartbeat))
     assert codec.timestamp == 9000
 
 

@@ -1,6 +1,7 @@
 """The key of MAVLink signing, and its time, which must never be used twice, not even across restarts.
 
-Source: mavlink.io, "Message Signing". It says who sent a packet; it hides nothing.
+Source: mavlink.io, "Message Signing". It says who sent a packet; it hides nothing. Of this package it alone reads files
+and the clock.
 """
 
 import time

@@ -61,6 +61,24 @@ class Command(IntEnum):
     REQUEST_CAPABILITIES = 520
 
 
+class Incoming(IntEnum):
+    """Messages that a vehicle heeds, with their numbers."""
+
+    HEARTBEAT = 0
+    PING = 4
+    SET_MODE = 11
+    PARAM_REQUEST_READ = 20
+    PARAM_REQUEST_LIST = 21
+    PARAM_SET = 23
+    MISSION_REQUEST_LIST = 43
+    MANUAL_CONTROL = 69
+    COMMAND_INT = 75
+    COMMAND_LONG = 76
+    SET_POSITION_TARGET = 84
+    FILE_TRANSFER = 110
+    TIMESYNC = 111
+
+
 class Result(IntEnum):
     """How a command was answered."""
 

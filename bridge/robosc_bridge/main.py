@@ -19,6 +19,7 @@ from robosc.model.structure import Deployment, Model
 from robosc_bridge.configuration import init, load, schema, tie
 from robosc_bridge.configuration.template import DriveDriver, Robot, ScannerDriver
 from robosc_bridge.daemon.assembly import assemble, check_settings
+from robosc_bridge.daemon.faces import make_faces
 from robosc_bridge.daemon.keyboard import Keyboard
 from robosc_bridge.daemon.loop import Key
 from robosc_bridge.daemon.supervisors import MODEL_SUFFIX, NoSupervisorError, Source, obtain
@@ -54,6 +55,9 @@ def _parser() -> argparse.ArgumentParser:
     _configuration_argument(run)
     run.add_argument("--server", metavar="HOST:PORT", help="a synthesis server that makes the supervisor of the model")
     run.add_argument("--keep", metavar="FOLDER", type=Path, help="folder for what the server made last")
+    run.add_argument(
+        "--standby", action="store_true", help="wait for an operator to start it; needs a remote face (section remote)"
+    )
     run.add_argument("--verbose", action="store_true", help="tell more")
     run.set_defaults(run=_run)
 
@@ -151,13 +155,14 @@ def _run(arguments: argparse.Namespace) -> int:
     if configuration.log.folder is not None:
         log = open_event_log(configuration.log.folder, supervisor.model.name, time.time())
     try:
-        machine = assemble(configuration, ties, supervisor, log, starts_itself=True)
+        machine = assemble(configuration, ties, supervisor, log, starts_itself=not arguments.standby)
+        faces = make_faces(configuration, machine.operations)
         for number in _SIGNALS:
             signal.signal(number, lambda *_: machine.quit())
         with Keyboard(lambda key: machine.daemon.post(Key(key))) as keyboard:
             if not keyboard.is_there:
                 tell("there is no terminal: no key stops the robot")
-            have_ended = machine.run()
+            have_ended = machine.run(faces)
     finally:
         log.close()
     return OK if have_ended and not machine.daemon.problem else FAULT

@@ -35,13 +35,11 @@ _MAXIMUM_DEPTH = 20
 
 
 class EventLog(Protocol):
-    """Where entries go. None of its methods raises or waits, but for `close`.
+    """Where entries go. None of its methods raises or waits, but for `close`."""
 
-    Attributes:
-        is_active: Whether entries are kept at all; if not, nobody needs to make them.
-    """
-
-    is_active: bool
+    @property
+    def is_active(self) -> bool:
+        """Whether entries are kept at all now; if not, nobody needs to make them."""
 
     @property
     def dropped(self) -> int:

@@ -35,7 +35,6 @@ class Recorder:
         log: Where entries go.
 
     Attributes:
-        is_active: Whether the log keeps anything.
         began_s: Reading of the clock when the handling of what came last began: decision times count from here.
     """
 
@@ -46,7 +45,6 @@ class Recorder:
         "_system",
         "began_s",
         "faults",
-        "is_active",
         "unexpected_count",
         "unknown_count",
     )
@@ -55,12 +53,16 @@ class Recorder:
         self._system = system
         self._clock = clock
         self._log = log
-        self.is_active = log.is_active
         self._lost = 0
         self.unknown_count = 0
         self.unexpected_count = 0
         self.faults = 0
         self.began_s = 0.0
+
+    @property
+    def is_active(self) -> bool:
+        """Whether the log keeps anything now."""
+        return self._log.is_active
 
     def counters(self) -> Counters:
         """The counters now."""

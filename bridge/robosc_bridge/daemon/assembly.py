@@ -1,6 +1,8 @@
 """From a configuration to a daemon with its devices' threads."""
 
+import contextlib
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import msgspec
@@ -21,7 +23,11 @@ from robosc_bridge.configuration.channels import (
 from robosc_bridge.configuration.structure import Configuration, Scanner
 from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.device_thread import DeviceThread
-from robosc_bridge.daemon.loop import Daemon, Job
+from robosc_bridge.daemon.faces import Face, is_remote
+from robosc_bridge.daemon.feed import Feed
+from robosc_bridge.daemon.jobs import Job
+from robosc_bridge.daemon.loop import Daemon
+from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
 from robosc_bridge.devices.interface import DriveBase, RangeScanner
@@ -42,7 +48,8 @@ LONGEST_PERIOD_S = 0.9
 
 # Longer than anything that a device's thread does at once, such as calibrating a gyroscope.
 _THREAD_LIMIT_S = 10.0
-_NOT_SERVED: tuple[type[Channel], ...] = (GrpcChannel, LineChannel, LineLostChannel)
+_NOT_SERVED: tuple[type[Channel], ...] = (LineChannel, LineLostChannel)
+_FACES_NOT_SERVED = ("grpc_address", "mavlink_url")
 
 
 class AssemblyError(BridgeError):
@@ -131,22 +138,35 @@ class Machine:
         daemon: The loop, run by whoever calls `run`.
         drive: The drive base's thread.
         scanner: The LiDAR's; None: there is none.
+        operations: The daemon as remote faces see it.
     """
 
     daemon: Daemon
     drive: DeviceThread
     scanner: DeviceThread | None
+    operations: Operations
 
-    def run(self) -> bool:
-        """Start the threads, run the loop to its end, and stop them; whether all gave back their devices in time."""
+    def run(self, faces: Sequence[Face] = ()) -> bool:
+        """Start the remote faces and the threads, run the loop to its end, and stop them.
+
+        Returns:
+            Whether all threads gave back their devices in time.
+
+        Raises:
+            BridgeError: A face cannot be started; no device was opened then.
+        """
         threads = [self.drive, *([self.scanner] if self.scanner else [])]
-        for thread in threads:
-            thread.start()
-        try:
-            self.daemon.run()
-        finally:
-            # The drive base first: whatever else hangs, the wheels stop.
-            ended = [thread.stop(_THREAD_LIMIT_S) for thread in threads]
+        with contextlib.ExitStack() as stack:
+            for face in faces:
+                stack.callback(face.stop)
+                face.start()
+            for thread in threads:
+                thread.start()
+            try:
+                self.daemon.run()
+            finally:
+                # The drive base first: whatever else hangs, the wheels stop.
+                ended = [thread.stop(_THREAD_LIMIT_S) for thread in threads]
         return all(ended)
 
     def quit(self) -> None:
@@ -161,17 +181,19 @@ def _require_served(configuration: Configuration, ties: Ties) -> None:
         for kind in _NOT_SERVED
         for item, _ in ties.tied_to(kind)
     ]
-    remote = configuration.remote
-    if configuration.safety.operator_link_timeout_s is not None:
-        missing.append("'safety.operator_link_timeout_s'")
     missing += [
         f"'{item.name}' ('{item.identifier}') is tied to 'fault' of a camera"
         for item, tied in ties.tied_to(FaultChannel)
         if isinstance(tied, FaultChannel) and tied.device == "camera"
     ]
-    missing += [f"'remote.{name}'" for name in ("grpc_address", "mavlink_url") if getattr(remote, name) is not None]
+    missing += [f"'remote.{name}'" for name in _FACES_NOT_SERVED if getattr(configuration.remote, name) is not None]
     if missing:
         raise AssemblyError(f"not served by this version of the bridge: {'; '.join(missing)}")
+    needing = [f"'{item.name}' ('{item.identifier}')" for item, _ in ties.tied_to(GrpcChannel)]
+    if needing and configuration.remote.grpc_address is None:
+        raise AssemblyError(f"tied to 'grpc', which needs 'remote.grpc_address': {', '.join(needing)}")
+    if configuration.safety.operator_link_timeout_s is not None and not is_remote(configuration):
+        raise AssemblyError("'safety.operator_link_timeout_s' needs 'remote.grpc_address' or 'remote.mavlink_url'")
 
 
 def assemble(
@@ -186,17 +208,21 @@ def assemble(
     if supervisor.deployment is not Deployment.CONTROLLER:
         raise AssemblyError("the supervisor is for a supervision layer; the bridge runs controllers")
     settings = check_settings(configuration, ties)
+    if not starts_itself and not is_remote(configuration):
+        raise AssemblyError("to wait in standby, the bridge needs 'remote.grpc_address' or 'remote.mavlink_url'")
     clock = SystemClock()
     limits = safety_limits(configuration)
     safety = SafetyLayer(limits)
-    job = Job(supervisor, ties, settings, configuration.scanner is not None, starts_itself)
+    # Who can be reached can be told to start again.
+    job = Job(supervisor, ties, settings, configuration.scanner is not None, starts_itself, is_remote(configuration))
     rotate = configuration.skills.rotate
     # A turn has a time limit, which goes by its speed.
     speed_rad_s = min(rotate.speed_rad_s, limits.angular_rad_s)
     slowest_rad_s = min(rotate.slowest_rad_s, speed_rad_s)
     rotate = msgspec.structs.replace(rotate, speed_rad_s=speed_rad_s, slowest_rad_s=slowest_rad_s)
     stop = EmergencyStop(configuration.skills.emergency_stop)
-    daemon = Daemon(job, safety, Rotate(rotate), stop, clock, log)
+    feed = Feed()
+    daemon = Daemon(job, safety, Rotate(rotate), stop, clock, log, feed)
     worker = DriveWorker(drive_base(configuration), safety, daemon.post, EXCHANGE_S, clock.monotonic)
     drive = DeviceThread(worker, clock.monotonic)
     scanner = None
@@ -211,4 +237,7 @@ def assemble(
         )
         scanner = DeviceThread(listener, clock.monotonic)
     daemon.connect(drive.hurry, worker.reset, lambda: drive.is_alive and (scanner is None or scanner.is_alive))
-    return Machine(daemon, drive, scanner)
+    operations = Operations(
+        supervisor.model, ties, feed, daemon.post, lambda: safety.operator_seen(clock.monotonic()), is_layer=False
+    )
+    return Machine(daemon, drive, scanner, operations)

@@ -1,24 +1,28 @@
 """The loop: executes the supervisor at its period, between what devices tell and what the safety layer lets through.
 
-One thread runs it and calls the executor; the devices' threads and signal handlers only put something into its inbox.
+One thread runs it and calls the executor; the devices' threads, remote faces and signal handlers only put something
+into its inbox. What each command of an operator does in each state stands in docs/bridge-daemon.md.
 """
 
 import logging
 import queue
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import assert_never
 
 from robosc.execution.clock import Clock
 from robosc.execution.event_log import EventLog
-from robosc.execution.executor import Executor
-from robosc.execution.interpreter import InterpretedSystem
-from robosc.execution.settings import Settings
-from robosc.supervisor import Supervisor
-from robosc_bridge.configuration.ties import Ties
+from robosc_bridge.daemon.execution import Execution
+from robosc_bridge.daemon.feed import Feed, WatchedLog
+from robosc_bridge.daemon.jobs import Job
 from robosc_bridge.daemon.motion import Motion
+from robosc_bridge.daemon.orders import HALTS, Orders, Until, answer, unanswered
+from robosc_bridge.daemon.programs import Attached, Detached, FromProgram, Refused
+from robosc_bridge.daemon.readiness import Readiness
 from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice
-from robosc_bridge.daemon.robot import Robot
-from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.daemon.robot import STOP_HELD, Robot
+from robosc_bridge.daemon.snapshots import Snapshots
+from robosc_bridge.daemon.states import Command, Order, State
 from robosc_bridge.devices.interface import DriveReading, Scan, Velocity
 from robosc_bridge.safety import LATCHING, Reason, SafetyLayer
 from robosc_bridge.skills import EmergencyStop, Rotate
@@ -28,11 +32,14 @@ _log = logging.getLogger(__name__)
 STOP_LIMIT_S = 3.0
 """How long the motors may take to let go."""
 
+RESET_LIMIT_S = 15.0
+"""How long a reset of the motors may take."""
 
 # They end by themselves, and belong to every start and stop.
 _ORDINARY = frozenset({Reason.STANDBY, Reason.TORQUE_AWAITED, Reason.COMMAND_SILENT})
 # An operator's stop is no fault; what is wrong with the supervisor is told by itself.
 _GRAVE = frozenset(LATCHING) - {Reason.OPERATOR_STOP, Reason.SUPERVISOR_FAULT}
+_OVER = "the bridge has ended"
 
 
 @dataclass(frozen=True)
@@ -42,25 +49,7 @@ class Key:
     key: str
 
 
-@dataclass(frozen=True)
-class Job:
-    """What is executed.
-
-    Attributes:
-        supervisor: Of the deployment `controller`.
-        ties: What its communications are tied to.
-        settings: Of the executor.
-        needs_scanner: Whether a LiDAR must be there before it starts.
-        starts_itself: Whether it starts as soon as the devices are there; else it stays in standby.
-        stays_after_fault: Whether it waits for somebody to start it again after a fault; else it ends.
-    """
-
-    supervisor: Supervisor
-    ties: Ties
-    settings: Settings
-    needs_scanner: bool
-    starts_itself: bool
-    stays_after_fault: bool = False
+Item = Report | Order | Key | FromProgram
 
 
 class Daemon:
@@ -73,11 +62,11 @@ class Daemon:
         emergency_stop: The operator's stop.
         clock: The only source of time.
         log: The executor's event log.
+        feed: Where everything is shown; None: nobody looks.
 
     Attributes:
         state: What it is doing.
         problem: The fault that has stopped it; empty: none.
-        overruns: How many decisions came too late by a whole period, and were left out.
     """
 
     def __init__(
@@ -88,15 +77,17 @@ class Daemon:
         emergency_stop: EmergencyStop,
         clock: Clock,
         log: EventLog,
+        feed: Feed | None = None,
     ) -> None:
         self.state = State.STARTING
         self.problem = ""
-        self.overruns = 0
         self._job = job
+        self._starts_itself = job.starts_itself
         self._safety = safety
         self._clock = clock
-        self._log = log
-        self._inbox: queue.SimpleQueue[Report | Command | Key] = queue.SimpleQueue()
+        self._feed = feed or Feed()
+        self._inbox: queue.SimpleQueue[Item] = queue.SimpleQueue()
+        self._orders = Orders()
         self._motion = Motion(rotate, self._command)
         self._robot = Robot(
             job.ties,
@@ -108,19 +99,23 @@ class Daemon:
             job.settings.service_timeout_s,
             clock.monotonic,
         )
-        self._executor: Executor | None = None
-        self._due_s = clock.monotonic()
+        self._readiness = Readiness(needs_scanner=job.needs_scanner)
+        self._execution = Execution(job, self._robot, clock, WatchedLog(log, self._feed))
+        self._snapshots = Snapshots(self._feed, self._execution, self._readiness, clock)
+        self._notice = SafetyNotice((), ())
         self._wish = Velocity()
-        self._is_up = {Device.DRIVE: False, Device.SCANNER: not job.needs_scanner}
-        self._scan: Scan | None = None
-        self._has_torque = False
-        self._stop_end_s = 0.0
+        self._stop_end_s = self._reset_end_s = 0.0
         self._after_stop = State.STANDBY
         self._hurry: Callable[[], None] = lambda: None
         self._reset_drive: Callable[[], None] = lambda: None
         self._are_alive: Callable[[], bool] = lambda: True
         self._is_drive_lost = False
         self._failed_turn = ""
+
+    @property
+    def overruns(self) -> int:
+        """How many decisions came too late by a whole period, and were left out."""
+        return self._execution.overruns
 
     def connect(
         self, hurry: Callable[[], None], reset_drive: Callable[[], None], are_alive: Callable[[], bool]
@@ -130,68 +125,82 @@ class Daemon:
         self._reset_drive = reset_drive
         self._are_alive = are_alive
 
-    def post(self, item: Report | Command | Key) -> None:
+    def post(self, item: Item | Command) -> None:
         """Tell the loop something; from any thread or signal handler, never waits."""
-        if item in (Command.STOP, Command.QUIT):
-            # These do not wait for the loop's turn.
-            self._safety.operator_stop() if item is Command.STOP else self._safety.disable()
+        if isinstance(item, Command):
+            item = Order(item, "", unanswered)
+        if isinstance(item, Order) and item.command in HALTS:
+            # These do not wait for the loop's turn, and what came before them does not undo them.
+            self._orders.halting(item)
+            self._safety.operator_stop() if item.command is Command.STOP else self._safety.disable()
             self._hurry()
         self._inbox.put(item)
+        if self.state is State.OVER:
+            self._drain()
 
     def run(self) -> None:
         """Take turns until somebody wants it to end."""
-        while self.state is not State.OVER:
-            try:
-                item = self._inbox.get(timeout=max(self._due_s - self._clock.monotonic(), 0.0))
-            except queue.Empty:
-                self.turn()
-            else:
-                self.turn(item)
+        try:
+            while self.state is not State.OVER:
+                try:
+                    item = self._inbox.get(timeout=max(self._execution.due_s - self._clock.monotonic(), 0.0))
+                except queue.Empty:
+                    self.turn()
+                else:
+                    self.turn(item)
+        finally:
+            self.state = State.OVER
+            self._close()
 
-    def turn(self, *items: Report | Command | Key) -> None:
+    def _close(self) -> None:
+        """Nothing is done any more: whoever waits for something is told so."""
+        self._drain()
+        self._orders.close(_OVER)
+
+    def _drain(self) -> None:
+        while True:
+            try:
+                item = self._inbox.get_nowait()
+            except queue.Empty:
+                break
+            if isinstance(item, Order):
+                answer(item, "" if item.command is Command.QUIT else _OVER)
+
+    def turn(self, *items: Item) -> None:
         """Handle what has come, and decide if it is time."""
         now_s = self._clock.monotonic()
         self._safety.loop_turned(now_s)
         for item in items:
             self._handle(item)
-        while True:
-            try:
-                self._handle(self._inbox.get_nowait())
-            except queue.Empty:
-                break
+        # Not what comes meanwhile: nobody can keep the loop from its turn.
+        for _ in range(self._inbox.qsize()):
+            self._handle(self._inbox.get_nowait())
         now_s = self._clock.monotonic()
-        if now_s >= self._due_s:
-            self._decide(now_s)
+        if now_s >= self._execution.due_s:
+            self._execution.decide(now_s, is_running=self.state is State.RUNNING)
         self._look_at_state(now_s)
-        if self.state is State.RUNNING and self._executor is not None:
+        executor = self._execution.executor
+        if self.state is State.RUNNING and executor is not None:
             # In a safe stop nothing moves, whatever identifiers are released.
-            self._motion.pause(bool(self._executor.reasons), now_s)
+            self._motion.pause(bool(executor.reasons), now_s)
             self._motion.refresh(now_s)
+        self._snapshots.look(self.state, self.problem, self._notice)
+        if self.state is State.OVER:
+            self._close()
 
-    def _decide(self, now_s: float) -> None:
-        if self._executor is not None:
-            self._executor.tick()
-            self._robot.settle(self._executor)
-            self._robot.report_turn(self._executor)
-        period_s = self._job.settings.period_s
-        self._due_s += period_s
-        if self._due_s <= now_s:
-            missed = int((now_s - self._due_s) / period_s) + 1
-            self.overruns += missed if self.state is State.RUNNING else 0
-            self._due_s += missed * period_s
-
-    def _handle(self, item: Report | Command | Key) -> None:
+    def _handle(self, item: Item) -> None:
+        executor = self._execution.executor
         match item:
             case DriveReading():
-                self._has_torque = item.is_torque_on
-                if self._executor is not None:
-                    self._robot.saw_drive(item, self._executor)
+                self._readiness.reading = item
+                if executor is not None:
+                    self._robot.saw_drive(item, executor)
                 else:
                     self._robot.watch_buttons(item.buttons)
             case Scan():
-                self._scan = item
-                if self._executor is not None:
-                    self._robot.saw_scan(item, self._executor)
+                self._readiness.scan = item
+                if executor is not None:
+                    self._robot.saw_scan(item, executor)
             case DeviceUp(device):
                 self._device_came(device)
             case DeviceDown():
@@ -199,41 +208,43 @@ class Daemon:
             case SafetyNotice():
                 self._heed(item)
             case ResetDone(problem):
-                _log.log(logging.ERROR if problem else logging.INFO, "reset: %s", problem or "done")
+                self._reset_done(problem)
             case Key(key):
-                if self._executor is not None:
-                    self._robot.saw_key(key, self._executor)
-            case Command():
+                self._robot.saw_key(key, executor)
+            case Order():
                 self._obey(item)
+            case Attached() | Detached():
+                pass
+            case _:
+                item.program.tell(Refused("nothing of this model is tied to programs"))
+
+    # Devices and the safety layer.
 
     def _device_came(self, device: Device) -> None:
         _log.info("the %s is there", device)
-        was_up, self._is_up[device] = self._is_up[device], True
-        if self._executor is not None and not was_up:
-            self._robot.saw_device(device, f"the {device} is back", self._executor, is_lost=False)
-        if device is Device.DRIVE and self.state is State.FAULT and self._is_drive_lost:
-            # Nothing moves before somebody says so.
-            self._is_drive_lost = False
-            self.problem = ""
-            self.state = State.STANDBY
+        is_news = self._readiness.came(device)
+        executor = self._execution.executor
+        if is_news:
+            self._snapshots.note("device", f"the {device} is there")
+        if executor is not None and is_news:
+            self._robot.saw_device(device, f"the {device} is back", executor, is_lost=False)
 
     def _device_went(self, report: DeviceDown) -> None:
-        was_up, self._is_up[report.device] = self._is_up[report.device], False
+        is_news = self._readiness.went(report.device)
         if report.is_first:
             _log.error("%s: %s", report.device, report.problem)
-        if report.device is Device.SCANNER:
-            self._scan = None
-        else:
-            self._has_torque = False
-        if self._executor is None or not was_up:
+            self._snapshots.note("device", f"{report.device}: {report.problem}")
+        executor = self._execution.executor
+        if executor is None or not is_news:
             return
-        self._robot.saw_device(report.device, report.problem, self._executor, is_lost=True)
+        self._robot.saw_device(report.device, report.problem, executor, is_lost=True)
         if report.device is Device.DRIVE:
             self._is_drive_lost = True
             self._fault(f"the drive base is lost: {report.problem}")
 
     def _heed(self, notice: SafetyNotice) -> None:
         """Tell a person why nothing moves; what only a person can end ends the run."""
+        self._notice = notice
         for warning in notice.warnings:
             _log.warning("%s", warning)
         for reason in notice.reasons:
@@ -244,52 +255,162 @@ class Daemon:
         if grave and self.state is State.RUNNING:
             self._fault(" ".join(grave))
 
-    def _obey(self, command: Command) -> None:
+    # Commands.
+
+    def _obey(self, order: Order) -> None:
+        self._orders.arrived(order)
+        command = order.command
+        text = f"{command} ({order.by})" if order.by else str(command)
+        _log.info("%s", text)
+        self._snapshots.note("order", text)
+        if self.state is State.OVER:
+            answer(order, _OVER)
+            return
         match command:
-            case Command.START if self.state is State.STANDBY:
-                self._begin()
+            case Command.START:
+                self._order_start(order)
             case Command.STOP:
-                self._robot.stop("the operator has stopped the robot", self._executor)
-            case Command.STANDBY if self.state in (State.RUNNING, State.FAULT):
-                self._end("standby", State.STANDBY)
-            case Command.QUIT if self.state is not State.STOPPING or self._after_stop is not State.OVER:
-                self._end("the bridge ends", State.OVER)
+                if self.state is State.STOPPING:
+                    # A reset that waits for the standstill would forget this stop, which came after it.
+                    self._orders.settle(Until.RESET, str(Reason.OPERATOR_STOP))
+                self._robot.stop_remotely(self._execution.executor)
+                answer(order, "")
+            case Command.STANDBY:
+                self._order_standby(order)
+            case Command.RESUME:
+                answer(order, self._robot.resume_remotely(self._execution.executor))
             case Command.RESET:
-                self._reset()
+                self._order_reset(order)
+            case Command.QUIT:
+                self._orders.wait(Until.RESTING, order)
+                if self.state is not State.STOPPING:
+                    self._end("the bridge ends", State.OVER)
+                self._after_stop = State.OVER
             case _:
-                pass  # They mean nothing in this state.
+                assert_never(command)
+
+    def _order_start(self, order: Order) -> None:
+        self._look_for_devices()
+        why = self._why_not_start()
+        if why:
+            answer(order, why)
+            return
+        if self.state is State.STANDBY:
+            self._begin()
+        # What the first steps of the supervisor lead to is known at the end of this turn.
+        self._orders.wait(Until.STARTED, order)
+
+    def _why_not_start(self) -> str:
+        if self.state is State.STARTING:
+            return f"the robot is starting: {self._readiness.missing()}"
+        if self.state is State.STOPPING:
+            return "the robot is being stopped"
+        if self.state is State.FAULT:
+            return f"the robot is in fault: {self.problem}; reset it first"
+        if self._orders.is_stop_coming:
+            return "it was told to stop meanwhile"
+        if self._orders.is_waiting(Until.RESET):
+            return "the motors are being reset"
+        latched = self._latched()
+        if latched:
+            return f"{latched} Resume or reset it first."
+        return "" if self.state is State.RUNNING else self._readiness.missing() or self._dead_thread()
+
+    def _dead_thread(self) -> str:
+        return "" if self._are_alive() else "a device's thread has ended; the bridge must be started anew"
+
+    def _latched(self) -> str:
+        """What holds until somebody says otherwise."""
+        reasons = [reason for reason in self._notice.reasons if reason in LATCHING]
+        if self._robot.is_stopped and Reason.OPERATOR_STOP not in reasons:
+            reasons.append(Reason.OPERATOR_STOP)
+        return " ".join(reasons)
+
+    def _order_standby(self, order: Order) -> None:
+        match self.state:
+            case State.STARTING:
+                self._starts_itself = False
+                answer(order, "")
+            case State.STANDBY:
+                answer(order, "")
+            case State.RUNNING:
+                self._orders.wait(Until.RESTING, order)
+                self._end("standby", State.STANDBY)
+            case State.STOPPING:
+                self._orders.wait(Until.RESTING, order)
+            case _:
+                answer(order, f"the robot is in fault: {self.problem}; reset it first")
+
+    def _order_reset(self, order: Order) -> None:
+        if self.state is State.STOPPING and not self._orders.is_waiting(Until.RESET):
+            answer(order, "the robot is being stopped")
+            return
+        self._orders.wait(Until.RESET, order)
+        if self.state is State.RUNNING:
+            # First to standby: motors that move are not reset.
+            self._end("reset", State.STANDBY)
+        elif self.state is not State.STOPPING:
+            self._reset()
 
     def _reset(self) -> None:
+        """Forget what has latched, and let the drive base reset its motors."""
+        why = "" if self._readiness.is_drive_there else "the drive base is not there"
+        why = why or (STOP_HELD if self._robot.is_stop_held else "") or self._release_safety()
+        if why:
+            _log.error("reset: %s", why)
+            self._orders.settle(Until.RESET, why)
+            return
+        self._robot.forget_stop()
+        self._reset_end_s = self._clock.monotonic() + RESET_LIMIT_S
+        self._reset_drive()
+
+    def _reset_done(self, problem: str) -> None:
+        _log.log(logging.ERROR if problem else logging.INFO, "reset: %s", problem or "done")
+        if self.state is State.FAULT and not problem and self._orders.is_waiting(Until.RESET):
+            self.state, self.problem = State.STANDBY, ""
+        self._orders.settle(Until.RESET, problem)
+
+    def _release_safety(self) -> str:
+        """Let the safety layer forget what has latched; why it does not."""
+        if self._orders.is_stop_coming:
+            return str(Reason.OPERATOR_STOP)
         remaining = self._safety.reset()
         if remaining:
-            _log.error("reset: %s", " ".join(remaining))
-            return
-        self._reset_drive()
-        if self.state in (State.RUNNING, State.FAULT):
-            self._end("reset", State.STANDBY)
+            return " ".join(remaining)
+        if self._orders.is_stop_coming:
+            # It came between the two, and may have been forgotten with the others.
+            self._safety.operator_stop()
+            return str(Reason.OPERATOR_STOP)
+        self._notice = SafetyNotice(
+            tuple(reason for reason in self._notice.reasons if reason not in LATCHING), self._notice.warnings
+        )
+        return ""
+
+    # Runs.
 
     def _begin(self) -> None:
-        job = self._job
-        self._executor = Executor(InterpretedSystem(job.supervisor), self._robot, job.settings, self._clock, self._log)
-        self._due_s = self._clock.monotonic()
+        executor = self._execution.begin()
         self.problem = ""
         self.state = State.RUNNING
         self._safety.enable()
-        self._robot.begin()
-        self._executor.start()
-        if self._scan is not None:
+        executor.start()
+        self._robot.tell_stop(executor)
+        if self._readiness.scan is not None:
             # It must not decide on nothing while the last one is at hand.
-            self._robot.saw_scan(self._scan, self._executor)
+            self._robot.saw_scan(self._readiness.scan, executor)
         _log.info("running")
 
     def _end(self, reason: str, then: State) -> None:
         """Bring the robot to rest; `then` follows once the motors have let go."""
-        if self._executor is not None:
-            self._executor.stop(reason)
+        if self._execution.executor is not None:
+            self._execution.executor.stop(reason)
         self._motion.stop(self._clock.monotonic(), reason)
         self._safety.disable()
         self._hurry()
-        self.state, self._after_stop = State.STOPPING, then
+        if self.state is not State.STOPPING or self._after_stop is not State.OVER:
+            # Who wants the bridge to end gets that, whatever fails on the way.
+            self._after_stop = then
+        self.state = State.STOPPING
         self._stop_end_s = self._clock.monotonic() + STOP_LIMIT_S
 
     def _fault(self, problem: str) -> None:
@@ -303,22 +424,46 @@ class Daemon:
         if self._failed_turn and self.state is State.RUNNING:
             self._fault(f"a turn has failed, and no message of the model tells it so: {self._failed_turn}")
         self._failed_turn = ""
+        executor = self._execution.executor
+        if self.state is State.RUNNING and executor is not None and executor.is_faulty:
+            self._safety.supervisor_fault()
+            self._fault("; ".join(executor.reasons))
+        self._orders.settle(Until.STARTED, "" if self.state is State.RUNNING else self.problem or "it was stopped")
         match self.state:
-            case State.STARTING if all(self._is_up.values()) and (self._scan or not self._job.needs_scanner):
+            case State.STARTING if self._look_for_devices() and self._starts_itself:
+                self._begin()
+            case State.STOPPING if not self._readiness.has_torque or now_s >= self._stop_end_s:
+                self._come_to_rest()
+            case State.FAULT if self._is_drive_lost and self._readiness.is_drive_there:
+                # Nothing moves before somebody says so.
+                self._is_drive_lost = False
+                self.problem = ""
                 self.state = State.STANDBY
-                _log.info("standby")
-                if self._job.starts_itself:
-                    self._begin()
-            case State.RUNNING if self._executor is not None and self._executor.is_faulty:
-                self._safety.supervisor_fault()
-                self._fault("; ".join(self._executor.reasons))
-            case State.STOPPING if not self._has_torque or not self._is_up[Device.DRIVE] or now_s >= self._stop_end_s:
-                if self._has_torque and self._is_up[Device.DRIVE]:
-                    self.problem = self.problem or f"the motors have not let go within {STOP_LIMIT_S:g} s"
-                    _log.error("%s", self.problem)
-                self._executor = None
-                self.state = self._after_stop
-                _log.info("%s", self.state)
+        if self._orders.is_waiting(Until.RESET) and self.state is not State.STOPPING and now_s >= self._reset_end_s:
+            self._orders.settle(Until.RESET, f"the motors were not reset within {RESET_LIMIT_S:g} s")
+
+    def _look_for_devices(self) -> bool:
+        """Leave the start once all devices are there; whether it does now."""
+        are_there = self.state is State.STARTING and not self._readiness.missing()
+        if are_there:
+            self.state = State.STANDBY
+            _log.info("standby")
+        return are_there
+
+    def _come_to_rest(self) -> None:
+        """What was executed is at rest, or will not come to rest."""
+        has_let_go = not self._readiness.has_torque
+        if not has_let_go:
+            self.problem = self.problem or f"the motors have not let go within {STOP_LIMIT_S:g} s"
+            _log.error("%s", self.problem)
+        self._execution.end()
+        self.state = self._after_stop
+        if self.state is State.STANDBY and not has_let_go:
+            self.state = State.FAULT
+        _log.info("%s", self.state)
+        self._orders.settle(Until.RESTING, "" if has_let_go and self.state is not State.FAULT else self.problem)
+        if self._orders.is_waiting(Until.RESET) and self.state is not State.OVER:
+            self._reset()
 
     def _command(self, velocity: Velocity, now_s: float) -> None:
         self._safety.command(velocity, now_s)
@@ -332,13 +477,19 @@ class Daemon:
         # What was wanted before does not move the robot afterwards.
         self._robot.stop("the operator has stopped the robot", None)
 
-    def _operator_resume(self) -> bool:
-        remaining = self._safety.reset()
-        if remaining:
-            _log.error("the robot cannot go on: %s", " ".join(remaining))
+    def _operator_resume(self) -> str:
+        """Let the robot go on after an operator's stop; why it cannot."""
+        if self.state in (State.STOPPING, State.OVER):
+            return "the robot is being stopped"
+        if self.state is State.FAULT:
+            return f"the robot is in fault: {self.problem}; reset it first"
+        others = [reason for reason in self._notice.reasons if reason in _GRAVE]
+        why = f"{' '.join(others)} Reset it first." if others else self._release_safety()
+        if why:
+            _log.error("the robot cannot go on: %s", why)
         elif self.state is State.RUNNING:
             self._safety.enable()
-        return not remaining
+        return why
 
     def _turn_failed(self, reason: str) -> None:
         self._failed_turn = reason or "it was ended"

@@ -25,6 +25,9 @@ _log = logging.getLogger(__name__)
 _SERVICE_SHARE = 0.9
 """How much of a call's time a turn may take."""
 
+STOP_HELD = "a button that stops the robot is pressed"
+"""Why nothing can go on."""
+
 _BUMPERS = {"front": ("bumper_1",), "back": ("bumper_2",), "any": ("bumper_1", "bumper_2")}
 
 
@@ -70,7 +73,7 @@ class Robot:
         motion: What moves the wheels.
         emergency_stop: The operator's stop.
         on_stop: Called when the operator stops the robot: the safety layer hears of it first.
-        on_resume: Called when the operator lets it go on; whether it can.
+        on_resume: Called when the operator lets it go on; why it cannot, or nothing.
         on_failed_turn: Called with the reason when a turn has failed of which the model hears nothing.
         service_timeout_s: When the executor takes a call for failed; None: never.
         clock: What the time is, in seconds.
@@ -82,7 +85,7 @@ class Robot:
         motion: Motion,
         emergency_stop: EmergencyStop,
         on_stop: Callable[[], None],
-        on_resume: Callable[[], bool],
+        on_resume: Callable[[], str],
         on_failed_turn: Callable[[str], None],
         service_timeout_s: float | None,
         clock: Callable[[], float],
@@ -226,10 +229,46 @@ class Robot:
     def watch_buttons(self, buttons: Mapping[str, bool]) -> None:
         """Heed the operator's buttons while no supervisor is executed."""
         held = [name for name, is_held in buttons.items() if is_held]
-        if self._emergency_stop.update(held_buttons=held) is StopEvent.STOP:
-            self._on_stop()
+        self._saw_stop(self._emergency_stop.update(held_buttons=held), None)
         # What was pressed meanwhile is no event for the next run, but bumpers are told at its start.
         self._buttons = {}
+
+    # The operator's side.
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether the operator has stopped the robot, and not let it go on since."""
+        return self._emergency_stop.is_stopped
+
+    def stop_remotely(self, executor: Supervised | None) -> None:
+        """The operator has stopped the robot from elsewhere."""
+        self._saw_stop(self._emergency_stop.update(remote=StopEvent.STOP), executor)
+        if executor is not None:
+            self.settle(executor)
+
+    def resume_remotely(self, executor: Supervised | None) -> str:
+        """The operator lets it go on from elsewhere; why it cannot."""
+        if not self._emergency_stop.is_stopped:
+            return "no operator has stopped the robot"
+        event = self._emergency_stop.update(remote=StopEvent.RESUME)
+        why = self._saw_stop(event, executor) if event is not None else STOP_HELD
+        if executor is not None:
+            self.settle(executor)
+        return why
+
+    def tell_stop(self, executor: Supervised) -> None:
+        """A new run has begun: a stop from before it still holds."""
+        if self._emergency_stop.is_stopped:
+            self._tell_stop(StopEvent.STOP, executor)
+
+    @property
+    def is_stop_held(self) -> bool:
+        """Whether a button that stops the robot is pressed."""
+        return self._emergency_stop.is_held
+
+    def forget_stop(self) -> None:
+        """Everything is reset."""
+        self._emergency_stop.is_stopped = False
 
     def saw_scan(self, scan: Scan, executor: Supervised) -> None:
         """A full turn of the LiDAR."""
@@ -250,9 +289,11 @@ class Robot:
             self._end_turn("the drive base is lost")
         self.settle(executor)
 
-    def saw_key(self, key: str, executor: Supervised) -> None:
+    def saw_key(self, key: str, executor: Supervised | None) -> None:
         """A key was typed in the terminal."""
         self._saw_stop(self._emergency_stop.update(keys=(key,)), executor)
+        if executor is None:
+            return
         for identifier, channel in self._told((channels.KeyChannel,)):
             if isinstance(channel, channels.KeyChannel) and channel.key == key:
                 executor.receive(identifier, None)
@@ -283,14 +324,20 @@ class Robot:
                     if not before or touched != any(before.get(name, False) for name in names):
                         executor.receive(identifier, shaped(item, touched))
 
-    def _saw_stop(self, event: StopEvent | None, executor: Supervised) -> None:
+    def _saw_stop(self, event: StopEvent | None, executor: Supervised | None) -> str:
+        """The operator did something; why it has no effect."""
         if event is StopEvent.STOP:
             self._on_stop()
-        if event is StopEvent.RESUME and not self._on_resume():
+        why = self._on_resume() if event is StopEvent.RESUME else ""
+        if why:
             self._emergency_stop.is_stopped = True
-            return
+        elif executor is not None and event is not None:
+            self._tell_stop(event, executor)
+        return why
+
+    def _tell_stop(self, event: StopEvent, executor: Supervised) -> None:
         for identifier, channel in self._told((channels.EmergencyStopChannel,)):
-            if event is not None and isinstance(channel, channels.EmergencyStopChannel) and channel.event == event:
+            if isinstance(channel, channels.EmergencyStopChannel) and channel.event == event:
                 executor.receive(identifier, None)
 
     def _told(self, kinds: tuple[type[channels.Channel], ...]) -> Iterator[tuple[str, channels.Channel]]:

@@ -12,7 +12,7 @@ from typing import Protocol
 
 from robosc_bridge.daemon.backoff import Backoff
 from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice
-from robosc_bridge.devices.interface import DriveBase, DriveReading, RangeScanner, Scan, Velocity
+from robosc_bridge.devices.interface import DriveBase, DriveReading, MotorFault, RangeScanner, Scan, Velocity
 from robosc_bridge.errors import BridgeError, DeviceSilentError
 from robosc_bridge.safety import Caution, Reason
 
@@ -118,6 +118,8 @@ class DriveWorker:
         self._silent = 0
         self._due_s = self._open_at_s = -math.inf
         self._notice = SafetyNotice((), ())
+        # Faults that a person was told of since it was opened or reset: one that comes and goes is told once.
+        self._told: frozenset[MotorFault] = frozenset()
 
     def reset(self) -> None:
         """Let the next step reboot motors that have switched themselves off; called from other threads."""
@@ -151,6 +153,7 @@ class DriveWorker:
         self._base.open()
         self._backoff.succeeded()
         self._is_open, self._has_torque = True, False
+        self._told = frozenset()
         self._silent = 0
         self._due_s = now_s
         self._report(DeviceUp(Device.DRIVE))
@@ -167,6 +170,9 @@ class DriveWorker:
             command = self._ask(self._clock())
         reading = self._base.exchange(command.velocity)
         self._silent = 0
+        if news := reading.faults - self._told:
+            _log.warning("the motors tell: %s", ", ".join(sorted(news)))
+            self._told |= news
         self._gate.saw_drive(reading)
         self._report(reading)
         # One that came early, because it was hurried, is no reason for a long pause.
@@ -186,6 +192,7 @@ class DriveWorker:
 
     def _reset(self) -> None:
         self._has_torque = False
+        self._told = frozenset()
         try:
             self._base.reset()
         except BridgeError as error:

@@ -9,6 +9,7 @@ from robosc_bridge.simulated.datagram_line import DatagramFaults, DatagramLine
 from robosc_bridge.simulated.lidar import LIDARS, Lds01, Lds02, Lds03, Lidar
 from robosc_bridge.simulated.line import Faults, SimulatedLine
 from robosc_bridge.simulated.opencr import OpenCr
+from robosc_bridge.simulated.recorder import Record, Recorder, Tap, read_records
 from robosc_bridge.simulated.robots import BODIES, Body
 from robosc_bridge.simulated.rover import Rover
 from robosc_bridge.simulated.servo import HardwareError, Servo
@@ -32,17 +33,21 @@ __all__ = [
     "Lds03",
     "Lidar",
     "OpenCr",
+    "Record",
+    "Recorder",
     "Rover",
     "Servo",
     "ServoBus",
     "SimulatedLine",
     "SimulatedTurtleBot3",
+    "Tap",
     "Timebase",
     "Walls",
     "Wheel",
     "World",
     "maze",
     "parse_walls",
+    "read_records",
     "room",
     "wheel_servos",
 ]

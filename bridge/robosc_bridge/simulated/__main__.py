@@ -15,6 +15,7 @@ from types import FrameType
 
 from robosc_bridge.simulated.commands import UnknownCommandError, obey
 from robosc_bridge.simulated.lidar import LIDARS
+from robosc_bridge.simulated.recorder import Recorder
 from robosc_bridge.simulated.robots import BODIES
 from robosc_bridge.simulated.turtlebot3 import BASES, SimulatedTurtleBot3
 from robosc_bridge.simulated.walls import Walls, maze, parse_walls, room
@@ -38,27 +39,35 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, end)
     try:
-        robot = SimulatedTurtleBot3(
-            options.robot,
-            options.base,
-            options.lidar,
-            walls=_walls(options),
-            factor=options.speed,
-            pose=options.pose,
-            base_link=options.base_link,
-            scanner_link=options.scanner_link,
-            seed=options.seed,
-            noise_m=options.noise,
-        )
+        with contextlib.ExitStack() as stack:
+            recorder = None
+            if options.record is not None:
+                recorder = Recorder(stack.enter_context(options.record.open("w", encoding="ascii")))
+            robot = stack.enter_context(_robot(options, recorder))
+            print(f"base {robot.base_path}")
+            print(f"scanner {robot.scanner_path}", flush=True)
+            threading.Thread(target=_listen, args=(robot,), name="commands", daemon=True).start()
+            ended.wait()
     except (OSError, ValueError) as error:
         print(f"the robot cannot be simulated: {error}", file=sys.stderr)
         return 1
-    with robot:
-        print(f"base {robot.base_path}")
-        print(f"scanner {robot.scanner_path}", flush=True)
-        threading.Thread(target=_listen, args=(robot,), name="commands", daemon=True).start()
-        ended.wait()
     return 0
+
+
+def _robot(options: argparse.Namespace, recorder: Recorder | None) -> SimulatedTurtleBot3:
+    return SimulatedTurtleBot3(
+        options.robot,
+        options.base,
+        options.lidar,
+        walls=_walls(options),
+        factor=options.speed,
+        pose=options.pose,
+        base_link=options.base_link,
+        scanner_link=options.scanner_link,
+        seed=options.seed,
+        noise_m=options.noise,
+        recorder=recorder,
+    )
 
 
 def _listen(robot: SimulatedTurtleBot3) -> None:
@@ -120,6 +129,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--seed", type=int, default=0, help="of the maze and of all faults that come by chance")
     parser.add_argument("--base-link", type=Path, metavar="PATH", help="where the base's port is to be")
     parser.add_argument("--scanner-link", type=Path, metavar="PATH", help="where the LiDAR's port is to be")
+    parser.add_argument(
+        "--record", type=Path, metavar="FILE", help="write all bytes on both lines into a file, with their times"
+    )
     return parser
 
 

@@ -11,6 +11,7 @@ from robosc.execution.clock import Clock
 from robosc_bridge.simulated.lidar import LIDARS, Lidar
 from robosc_bridge.simulated.line import Faults, SimulatedLine
 from robosc_bridge.simulated.opencr import OpenCr
+from robosc_bridge.simulated.recorder import Recorder
 from robosc_bridge.simulated.robots import BODIES
 from robosc_bridge.simulated.rover import Rover
 from robosc_bridge.simulated.servo import Servo
@@ -49,6 +50,7 @@ class SimulatedTurtleBot3:
         has_motors: Whether OpenCR has found its motors when it started.
         calibration_s: How long OpenCR's gyroscope is calibrated.
         noise_m: Standard deviation of what the LiDAR measures.
+        recorder: Takes all bytes, as of the lines `base` and `scanner`; None: nobody does.
 
     Attributes:
         time: That all of it lives by.
@@ -83,6 +85,7 @@ class SimulatedTurtleBot3:
         has_motors: bool = True,
         calibration_s: float = 5.0,
         noise_m: float = 0.0,
+        recorder: Recorder | None = None,
     ) -> None:
         for kind, name, known in (("robot", robot, BODIES), ("base", base, BASES), ("LiDAR", lidar, LIDARS)):
             if name not in known:
@@ -103,9 +106,10 @@ class SimulatedTurtleBot3:
         else:
             device = self.rover = Rover(self.world)
         self.scanner: Lidar = LIDARS[lidar](self.world, seed=seed, noise_m=noise_m)
-        self.base_line = SimulatedLine(device, self.time, base_link, seed)
+        base_tap, scanner_tap = (None if recorder is None else recorder.tap(line) for line in ("base", "scanner"))
+        self.base_line = SimulatedLine(device, self.time, base_link, seed, base_tap)
         try:
-            self.scanner_line = SimulatedLine(self.scanner, self.time, scanner_link, seed + 1)
+            self.scanner_line = SimulatedLine(self.scanner, self.time, scanner_link, seed + 1, scanner_tap)
         except BaseException:
             self.base_line.close()
             raise

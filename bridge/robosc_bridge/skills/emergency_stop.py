@@ -33,6 +33,11 @@ class EmergencyStop:
         # Held until shown otherwise: a button that jams before the start lets nothing go on.
         self._resuming = frozenset(settings.resume_buttons)
 
+    @property
+    def is_held(self) -> bool:
+        """Whether a button that stops is pressed."""
+        return bool(self._stopping)
+
     def update(
         self,
         held_buttons: Collection[str] | None = None,

@@ -125,6 +125,14 @@ def test_what_is_not_served_is_refused(tmp_path: Path) -> None:
     assert "is tied to 'line'" in done.stderr
 
 
+def test_standby_without_a_remote_face_is_refused(tmp_path: Path) -> None:
+    with SimulatedTurtleBot3("burger", "opencr", "lds01") as robot:
+        file = configured(tmp_path, robot, "opencr")
+        done = bridge("run", "--standby", "--model", str(MODEL), "--config", str(file))
+    assert done.returncode == 2
+    assert "to wait in standby, the bridge needs 'remote.grpc_address' or 'remote.mavlink_url'" in done.stderr
+
+
 def test_drivers_are_listed_for_people_and_programs() -> None:
     assert "opencr" in bridge("drivers").stdout
     assert '"name": "lds03"' in bridge("drivers", "--json").stdout

@@ -1,0 +1,87 @@
+"""The supervisor at work, run by run: when it decides, and what it shows."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from robosc.execution.clock import Clock
+from robosc.execution.event_log import EventLog
+from robosc.execution.executor import Executor
+from robosc.execution.interpreter import InterpretedSystem
+from robosc.execution.protocol import requesting
+from robosc_bridge.daemon.jobs import Job
+from robosc_bridge.daemon.robot import Robot
+
+
+class Execution:
+    """One executor at a time.
+
+    Args:
+        job: What is executed.
+        robot: What it makes move.
+        clock: The only source of time.
+        log: The event log.
+
+    Attributes:
+        executor: At work; None: nothing is executed.
+        due_s: When it decides next.
+        overruns: How many decisions were left out because the one before took too long.
+    """
+
+    def __init__(self, job: Job, robot: Robot, clock: Clock, log: EventLog) -> None:
+        self.executor: Executor | None = None
+        self.due_s = clock.monotonic()
+        self.overruns = 0
+        self._job = job
+        self._robot = robot
+        self._clock = clock
+        self._log = log
+        self._system: InterpretedSystem | None = None
+        # Another run is another state, whatever its system has counted.
+        self._run = 0
+        self._names: tuple[str, ...] = ()
+
+    def begin(self) -> Executor:
+        """A new run, from the initial state; `start` of its executor is still to be called."""
+        self._run += 1 << 32
+        self._system = InterpretedSystem(self._job.supervisor)
+        self._names = tuple(info.name for info in requesting(self._system.description.communications))
+        self._robot.begin()
+        self.executor = Executor(self._system, self._robot, self._job.settings, self._clock, self._log)
+        self.due_s = self._clock.monotonic()
+        return self.executor
+
+    def end(self) -> None:
+        """The run is over."""
+        self._run += 1 << 32
+        self.executor = self._system = None
+
+    def decide(self, now_s: float, *, is_running: bool) -> None:
+        """A period has passed; decisions that come too late by whole periods are left out."""
+        if self.executor is not None:
+            self.executor.tick()
+            self._robot.settle(self.executor)
+            self._robot.report_turn(self.executor)
+        period_s = self._job.settings.period_s
+        self.due_s += period_s
+        if self.due_s <= now_s:
+            missed = int((now_s - self.due_s) / period_s) + 1
+            self.overruns += missed if is_running else 0
+            self.due_s += missed * period_s
+
+    @property
+    def stops(self) -> tuple[str, ...]:
+        """Why the executor requests nothing; empty: it may, or nothing is executed."""
+        return () if self.executor is None else self.executor.reasons
+
+    @property
+    def changes(self) -> int:
+        """Another number whenever what is shown may be another."""
+        return self._run + (0 if self._system is None else self._system.changes)
+
+    def components(self) -> Mapping[str, Mapping[str, Any]]:
+        """State and variables of each component with a behaviour; empty: nothing is executed."""
+        return {} if self._system is None else self._system.state()
+
+    def enabled(self) -> tuple[str, ...]:
+        """Names of the requests that are allowed now, in the model's order."""
+        return () if self._system is None else tuple(self._names[number] for number in self._system.enabled_requests())

@@ -1,0 +1,95 @@
+"""What the loop shows: a snapshot whenever something changes that a person would want to see at once."""
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from robosc.execution.clock import Clock
+from robosc_bridge.daemon.feed import Feed, Snapshot
+from robosc_bridge.daemon.readiness import Readiness
+from robosc_bridge.daemon.reports import SafetyNotice
+from robosc_bridge.daemon.states import State
+
+INTERVAL_S = 0.05
+"""Time between snapshots that differ in measurements alone."""
+
+
+class Shown(Protocol):
+    """The supervisor at work, as it is shown."""
+
+    overruns: int
+
+    @property
+    def stops(self) -> tuple[str, ...]:
+        """Why the executor requests nothing."""
+
+    @property
+    def changes(self) -> int:
+        """Grows with each change of state."""
+
+    def components(self) -> Mapping[str, Mapping[str, Any]]:
+        """State and variables of each component."""
+
+    def enabled(self) -> tuple[str, ...]:
+        """The requests that are allowed now."""
+
+
+class Snapshots:
+    """Makes snapshots, and only those that are worth it.
+
+    Args:
+        feed: Where they are shown.
+        execution: The supervisor at work.
+        readiness: What is known of the devices.
+        clock: The time.
+    """
+
+    def __init__(self, feed: Feed, execution: Shown, readiness: Readiness, clock: Clock) -> None:
+        self._feed = feed
+        self._execution = execution
+        self._readiness = readiness
+        self._clock = clock
+        self._number = 0
+        self._changes = -1
+        self._components: Mapping[str, Mapping[str, Any]] = {}
+        self._enabled: tuple[str, ...] = ()
+        self._shown: tuple[object, ...] = ()
+        self._due_s = -1.0
+
+    def note(self, kind: str, what: str) -> None:
+        """Something of the bridge itself happened; it stands in no log file, whose readers know nothing of it."""
+        if self._feed.is_watched:
+            self._feed.tell({"time": self._clock.wall(), "kind": kind, "what": what})
+
+    def look(self, state: State, problem: str, notice: SafetyNotice) -> None:
+        """Show what is so at the end of a turn, if it is news or measurements have not been shown for a while."""
+        stops, changes = self._execution.stops, self._execution.changes
+        if changes != self._changes:
+            self._changes = changes
+            self._components = self._execution.components()
+            self._enabled = self._execution.enabled()
+        seen = (state, problem, notice, stops, self._readiness.devices, self._components)
+        now_s = self._clock.monotonic()
+        if seen == self._shown and now_s < self._due_s:
+            return
+        if not self._shown or self._shown[0] is not state:
+            self.note("state", f"{state}: {problem}" if problem else str(state))
+        self._shown = seen
+        self._due_s = now_s + INTERVAL_S
+        self._number += 1
+        self._feed.show(
+            Snapshot(
+                self._number,
+                self._clock.wall(),
+                state,
+                problem,
+                notice.reasons,
+                notice.warnings,
+                stops,
+                self._readiness.devices,
+                self._components,
+                self._enabled,
+                self._readiness.reading,
+                self._readiness.scan,
+                self._execution.overruns,
+            )
+        )

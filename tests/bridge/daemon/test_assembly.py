@@ -1,0 +1,93 @@
+"""What is refused before anything is opened, and how the parts start and stop together."""
+
+from pathlib import Path
+
+import pytest
+
+from robosc.execution.event_log import NullLog
+from robosc.supervisor import Supervisor, make_supervisor
+from robosc_bridge.configuration import parse, tie
+from robosc_bridge.daemon.assembly import AssemblyError, Machine, assemble, check_settings
+from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.errors import BridgeError
+from robosc_bridge.simulated import SimulatedTurtleBot3
+from support.daemons import CONFIGURATION, MODEL
+from support.models import bundle_of
+
+
+@pytest.fixture(scope="module")
+def supervisor() -> Supervisor:
+    made = make_supervisor(bundle_of(MODEL))
+    assert made.supervisor is not None
+    return made.supervisor
+
+
+def machine(supervisor: Supervisor, text: str, *, starts_itself: bool = True) -> Machine:
+    configuration = parse(text.encode(), "test.yaml").configuration
+    ties = tie(supervisor.model, configuration)
+    return assemble(configuration, ties, supervisor, NullLog(), starts_itself=starts_itself)
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        (
+            ("{channel: fault}", "{channel: grpc}"),
+            "tied to 'grpc', which needs 'remote.grpc_address': 'lost' ('/lost')",
+        ),
+        (
+            ("skills:", "safety: {operator_link_timeout_s: 1}\nskills:"),
+            "'safety.operator_link_timeout_s' needs 'remote.grpc_address' or 'remote.mavlink_url'",
+        ),
+        (("execution: {", "execution: {command_timeout_s: 2, "), "means nothing in the deployment 'controller'"),
+    ],
+)
+def test_what_needs_a_remote_face_is_refused_without_one(
+    change: tuple[str, str], why: str, supervisor: Supervisor
+) -> None:
+    configuration = parse(CONFIGURATION.replace(*change).encode(), "test.yaml").configuration
+    with pytest.raises(AssemblyError) as raised:
+        check_settings(configuration, tie(supervisor.model, configuration))
+    assert why in str(raised.value)
+
+
+def test_nobody_waits_in_standby_for_somebody_who_cannot_come(supervisor: Supervisor) -> None:
+    with pytest.raises(AssemblyError, match="to wait in standby, the bridge needs "):
+        machine(supervisor, CONFIGURATION, starts_itself=False)
+
+
+class RecordedFace:
+    """A remote face that notes when it is started and stopped."""
+
+    def __init__(self, made: Machine, problem: str = "") -> None:
+        self.made = made
+        self.problem = problem
+        self.told: list[str] = []
+
+    def start(self) -> None:
+        if self.problem:
+            raise BridgeError(self.problem)
+        self.told.append(f"start {self.made.drive.is_alive}")
+        self.made.operations.order(Command.QUIT, "a test")
+
+    def stop(self) -> None:
+        snapshot = self.made.operations.feed.snapshot
+        self.told.append(f"stop {self.made.drive.is_alive} {None if snapshot is None else snapshot.state}")
+
+
+def test_faces_are_started_before_the_devices_and_stopped_after_them(supervisor: Supervisor) -> None:
+    with SimulatedTurtleBot3("burger", "opencr", "lds01") as robot:
+        text = CONFIGURATION.replace("/dev/base", str(robot.base_path)).replace("/dev/scanner", str(robot.scanner_path))
+        made = machine(supervisor, text)
+        face = RecordedFace(made)
+        assert made.run([face])
+    assert face.told == ["start False", f"stop False {State.OVER}"]
+
+
+def test_a_face_that_cannot_start_opens_no_device_and_stops_the_others(supervisor: Supervisor, tmp_path: Path) -> None:
+    made = machine(supervisor, CONFIGURATION.replace("/dev/base", str(tmp_path / "none")))
+    first, second = RecordedFace(made), RecordedFace(made, "the address is in use")
+    with pytest.raises(BridgeError, match="the address is in use"):
+        made.run([first, second])
+    assert first.told == ["start False", "stop False None"]
+    assert not made.drive.is_alive

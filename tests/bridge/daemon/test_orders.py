@@ -1,0 +1,393 @@
+"""What operators order: in each state each command is done or refused with a sentence, and never left unanswered."""
+
+import threading
+from collections.abc import Callable
+
+import pytest
+
+from robosc_bridge.daemon.loop import RESET_LIMIT_S, STOP_LIMIT_S
+from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, ResetDone
+from robosc_bridge.daemon.states import Command, Order, State
+from robosc_bridge.devices.interface import STANDSTILL
+from robosc_bridge.safety import Reason
+from support.daemons import Scene
+
+DONE = ""
+
+
+class Operated(Scene):
+    """A scene with an operator who waits for answers."""
+
+    def order(self, command: Command) -> list[str]:
+        """Where the answer will stand."""
+        answers: list[str] = []
+        self.daemon.post(Order(command, "a test", answers.append))
+        return answers
+
+    def ask(self, command: Command, seconds: float) -> list[str]:
+        """What is answered within some time."""
+        answers = self.order(command)
+        self.live(seconds, 2.0)
+        return answers
+
+
+def starting() -> Operated:
+    scene = Operated(starts_itself=False, stays=True)
+    scene.daemon.post(DeviceUp(Device.DRIVE))
+    scene.live(0.1)
+    return scene
+
+
+def standby() -> Operated:
+    scene = Operated(starts_itself=False, stays=True)
+    scene.up()
+    return scene
+
+
+def running() -> Operated:
+    scene = standby()
+    scene.order(Command.START)
+    scene.live(0.5, 2.0)
+    return scene
+
+
+def stopped() -> Operated:
+    scene = running()
+    scene.order(Command.STOP)
+    scene.live(0.1, 2.0)
+    return scene
+
+
+def stopping() -> Operated:
+    scene = running()
+    scene.order(Command.STANDBY)
+    scene.daemon.turn()
+    return scene
+
+
+def ending() -> Operated:
+    scene = running()
+    scene.order(Command.QUIT)
+    scene.daemon.turn()
+    return scene
+
+
+def fault() -> Operated:
+    scene = running()
+    scene.daemon.post(DeviceDown(Device.DRIVE, "no answer", 0.25, True))
+    scene.daemon.turn()
+    return scene
+
+
+def over() -> Operated:
+    scene = ending()
+    scene.live(0.2, 2.0)
+    return scene
+
+
+MAKERS: dict[Callable[[], Operated], State] = {
+    starting: State.STARTING,
+    standby: State.STANDBY,
+    running: State.RUNNING,
+    stopped: State.RUNNING,
+    stopping: State.STOPPING,
+    ending: State.STOPPING,
+    fault: State.FAULT,
+    over: State.OVER,
+}
+FAULTY = "the robot is in fault: the drive base is lost: no answer; reset it first"
+NOT_STOPPED = "no operator has stopped the robot"
+ENDED = "the bridge has ended"
+LATCHED = "An operator has stopped the robot. Resume or reset it first."
+
+# What each command is answered in each state, and the state some time later.
+TABLE: list[tuple[Callable[[], Operated], Command, str, State]] = [
+    (starting, Command.START, "the robot is starting: the scanner is not there", State.STARTING),
+    (starting, Command.STANDBY, DONE, State.STARTING),
+    (starting, Command.STOP, DONE, State.STARTING),
+    (starting, Command.RESUME, NOT_STOPPED, State.STARTING),
+    (starting, Command.RESET, DONE, State.STARTING),
+    (starting, Command.QUIT, DONE, State.OVER),
+    (standby, Command.START, DONE, State.RUNNING),
+    (standby, Command.STANDBY, DONE, State.STANDBY),
+    (standby, Command.STOP, DONE, State.STANDBY),
+    (standby, Command.RESUME, NOT_STOPPED, State.STANDBY),
+    (standby, Command.RESET, DONE, State.STANDBY),
+    (standby, Command.QUIT, DONE, State.OVER),
+    (running, Command.START, DONE, State.RUNNING),
+    (running, Command.STANDBY, DONE, State.STANDBY),
+    (running, Command.STOP, DONE, State.RUNNING),
+    (running, Command.RESUME, NOT_STOPPED, State.RUNNING),
+    (running, Command.RESET, DONE, State.STANDBY),
+    (running, Command.QUIT, DONE, State.OVER),
+    (stopped, Command.START, LATCHED, State.RUNNING),
+    (stopped, Command.STANDBY, DONE, State.STANDBY),
+    (stopped, Command.STOP, DONE, State.RUNNING),
+    (stopped, Command.RESUME, DONE, State.RUNNING),
+    (stopped, Command.RESET, DONE, State.STANDBY),
+    (stopped, Command.QUIT, DONE, State.OVER),
+    (stopping, Command.START, "the robot is being stopped", State.STANDBY),
+    (stopping, Command.STANDBY, DONE, State.STANDBY),
+    (stopping, Command.STOP, DONE, State.STANDBY),
+    (stopping, Command.RESUME, NOT_STOPPED, State.STANDBY),
+    (stopping, Command.RESET, "the robot is being stopped", State.STANDBY),
+    (stopping, Command.QUIT, DONE, State.OVER),
+    (ending, Command.START, "the robot is being stopped", State.OVER),
+    (ending, Command.STANDBY, DONE, State.OVER),
+    (ending, Command.STOP, DONE, State.OVER),
+    (ending, Command.RESUME, NOT_STOPPED, State.OVER),
+    (ending, Command.RESET, "the robot is being stopped", State.OVER),
+    (ending, Command.QUIT, DONE, State.OVER),
+    (fault, Command.START, FAULTY, State.FAULT),
+    (fault, Command.STANDBY, FAULTY, State.FAULT),
+    (fault, Command.STOP, DONE, State.FAULT),
+    (fault, Command.RESUME, NOT_STOPPED, State.FAULT),
+    (fault, Command.RESET, "the drive base is not there", State.FAULT),
+    (fault, Command.QUIT, DONE, State.OVER),
+    (over, Command.START, ENDED, State.OVER),
+    (over, Command.STANDBY, ENDED, State.OVER),
+    (over, Command.STOP, ENDED, State.OVER),
+    (over, Command.RESUME, ENDED, State.OVER),
+    (over, Command.RESET, ENDED, State.OVER),
+    (over, Command.QUIT, DONE, State.OVER),
+]
+
+
+def test_the_table_is_complete() -> None:
+    assert {(maker, command) for maker, command, _, _ in TABLE} == {(m, c) for m in MAKERS for c in Command}
+
+
+@pytest.mark.parametrize(("make", "command", "answer", "state"), TABLE)
+def test_each_command_in_each_state(make: Callable[[], Operated], command: Command, answer: str, state: State) -> None:
+    scene = make()
+    assert scene.daemon.state is MAKERS[make]
+    answers = scene.order(command)
+    scene.live(0.3, None if make in (starting, fault) else 2.0)
+    assert (answers, scene.daemon.state) == ([answer], state)
+    if state is not State.RUNNING:
+        assert scene.out == STANDSTILL
+
+
+@pytest.mark.parametrize("command", [Command.STOP, Command.STANDBY, Command.QUIT])
+def test_what_stops_has_its_effect_before_the_loop_hears_of_it(command: Command) -> None:
+    scene = running()
+    assert scene.out != STANDSTILL
+    hurries = scene.hurries
+    scene.order(command)
+    assert scene.hurries > hurries
+    scene.exchange()
+    assert scene.out == STANDSTILL
+
+
+@pytest.mark.parametrize("command", [Command.STOP, Command.STANDBY, Command.QUIT])
+@pytest.mark.parametrize("before", [Command.START, Command.RESUME, Command.RESET])
+def test_a_stop_wins_over_what_was_ordered_before_it(command: Command, before: Command) -> None:
+    scene = standby() if before is Command.START else stopped()
+    answers = scene.order(before)
+    scene.order(command)
+    moved = []
+    for _ in range(30):
+        scene.live(0.02, 2.0)
+        moved.append(scene.out)
+    assert set(moved) == {STANDSTILL}
+    assert (len(answers), answers != [DONE]) == (1, before is not Command.RESET or command is not Command.STANDBY)
+
+
+def test_an_operators_stop_and_resume_are_told_to_the_model() -> None:
+    scene = running()
+    scene.order(Command.STOP)
+    scene.live(0.1, 2.0)
+    assert (scene.component("Eyes")["state"], scene.out) == ("stopped", STANDSTILL)
+    scene.order(Command.RESUME)
+    scene.live(0.5, 2.0)
+    assert (scene.component("Eyes")["state"], scene.out.linear_m_s) == ("calm", 0.1)
+
+
+def test_a_stop_from_before_the_start_forbids_it_until_somebody_resumes() -> None:
+    scene = standby()
+    scene.order(Command.STOP)
+    scene.live(0.1, 2.0)
+    assert scene.ask(Command.START, 0.1) == [LATCHED]
+    assert scene.ask(Command.RESUME, 0.1) == [DONE]
+    assert scene.ask(Command.START, 1.0) == [DONE]
+    assert scene.out.linear_m_s == 0.1
+
+
+def test_a_robot_that_starts_itself_begins_stopped_and_the_model_knows() -> None:
+    scene = Operated()
+    scene.order(Command.STOP)
+    scene.up()
+    assert (scene.daemon.state, scene.out) == (State.RUNNING, STANDSTILL)
+    assert scene.component("Eyes")["state"] == "stopped"
+    assert scene.ask(Command.RESUME, 0.5) == [DONE]
+    assert scene.out.linear_m_s == 0.1
+
+
+def test_nothing_goes_on_while_a_stop_button_is_pressed() -> None:
+    scene = running()
+    scene.buttons["button_1"] = True
+    scene.live(0.1, 2.0)
+    held = "a button that stops the robot is pressed"
+    assert scene.ask(Command.RESUME, 0.1) == [held]
+    assert scene.ask(Command.RESET, 0.3) == [held]
+    assert scene.out == STANDSTILL
+    scene.buttons["button_1"] = False
+    scene.live(0.1, 2.0)
+    assert scene.ask(Command.RESET, 0.1) == [DONE]
+
+
+def test_keys_and_buttons_stop_and_let_go_on_in_standby_too() -> None:
+    scene = standby()
+    scene.buttons["button_1"] = True
+    scene.live(0.1, 2.0)
+    scene.buttons["button_1"] = False
+    scene.live(0.1, 2.0)
+    assert scene.ask(Command.START, 0.1) == [LATCHED]
+    scene.buttons["button_2"] = True
+    scene.live(0.1, 2.0)
+    assert scene.ask(Command.START, 1.0) == [DONE]
+    assert scene.out.linear_m_s == 0.1
+
+
+def test_a_resume_before_the_stop_was_put_out_is_refused() -> None:
+    scene = running()
+    scene.order(Command.STOP)
+    answers = scene.order(Command.RESUME)
+    scene.daemon.turn()
+    assert answers == [str(Reason.OPERATOR_STOP)]
+    scene.live(0.1, 2.0)
+    assert scene.out == STANDSTILL
+
+
+def test_a_lost_drive_that_is_back_leaves_the_fault_and_can_be_started() -> None:
+    scene = fault()
+    scene.daemon.post(DeviceUp(Device.DRIVE))
+    scene.live(0.2, 2.0)
+    assert (scene.daemon.state, scene.daemon.problem) == (State.STANDBY, "")
+    assert scene.ask(Command.START, 1.0) == [DONE]
+    assert scene.out.linear_m_s == 0.1
+
+
+def test_a_drive_that_is_lost_and_back_within_a_turn_is_no_lasting_fault() -> None:
+    scene = running()
+    scene.daemon.post(DeviceDown(Device.DRIVE, "no answer", 0.25, True))
+    scene.daemon.post(DeviceUp(Device.DRIVE))
+    scene.live(0.5, 2.0)
+    assert (scene.daemon.state, scene.out) == (State.STANDBY, STANDSTILL)
+
+
+@pytest.mark.parametrize("device", [Device.DRIVE, Device.SCANNER])
+def test_nothing_starts_without_a_device(device: Device) -> None:
+    scene = standby()
+    scene.daemon.post(DeviceDown(device, "gone", 0.25, True))
+    answers = scene.order(Command.START)
+    scene.daemon.turn()
+    name = "drive base" if device is Device.DRIVE else "scanner"
+    assert answers == [f"the {name} is not there"]
+    assert scene.daemon.state is State.STANDBY
+
+
+def supervisor_fault() -> Operated:
+    scene = running()
+    executor = scene.daemon._execution.executor
+    assert executor is not None
+    executor.stop("broken", is_fault=True)
+    scene.live(0.3, 2.0)
+    assert scene.daemon.state is State.FAULT
+    return scene
+
+
+def test_a_fault_is_left_by_a_reset_that_is_done_and_not_before() -> None:
+    scene = supervisor_fault()
+    scene.answers_reset = False
+    answers = scene.order(Command.RESET)
+    scene.live(0.2, 2.0)
+    assert (answers, scene.daemon.state) == ([], State.FAULT)
+    start = scene.order(Command.START)
+    scene.live(0.1, 2.0)
+    assert start[0].startswith("the robot is in fault: ")
+    scene.daemon.post(ResetDone())
+    scene.live(0.1, 2.0)
+    assert (answers, scene.daemon.state, scene.daemon.problem) == ([DONE], State.STANDBY, "")
+    assert scene.ask(Command.START, 1.0) == [DONE]
+    assert scene.out.linear_m_s == 0.1
+
+
+@pytest.mark.parametrize("problem", ["the motor is hot", None])
+def test_a_reset_that_fails_or_never_ends_is_answered_and_the_fault_stays(problem: str | None) -> None:
+    scene = supervisor_fault()
+    scene.answers_reset = False
+    answers = scene.order(Command.RESET)
+    scene.live(0.2, 2.0)
+    if problem is not None:
+        scene.daemon.post(ResetDone(problem))
+    else:
+        scene.clock.advance(RESET_LIMIT_S)
+    scene.live(0.2, 2.0)
+    assert answers == [problem or f"the motors were not reset within {RESET_LIMIT_S:g} s"]
+    assert scene.daemon.state is State.FAULT
+
+
+def test_motors_that_do_not_let_go_are_a_fault_that_the_order_is_told() -> None:
+    scene = running()
+    answers = scene.order(Command.STANDBY)
+    scene.daemon.turn()
+    scene.clock.advance(STOP_LIMIT_S)
+    scene.daemon.turn()
+    assert answers == [f"the motors have not let go within {STOP_LIMIT_S:g} s"]
+    assert scene.daemon.state is State.FAULT
+
+
+def test_an_end_that_is_ordered_comes_though_the_drive_is_lost_on_the_way() -> None:
+    scene = ending()
+    scene.daemon.post(DeviceDown(Device.DRIVE, "no answer", 0.25, True))
+    scene.daemon.turn()
+    assert scene.daemon.state is State.OVER
+
+
+def test_who_wants_standby_before_the_start_gets_it() -> None:
+    scene = Operated()
+    scene.order(Command.STANDBY)
+    scene.up()
+    assert (scene.daemon.state, scene.torque) == (State.STANDBY, False)
+
+
+def test_all_that_waits_is_answered_at_the_end_and_after_it() -> None:
+    scene = supervisor_fault()
+    scene.answers_reset = False
+    waiting = scene.order(Command.RESET)
+    scene.live(0.1)
+    end, late = scene.order(Command.QUIT), scene.order(Command.START)
+    scene.live(0.1)
+    assert scene.daemon.state is State.OVER
+    assert (waiting, end, late) == ([ENDED], [DONE], ["the robot is being stopped"])
+    assert scene.order(Command.START) == [ENDED]
+
+
+def test_an_answer_that_raises_harms_nobody() -> None:
+    scene = running()
+
+    def hostile(why: str) -> None:
+        raise ValueError(why)
+
+    scene.daemon.post(Order(Command.START, "a test", hostile))
+    scene.live(0.1, 2.0)
+    assert scene.daemon.state is State.RUNNING
+
+
+def test_orders_from_many_threads_while_the_loop_ends_are_all_answered() -> None:
+    scene = running()
+    found: list[list[str]] = []
+
+    def ask() -> None:
+        found.extend(scene.order(Command.START) for _ in range(200))
+
+    threads = [threading.Thread(target=ask) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    scene.order(Command.QUIT)
+    while scene.daemon.state is not State.OVER:
+        scene.live(0.02, 2.0)
+    for thread in threads:
+        thread.join()
+    assert [len(answers) for answers in found] == [1] * 800

@@ -30,10 +30,11 @@ from robosc_bridge.daemon.loop import Daemon
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
-from robosc_bridge.devices.interface import DriveBase, RangeScanner
+from robosc_bridge.devices.interface import DriveBase, RangeScanner, Velocity
 from robosc_bridge.devices.registry import make_drive_base, make_range_scanner
 from robosc_bridge.devices.robots import ROBOTS
 from robosc_bridge.errors import BridgeError
+from robosc_bridge.ground import ground_settings
 from robosc_bridge.safety import SafetyLayer, SafetyLimits
 from robosc_bridge.skills import EmergencyStop, Rotate
 
@@ -49,7 +50,7 @@ LONGEST_PERIOD_S = 0.9
 # Longer than anything that a device's thread does at once, such as calibrating a gyroscope.
 _THREAD_LIMIT_S = 10.0
 _NOT_SERVED: tuple[type[Channel], ...] = (LineChannel, LineLostChannel)
-_FACES_NOT_SERVED = ("grpc_address", "mavlink_url")
+_FACES_NOT_SERVED = ("grpc_address",)
 
 
 class AssemblyError(BridgeError):
@@ -95,9 +96,11 @@ def check_settings(configuration: Configuration, ties: Ties) -> Settings:
 
     Raises:
         AssemblyError: Something does not fit; says what.
+        GroundSettingsError: The ground station cannot be reached as it is said.
     """
     _require_served(configuration, ties)
-    safety_limits(configuration)
+    limits = safety_limits(configuration)
+    ground_settings(configuration, Velocity(limits.linear_m_s, limits.angular_rad_s))
     settings = ties.settings(configuration.execution)
     try:
         require_settings_of(settings, str(Deployment.CONTROLLER))

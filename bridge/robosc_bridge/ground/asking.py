@@ -175,10 +175,6 @@ class Asking:
 
     def _result(self, pending: _Pending) -> Result:
         why = pending.answer.result()
-        snapshot = self._stream.snapshot
-        if pending.wish is Wish.RESUME and why and snapshot is not None and not is_held(snapshot):
-            # Somebody else was faster.
-            why = ""
         if not why:
             return Result.ACCEPTED
         self._say(Severity.WARNING, f"{_NOT_DONE[pending.wish]}: {why}")
@@ -218,7 +214,7 @@ class Asking:
 
 _NOT_DONE = {
     Wish.START: "Not armed",
-    Wish.RESUME: "Still stopped",
+    Wish.RESUME: "Not resumed",
     Wish.RESET: "Not reset",
 }
 

@@ -69,15 +69,14 @@ class GroundLink:
         """Begin; whether the station is there is nobody's concern."""
         self._thread.start()
 
-    def stop(self) -> bool:
-        """End; whether it did so in time. May be called again, and before `start`."""
+    def stop(self) -> None:
+        """End, with a last heartbeat; may be called again, and before `start`."""
         self._over.set()
         with self._guard:
             if self._line is not None:
                 self._line.wake()
         if self._thread.ident is not None:
             self._thread.join(_JOIN_S)
-        return not self._thread.is_alive()
 
     def _run(self) -> None:
         while not self._over.is_set():

@@ -363,8 +363,8 @@ def test_going_on_right_after_a_stop_is_ordered_though_it_does_not_show_yet(talk
     assert talk.results(193, 0.0) == [0]
     assert talk.results(193, 1.0) == []
     assert talk.daemon.commands == [Command.STOP, Command.RESUME]
-    talk.daemon.orders[1].answer("no operator has stopped the robot")
-    assert [ack.result for ack in of_type("COMMAND_ACK", talk.say())] == [0]
+    talk.daemon.orders[1].answer("the stop has not reached the motors yet")
+    assert [ack.result for ack in of_type("COMMAND_ACK", talk.say())] == [1]
 
 
 def test_a_stop_that_must_hold_is_told(talk: Talk) -> None:
@@ -373,7 +373,7 @@ def test_a_stop_that_must_hold_is_told(talk: Talk) -> None:
     talk.say()
     found = talk.ask(193, 1.0)
     assert [ack.result for ack in of_type("COMMAND_ACK", found)] == [1]
-    assert "Still stopped: the stop button is held" in joined_texts(found)
+    assert "Not resumed: the stop button is held" in joined_texts(found)
 
 
 def test_the_old_message_for_modes(talk: Talk) -> None:

@@ -34,6 +34,8 @@ def happened(before: Snapshot | None, after: Snapshot) -> Iterator[Notice]:
             yield Severity.NOTICE, f"The {device} is there"
     if Reason.OPERATOR_STOP in before.reasons and Reason.OPERATOR_STOP not in after.reasons:
         yield Severity.NOTICE, "The operator's stop is over"
+    if before.stops and not after.stops and before.state is after.state is State.RUNNING:
+        yield Severity.NOTICE, "It goes on"
 
 
 def standing(snapshot: Snapshot) -> Iterator[Notice]:
@@ -48,8 +50,10 @@ def standing(snapshot: Snapshot) -> Iterator[Notice]:
             yield Severity.WARNING if is_chosen else Severity.CRITICAL, str(reason)
         elif is_running and reason not in ORDINARY:
             yield Severity.WARNING, str(reason)
-    for stop in snapshot.stops:
-        yield Severity.WARNING, stop
+    if is_running:
+        # At the end of a run, what ends it is no news.
+        for stop in snapshot.stops:
+            yield Severity.WARNING, f"Stopped: {stop}"
     for warning in snapshot.warnings:
         yield Severity.WARNING, str(warning)
     for device, works in snapshot.devices.items():
@@ -64,8 +68,4 @@ def written(entry: Entry) -> Notice | None:
             return Severity.WARNING, f"Held back: {identifier}: {why}"
         case {"kind": "fault", "what": what}:
             return Severity.ERROR, f"Fault: {what}"
-        case {"kind": "stop", "what": what}:
-            return Severity.WARNING, f"Stopped: {what}"
-        case {"kind": "resume", "what": what}:
-            return Severity.NOTICE, f"Goes on: {what}"
     return None

@@ -22,6 +22,8 @@ type Make = Callable[[Any], Any]
 
 _GENERIC = 0  # Autopilot.
 _MOTORS, _BATTERY, _PROXIMITY = 0x8000, 0x2000000, 0x4000000
+# There is none; MAVProxy takes one that is not healthy for broken, whether it is there or not.
+_FENCE = 0x100000
 _ALL_BATTERIES, _LITHIUM_POLYMER = 1, 1
 _NO_TEMPERATURE = 32767
 _OK, _LOW, _CRITICAL = 1, 2, 3
@@ -66,7 +68,7 @@ def sys_status(snapshot: Snapshot, bad_packets: int) -> Make:
         health |= 0 if Reason.BATTERY_LOW in snapshot.reasons else _BATTERY
     overruns = min(snapshot.overruns, UNKNOWN)
     return lambda codec: codec.sys_status_encode(
-        present, present, health & present, 0, _millivolts(reading), -1, _percent(reading), 0,
+        present, present, health & present | _FENCE, 0, _millivolts(reading), -1, _percent(reading), 0,
         min(bad_packets, UNKNOWN), overruns, 0, 0, 0,
     )  # fmt: skip
 

@@ -16,6 +16,7 @@ _UNKNOWN_CM = 65535
 _EIGHTHS = 8
 _EIGHTH_DEG = 45.0
 _TINY_DEG = 1e-6
+_FAR_M = 1e6
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,13 +101,15 @@ def ring_distances_cm(ranges_m: Sequence[float], least_cm: int, most_cm: int) ->
         was measured, which need not mean that nothing is there.
     """
     half = RING_STEP_DEG // 2
+    # Nothing was measured: farther than all that was, also than what is infinitely far.
+    clear = [range_m if 0.0 < range_m < _FAR_M else _FAR_M if range_m >= _FAR_M else math.inf for range_m in ranges_m]
+    clear = clear[-half:] + clear[: BINS - half]
     found = []
-    for entry in range(RING):
-        bins = (ranges_m[(-entry * RING_STEP_DEG + k) % BINS] for k in range(-half, half + 1))
-        nearest_m = min((range_m for range_m in bins if range_m > 0.0), default=math.nan)
-        if math.isnan(nearest_m):
+    for first in range(0, BINS, RING_STEP_DEG):
+        nearest_m = min(clear[first : first + RING_STEP_DEG])
+        if nearest_m == math.inf:
             found.append(_UNKNOWN_CM)
         else:
-            # An infinite range is beyond, too. The smallest part of a millimetre keeps 0.29 m at 29 cm.
+            # The smallest part of a millimetre keeps 0.29 m at 29 cm.
             found.append(max(int(min(nearest_m * 100 + 1e-6, most_cm + 1)), least_cm))
-    return tuple(found)
+    return (found[0], *reversed(found[1:]))

@@ -221,6 +221,19 @@ def test_what_happens_is_told_in_words(talk: Talk) -> None:
     assert joined_texts(talk.live(2.0)) == ["a motor is hot", "A motor tells of a fault."]
 
 
+def test_a_safe_stop_is_told_and_its_end_and_no_ordinary_end(talk: Talk) -> None:
+    talk.daemon.show(state=State.RUNNING)
+    talk.live(0.2)
+    talk.daemon.show(stops=("/scan is stale",))
+    assert joined_texts(talk.live(0.2)) == ["Stopped: /scan is stale"]
+    talk.daemon.show(stops=())
+    assert joined_texts(talk.live(0.2)) == ["It goes on"]
+    talk.daemon.show(state=State.STOPPING, stops=("standby",))
+    assert joined_texts(talk.live(0.2)) == ["Stopping"]
+    talk.daemon.write(kind="fault", what="division by zero")
+    assert joined_texts(talk.live(0.2)) == ["Fault: division by zero"]
+
+
 def test_a_station_that_comes_later_is_told_what_holds(talk: Talk) -> None:
     talk.daemon.show(state=State.FAULT, problem="a motor is hot")
     assert "a motor is hot" in joined_texts(talk.live(1.0))

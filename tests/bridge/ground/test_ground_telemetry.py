@@ -138,7 +138,7 @@ def test_the_battery() -> None:
 )
 def test_the_health_of_the_devices(values: dict[str, Any], health: int) -> None:
     told = _told(telemetry.sys_status(replace(STANDBY, **values), 0))
-    assert told.onboard_control_sensors_health == health
+    assert told.onboard_control_sensors_health == health | dialect.MAV_SYS_STATUS_GEOFENCE
     assert told.onboard_control_sensors_present == told.onboard_control_sensors_enabled
     assert told.onboard_control_sensors_present & health == health
     assert told.onboard_control_sensors_present & 0x4008000 == 0x4008000

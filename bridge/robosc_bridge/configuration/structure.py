@@ -185,6 +185,18 @@ class Remote(_Section, frozen=True):
         _Text | None,
         Meta(description="Where the ground station is, such as udpout:192.168.1.2:14550; null: none."),
     ] = None
+    mavlink_system: Annotated[int, Meta(ge=1, le=255, description="Number of the vehicle.")] = 1
+    mavlink_key: Annotated[
+        _Text | None,
+        Meta(description="File with the key of signing: then only what is signed is obeyed; null: nothing is signed."),
+    ] = None
+    mavlink_link_id: Annotated[int, Meta(ge=0, le=255, description="Number of the signed stream.")] = 0
+    mavlink_unsigned_commands: Annotated[
+        bool, Meta(description="Whether unsigned commands of other computers do more than stopping.")
+    ] = False
+    mavlink_interval_s: Annotated[
+        float, Meta(ge=0.05, le=10, description="Seconds between two messages of pose, and of obstacles.")
+    ] = 0.1
 
 
 class SupervisorSource(_Section, frozen=True):

@@ -248,9 +248,10 @@ class Daemon:
 
     def _heed(self, notice: SafetyNotice) -> None:
         """Tell a person why nothing moves; what only a person can end ends the run."""
-        self._notice = notice
+        known, self._notice = self._notice.warnings, notice
         for warning in notice.warnings:
-            _log.warning("%s", warning)
+            if warning not in known:
+                _log.warning("%s", warning)
         for reason in notice.reasons:
             # Before the start, nothing has told anything yet.
             is_news = self.state is State.RUNNING and reason not in _ORDINARY

@@ -13,10 +13,10 @@ from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.assembly import AssemblyError, assemble, check_settings
 from robosc_bridge.daemon.jobs import Job
 from robosc_bridge.daemon.loop import Daemon
-from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, Sighting
+from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, SafetyNotice, Sighting
 from robosc_bridge.daemon.sight import needs_camera
 from robosc_bridge.daemon.states import State
-from robosc_bridge.safety import SafetyLayer, SafetyLimits
+from robosc_bridge.safety import Caution, SafetyLayer, SafetyLimits
 from robosc_bridge.skills import EmergencyStop, Rotate
 from support.models import bundle_of
 
@@ -62,6 +62,18 @@ def tied(more: str = "", **channels: str) -> tuple[Configuration, Ties]:
     assert MADE.supervisor is not None, MADE.reason
     configuration = parse(f"{DEVICES}{more}channels:\n{lines}".encode(), "test.yaml").configuration
     return configuration, tie(MADE.supervisor.model, configuration)
+
+
+def test_a_warning_is_logged_when_it_begins(caplog: pytest.LogCaptureFixture) -> None:
+    scene = Scene()
+    blind, both = (Caution.SCAN_BLIND,), (Caution.BATTERY, Caution.SCAN_BLIND)
+    for warnings in (blind, both, blind, (), blind):
+        scene.told(SafetyNotice((), warnings))
+    assert [record.message for record in caplog.records] == [
+        Caution.SCAN_BLIND,
+        Caution.BATTERY,
+        Caution.SCAN_BLIND,
+    ]
 
 
 NONE = {"lost": "{channel: none}", "blind": "{channel: none}", "sees": "{channel: none}"}

@@ -6,6 +6,7 @@ import pytest
 
 from robosc.execution.clock import ManualClock
 from robosc.execution.event_log import MemoryLog
+from robosc.model.structure import Deployment
 from robosc.supervisor import make_supervisor
 from robosc_bridge.configuration import parse, tie
 from robosc_bridge.configuration.structure import Configuration
@@ -105,7 +106,7 @@ class Scene:
 
 
 def test_it_waits_for_the_camera_and_says_so(caplog: pytest.LogCaptureFixture) -> None:
-    caplog.set_level(logging.INFO, "robosc_bridge.daemon.loop")
+    caplog.set_level(logging.INFO, "robosc_bridge.daemon")
     scene = Scene()
     scene.told()
     scene.told(DeviceUp(Device.DRIVE))
@@ -173,15 +174,19 @@ def test_a_camera_is_opened_only_for_whom_it_is_for(channels: dict[str, str], is
     assert (machine.camera is not None) is is_needed
 
 
+def check(configuration: Configuration, ties: Ties) -> None:
+    check_settings(configuration, ties, Deployment.CONTROLLER)
+
+
 def test_a_line_that_nobody_tells_is_lost_is_refused() -> None:
     with pytest.raises(AssemblyError, match=r"'correction' \('/line'\) is tied to 'line', and nothing tells when"):
-        check_settings(*tied(lost="{channel: none}"))
-    check_settings(*tied("execution: {max_age_s: {/line: 0.5}}\n", lost="{channel: none}"))
-    check_settings(*tied())
+        check(*tied(lost="{channel: none}"))
+    check(*tied("execution: {max_age_s: {/line: 0.5}}\n", lost="{channel: none}"))
+    check(*tied())
 
 
 def test_a_simulator_without_a_place_is_refused() -> None:
     with pytest.raises(AssemblyError, match="as simulated:PATH"):
-        check_settings(*tied("skills: {line: {camera: simulated}}\n"))
-    check_settings(*tied("skills: {line: {camera: 'simulated:/tmp/x'}}\n"))
-    check_settings(*tied("skills: {line: {camera: simulated}}\n", line="{channel: none}", **NONE))
+        check(*tied("skills: {line: {camera: simulated}}\n"))
+    check(*tied("skills: {line: {camera: 'simulated:/tmp/x'}}\n"))
+    check(*tied("skills: {line: {camera: simulated}}\n", line="{channel: none}", **NONE))

@@ -4,6 +4,8 @@ import math
 from typing import Any
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from robosc_bridge.daemon.programs import (
     Answered,
@@ -341,6 +343,8 @@ def test_what_is_left_out_is_zero_for_model_and_wheels_alike(scene: Scene, progr
     for data in nothing:
         assert without_sensors(program.say(Requested, "/cmd_vel", data)) == []
     assert without_sensors(program.say(Requested, "/cmd_vel", {"linear": {"x": 0.001}})) == [Blocked("/cmd_vel")]
+    # The model has read all of it: nothing was unknown to it.
+    assert not [entry for entry in scene.log.entries if entry["kind"] == "unknown"]
 
 
 def test_who_sends_too_much_is_stopped(scene: Scene, program: Connected) -> None:
@@ -361,3 +365,57 @@ def test_a_lost_drive_base_ends_a_layers_run(scene: Scene, program: Connected) -
     assert scene.daemon.state is State.FAULT
     scene.daemon.post(Detached(program.program))
     scene.daemon.turn()
+
+
+EVERYTHING = [
+    (Requested, ("/cmd_vel", FORWARD)),
+    (Requested, ("/cmd_vel", ZERO)),
+    (Requested, ("/spin", 40)),
+    (Called, ("turn", "1", {"angle": 40})),
+    (Called, ("think", "2", "?")),
+    (GoalSent, ("face", "3", {"angle": 40})),
+    (CancelWanted, ("face", "3")),
+    (Told, ("/mood", "x")),
+]
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            st.integers(0, 2), st.none() | st.sampled_from(EVERYTHING), st.sampled_from([0.02, 0.1]), st.booleans()
+        ),
+        min_size=1,
+        max_size=15,
+    )
+)
+def test_programs_may_come_and_go_in_the_middle_of_everything(steps: list[tuple[int, Any, float, bool]]) -> None:
+    scene = driven()
+    names = iter(range(1000))
+
+    def come() -> Connected:
+        return Connected(scene, str(next(names)), ("think",))
+
+    programs = [come() for _ in range(3)]
+    for who, what, seconds, is_free in steps:
+        if what is None:
+            programs[who].leave()
+            programs[who] = come()
+        else:
+            make, arguments = what
+            programs[who].say(make, *arguments)
+        scene.live(seconds, 2.0 if is_free else 0.3)
+        assert scene.daemon.state is State.RUNNING
+    for program in programs:
+        program.leave()
+    scene.exchange()
+    # Nobody is there who wants anything to move.
+    assert scene.out == STANDSTILL
+    scene.live(1.0, 2.0)
+    assert (scene.out, scene.daemon.state) == (STANDSTILL, State.RUNNING)
+    # Whoever comes finds everything free.
+    late = come()
+    late.say(GoalSent, "face", "1", {"angle": 10})
+    assert GoalTaken("1") in late.told
+    scene.live(3.0, 2.0)
+    assert [item.outcome for item in late.of(GoalOver)] == ["succeeded"]

@@ -1,6 +1,7 @@
 """`robosc-bridge`: run a supervisor on a robot's devices, and what is needed before that."""
 
 import argparse
+import dataclasses
 import json
 import logging
 import signal
@@ -18,13 +19,21 @@ from robosc.model import check
 from robosc.model.layers import layer_findings
 from robosc.model.structure import Deployment, Model
 from robosc_bridge.configuration import init, load, schema, tie
-from robosc_bridge.configuration.template import DriveDriver, Robot, ScannerDriver
+from robosc_bridge.configuration.structure import TURTLEBOTS
+from robosc_bridge.configuration.template import DriveDriver, ScannerDriver
 from robosc_bridge.daemon.assembly import assemble, check_settings
 from robosc_bridge.daemon.faces import make_faces
 from robosc_bridge.daemon.keyboard import Keyboard
 from robosc_bridge.daemon.loop import Key
-from robosc_bridge.daemon.supervisors import MODEL_SUFFIX, NoSupervisorError, Source, deployment_of, obtain
-from robosc_bridge.devices.registry import Kind, available_drivers
+from robosc_bridge.daemon.supervisors import (
+    MODEL_SUFFIX,
+    NoSupervisorError,
+    Source,
+    deployment_of,
+    obtain,
+    trusted_keys,
+)
+from robosc_bridge.drivers import Kind, available_drivers
 from robosc_bridge.errors import BridgeError
 
 OK, FAULT, WRONG_USE = 0, 1, 2
@@ -52,7 +61,9 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     run = commands.add_parser("run", help="execute a supervisor on a robot's devices", epilog=_EPILOG)
-    _model_argument(run, "the model (.rscd), or a supervisor (.rsup) with its model beside it, called alike")
+    _model_argument(
+        run, "the model (.rscd), or a supervisor (.rsup): signed, or with its model beside it, called alike"
+    )
     _configuration_argument(run)
     _deployment_argument(run)
     run.add_argument("--server", metavar="HOST:PORT", help="a synthesis server that makes the supervisor of the model")
@@ -71,7 +82,7 @@ def _parser() -> argparse.ArgumentParser:
 
     first = commands.add_parser("init", help="write a first configuration for a robot and a model", epilog=_EPILOG)
     _model_argument(first, "the model (.rscd)")
-    first.add_argument("--robot", choices=get_args(Robot), default="burger")
+    first.add_argument("--robot", choices=TURTLEBOTS, default="burger")
     first.add_argument("--drive", choices=get_args(DriveDriver), default="opencr")
     first.add_argument("--scanner", choices=get_args(ScannerDriver), default="lds02")
     first.add_argument("-o", "--output", metavar="FILE", type=Path, help="where to; standard output if it is left out")
@@ -125,6 +136,7 @@ def _check(arguments: argparse.Namespace) -> int:
     deployment = arguments.deployment or Deployment.CONTROLLER
     ties = tie(_model(arguments.model, deployment), loaded.configuration, loaded.document)
     check_settings(loaded.configuration, ties, deployment)
+    trusted_keys(loaded.configuration.supervisor.trusted_keys)
     sys.stdout.write(f"{arguments.config}: {len(ties.communications)} communications are tied\n")
     return OK
 
@@ -148,7 +160,7 @@ def _schema(arguments: argparse.Namespace) -> int:
 def _drivers(arguments: argparse.Namespace) -> int:
     found = [(kind, info) for kind in Kind for info in available_drivers(kind)]
     if arguments.json:
-        items = [{"kind": str(kind), "name": info.name, "description": info.description} for kind, info in found]
+        items = [{"kind": str(kind), **dataclasses.asdict(info)} for kind, info in found]
         sys.stdout.write(json.dumps(items, indent=2) + "\n")
     else:
         for kind, info in found:
@@ -167,7 +179,8 @@ def _run(arguments: argparse.Namespace) -> int:
     configuration = loaded.configuration
     server = arguments.server or configuration.supervisor.server
     deployment = arguments.deployment or deployment_of(arguments.model)
-    supervisor = obtain(Source(arguments.model, deployment, server, arguments.keep), tell)
+    trusted = trusted_keys(configuration.supervisor.trusted_keys)
+    supervisor = obtain(Source(arguments.model, deployment, server, arguments.keep, trusted), tell)
     ties = tie(supervisor.model, configuration, loaded.document)
     log: EventLog = NullLog()
     if configuration.log.folder is not None:

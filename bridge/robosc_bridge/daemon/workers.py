@@ -7,12 +7,13 @@ the safety layer decides that alone.
 
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from robosc_bridge.daemon.backoff import Backoff
+from robosc_bridge.daemon.frame_watch import FrameWatch
 from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice
-from robosc_bridge.devices.interface import DriveBase, DriveReading, RangeScanner, Scan, Velocity
+from robosc_bridge.devices.interface import DriveBase, DriveReading, MotorFault, RangeScanner, Scan, Velocity
 from robosc_bridge.errors import BridgeError, DeviceSilentError
 from robosc_bridge.safety import Caution, Reason
 
@@ -27,6 +28,9 @@ _log = logging.getLogger(__name__)
 
 _CLOSED_S = 0.1
 """How often the safety layer is asked while there is no drive base: it must notice that nothing holds any more."""
+
+RESTART_LIMIT = 3
+"""So many restarts of a scanner's motor without a full turn, and the scanner is closed and opened anew."""
 
 VALID_LIMIT = 8
 """A turn with fewer valid ranges shows nothing: the LiDAR is covered, or something is too near."""
@@ -64,8 +68,11 @@ class Gate(Protocol):
     def drive_failed(self) -> None:
         """The drive base did not answer."""
 
-    def saw_scan(self, now_s: float) -> None:
-        """A full turn came."""
+    def saw_scan(self, now_s: float, ranges_m: Sequence[float]) -> None:
+        """A full turn came, with a range for each degree."""
+
+    def saw_noise(self, is_noisy: bool) -> None:
+        """Whether many frames of the scanner are damaged."""
 
 
 class Worker(Protocol):
@@ -118,6 +125,8 @@ class DriveWorker:
         self._silent = 0
         self._due_s = self._open_at_s = -math.inf
         self._notice = SafetyNotice((), ())
+        # Faults that a person was told of since it was opened or reset: one that comes and goes is told once.
+        self._told: frozenset[MotorFault] = frozenset()
 
     def reset(self) -> None:
         """Let the next step reboot motors that have switched themselves off; called from other threads."""
@@ -151,6 +160,7 @@ class DriveWorker:
         self._base.open()
         self._backoff.succeeded()
         self._is_open, self._has_torque = True, False
+        self._told = frozenset()
         self._silent = 0
         self._due_s = now_s
         self._report(DeviceUp(Device.DRIVE))
@@ -167,6 +177,9 @@ class DriveWorker:
             command = self._ask(self._clock())
         reading = self._base.exchange(command.velocity)
         self._silent = 0
+        if news := reading.faults - self._told:
+            _log.warning("the motors tell: %s", ", ".join(sorted(news)))
+            self._told |= news
         self._gate.saw_drive(reading)
         self._report(reading)
         # One that came early, because it was hurried, is no reason for a long pause.
@@ -186,6 +199,7 @@ class DriveWorker:
 
     def _reset(self) -> None:
         self._has_torque = False
+        self._told = frozenset()
         try:
             self._base.reset()
         except BridgeError as error:
@@ -220,9 +234,10 @@ class ScannerWorker:
         gate: The safety layer.
         report: Takes what is told; must not wait.
         silent_after_s: After so long without a full turn it counts as lost.
-        restart_after_s: After so long its motor is restarted, again and again.
+        restart_after_s: After so long without any turn its motor is restarted, `RESTART_LIMIT` times; then it is lost.
         clock: What the time is, in seconds.
         backoff: Pauses between attempts to open it.
+        bad_frames_share: Of a second's frames, above which its line is told to be noisy.
     """
 
     name = "scanner"
@@ -236,6 +251,7 @@ class ScannerWorker:
         restart_after_s: float,
         clock: Callable[[], float],
         backoff: Backoff | None = None,
+        bad_frames_share: float = 0.1,
     ) -> None:
         self._scanner = scanner
         self._gate = gate
@@ -247,6 +263,8 @@ class ScannerWorker:
         self._is_open = False
         self._is_turning = False
         self._heard_s = self._restart_at_s = 0.0
+        self._restarts = 0
+        self._frames = FrameWatch(scanner.counters, bad_frames_share)
 
     def step(self, now_s: float) -> float:
         """Open it, or listen for a turn."""
@@ -258,6 +276,7 @@ class ScannerWorker:
                 self._is_open = True
                 self._heard_s = self._clock()
                 self._restart_at_s = self._heard_s + self._restart_after_s
+                self._restarts = 0
         except BridgeError as error:
             return self._failed(str(error))
         except Exception as error:  # Without a scanner, the safety layer stops the wheels.
@@ -273,19 +292,35 @@ class ScannerWorker:
             self._is_turning = False
             what = f"no full turn with valid ranges for {self._silent_after_s:g} s"
             self._report(DeviceDown(Device.SCANNER, what, 0.0, is_first=True))
-        if scan is None and self._clock() >= self._restart_at_s:
-            self._scanner.restart()
+        if scan is not None:
+            # It turns, whatever it sees.
+            self._restarts = 0
             self._restart_at_s = self._clock() + self._restart_after_s
+        elif self._clock() >= self._restart_at_s:
+            self._restart()
+        self._look_at_frames()
+
+    def _restart(self) -> None:
+        if self._restarts >= RESTART_LIMIT:
+            raise DeviceSilentError(f"no full turn, also after its motor was started anew {RESTART_LIMIT} times")
+        self._restarts += 1
+        self._scanner.restart()
+        self._restart_at_s = self._clock() + self._restart_after_s
+
+    def _look_at_frames(self) -> None:
+        found = self._frames.look(self._clock())
+        if found is not None:
+            self._gate.saw_noise(found.is_noisy)
+            _log.warning("scanner: %s", found.text)
 
     def _heard(self, scan: Scan) -> None:
         self._backoff.succeeded()
-        self._gate.saw_scan(scan.time_s)
+        self._gate.saw_scan(scan.time_s, scan.ranges_m)
         if not self._is_turning:
             self._is_turning = True
             self._report(DeviceUp(Device.SCANNER))
         self._report(scan)
         self._heard_s = scan.time_s
-        self._restart_at_s = scan.time_s + self._restart_after_s
 
     def _failed(self, problem: str) -> float:
         self._is_open = self._is_turning = False

@@ -86,10 +86,12 @@ class DynamixelBus:
 
     Attributes:
         counters: How healthy the line is.
+        stranger: Device that has answered to requests for others since the last `begin`; None: none has.
     """
 
     def __init__(self, line: SerialLine, name_of: Callable[[int], str], answer_limit_s: float = ANSWER_LIMIT_S) -> None:
         self.counters = BusCounters()
+        self.stranger: int | None = None
         self._port = DynamixelPort(line, answer_limit_s)
         self._handler = PacketHandler()
         self._name_of = name_of
@@ -110,6 +112,12 @@ class DynamixelBus:
         """
         self._port.end_s = time.monotonic() + limit_s
         self._repeats = repeats
+        self.stranger = None
+
+    def silence_of(self, names: str, verb: str) -> DeviceSilentError:
+        """The error to tell: who does not answer, and who does instead."""
+        other = "" if self.stranger is None else f", but device {self.stranger} does"
+        return DeviceSilentError(f"{names} {verb} not answer{other}")
 
     def settle(self, device: int) -> bytes:
         """Have every older answer of a device behind: what it answers to the next request, that is its answer.
@@ -175,6 +183,15 @@ class DynamixelBus:
             self._asked(device, transmit, 0, limit_s), f"does not let {len(data)} bytes at {address} be written"
         )
 
+    def tell(self, device: int, address: int, data: bytes) -> None:
+        """Write to an address of a device that may hear though it is not heard: no answer is waited for.
+
+        Raises:
+            LineError: The line is gone.
+        """
+        self._unsettled.add(device)
+        self._sent(int(self._handler.writeTxOnly(self._port, device, address, len(data), list(data))))
+
     def reboot(self, device: int) -> None:
         """Restart a device; it is silent for a while then.
 
@@ -215,30 +232,34 @@ class DynamixelBus:
 
     def _sync_read(self, address: int, length: int, devices: Collection[int]) -> dict[int, Status]:
         found: dict[int, Status] = {}
-        try:
-            for device in devices:
-                if device in self._unsettled:
-                    self.settle(device)
-            self._begin_request()
-        except DeviceSilentError:
+        # One that stays silent is left out, and does not make the others look so.
+        asked = [device for device in devices if device not in self._unsettled or self._has_settled(device)]
+        if not asked or self._port.is_late:
             return found
-        parameters = list(devices)
-        self._unsettled.update(devices)
-        self._sent(self._handler.syncReadTx(self._port, address, length, parameters, len(parameters), False))
-        self._port.wait_for(len(devices) * (_EMPTY_STATUS + length))
-        while len(found) < len(devices):
+        self._begin_request()
+        self._unsettled.update(asked)
+        self._sent(self._handler.syncReadTx(self._port, address, length, asked, len(asked), False))
+        self._port.wait_for(len(asked) * (_EMPTY_STATUS + length))
+        while len(found) < len(asked):
             status = self._received()
             if status is None:
                 self.counters.unanswered += 1
                 break
-            if status.device in devices and status.device not in found and _fits(status, length):
+            if status.device in asked and status.device not in found and _fits(status, length):
                 self._unsettled.discard(status.device)
                 if status.number == DAMAGED_REQUEST:
                     break
                 found[status.device] = status
             else:
-                self.counters.foreign += 1
+                self._is_foreign(status, devices)
         return found
+
+    def _has_settled(self, device: int) -> bool:
+        try:
+            self.settle(device)
+        except DeviceSilentError:
+            return False
+        return True
 
     def _asked(self, device: int, transmit: Callable[[], int], length: int, limit_s: float | None = None) -> Status:
         """The answer to a request, which is made again if there is none; never that to an older one."""
@@ -269,16 +290,19 @@ class DynamixelBus:
         self._unsettled.add(device)
         self._sent(transmit())
         self._port.wait_for(_EMPTY_STATUS + length, limit_s)
-        other = ""
         while (status := self._received()) is not None:
             if status.device == device and fits(status):
                 self._unsettled.discard(device)
                 return status
-            self.counters.foreign += 1
-            if status.device != device:
-                other = f", but device {status.device} does"
+            self._is_foreign(status, (device,))
         self.counters.unanswered += 1
-        raise DeviceSilentError(f"{self._name_of(device)} does not answer{other}")
+        raise self.silence_of(self._name_of(device), "does")
+
+    def _is_foreign(self, status: Status, devices: Collection[int]) -> None:
+        """It is no answer to what these were asked."""
+        self.counters.foreign += 1
+        if status.device not in devices:
+            self.stranger = status.device
 
     def _begin_request(self) -> None:
         if self._port.is_late:

@@ -17,7 +17,7 @@ from robosc_bridge.devices.interface import DriveLimits, DriveReading, MotorFaul
 from robosc_bridge.devices.kinematics import body_velocity, opencr_words, wheel_speeds
 from robosc_bridge.devices.odometry import Odometry
 from robosc_bridge.devices.robots import Robot
-from robosc_bridge.errors import BridgeError, DeviceError, DeviceFaultError, WrongDeviceError
+from robosc_bridge.errors import BridgeError, DeviceError, DeviceFaultError, DeviceSilentError, WrongDeviceError
 from robosc_bridge.protocol import opencr
 from robosc_bridge.protocol.opencr import Block, decode_block, encode_command
 from robosc_bridge.transport.serial_line import SerialLine
@@ -119,9 +119,18 @@ class OpenCrBase:
 
         Raises:
             LineError: The line is gone.
-            DeviceSilentError: The board did not answer, also when asked again.
+            DeviceSilentError: The board did not answer, also when asked again; it has been told to stop.
             DeviceError: The board has started anew.
         """
+        try:
+            return self._exchange(velocity)
+        except DeviceSilentError:
+            if self._is_torque_wanted:
+                # It may hear though it is not heard: its own time limit is half a second.
+                self._used_bus.tell(opencr.DEVICE, opencr.COMMAND, encode_command(0, 0))
+            raise
+
+    def _exchange(self, velocity: Velocity) -> DriveReading:
         is_obeying = self._is_torque_wanted and not self._is_torque_lost
         words = opencr_words(velocity, self.limits, self._robot.wheel_separation_m) if is_obeying else (0, 0)
         block = self._cycle(words if self._is_torque_wanted else None)

@@ -260,7 +260,7 @@ class ServoPair:
         found = self._bus.sync_read(address, length, self.motors)
         silent = [self._names[motor] for motor in self.motors if motor not in found]
         if silent:
-            raise DeviceSilentError(" and ".join(silent) + (" does" if len(silent) == 1 else " do") + " not answer")
+            raise self._bus.silence_of(" and ".join(silent), "does" if len(silent) == 1 else "do")
         for motor, status in found.items():
             if status.number:
                 raise RefusedError(f"{self._names[motor]} does not let {length} bytes at {address} be read", status)

@@ -23,6 +23,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self
 
+from robosc_bridge.simulated.recorder import Tap
 from robosc_bridge.simulated.timebase import Timebase
 
 _CHUNK = 4096
@@ -116,6 +117,7 @@ class SimulatedLine:
         time: That it lives by.
         link: Where the port's stable name, a symbolic link, is to be; None: in a folder of its own.
         seed: Of the faults that come by chance.
+        tap: Takes all bytes that pass here; None: nothing does.
 
     Attributes:
         path: Of the port: stable over `disconnect` and `reconnect`, as a udev rule makes it.
@@ -128,13 +130,16 @@ class SimulatedLine:
         FileExistsError: There is something at `link` already.
     """
 
-    def __init__(self, device: Device, time: Timebase, link: Path | None = None, seed: int = 0) -> None:
+    def __init__(
+        self, device: Device, time: Timebase, link: Path | None = None, seed: int = 0, tap: Tap | None = None
+    ) -> None:
         self.device = device
         self.faults = Faults()
         self.lost_bytes = 0
         self.received = 0
         self.sent = 0
         self._time = time
+        self._tap = tap
         self._chance = random.Random(seed)  # noqa: S311 (faults are no secrets)
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         if link is None:
@@ -254,6 +259,8 @@ class SimulatedLine:
             data = os.read(self._master, _CHUNK)
         except OSError:
             return
+        if self._tap is not None:
+            self._tap(True, time.monotonic(), data)
         self.received += len(data)
         if self.faults.echo:
             self._send([Sending(data)])
@@ -333,7 +340,10 @@ class SimulatedLine:
                 continue
             written = 0
             if self._unread() + len(data) <= _BUFFER:
+                begin_s = time.monotonic()
                 with contextlib.suppress(OSError):
                     written = os.write(self._master, data)
+                if self._tap is not None and written:
+                    self._tap(False, begin_s, data[:written])
             self.sent += written
             self.lost_bytes += len(data) - written

@@ -13,6 +13,7 @@ from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.simulated import SimulatedTurtleBot3
 from support.daemons import CONFIGURATION, MODEL
+from support.driven import driven
 from support.models import bundle_of
 
 
@@ -55,6 +56,20 @@ def test_what_needs_a_remote_face_is_refused_without_one(
 def test_nobody_waits_in_standby_for_somebody_who_cannot_come(supervisor: Supervisor) -> None:
     with pytest.raises(AssemblyError, match="to wait in standby, the bridge needs "):
         machine(supervisor, CONFIGURATION, starts_itself=False)
+
+
+def test_a_rover_is_driven_within_its_own_limits() -> None:
+    """Those of its body, not those of a TurtleBot3; one that is called like one has its numbers."""
+    own = "{wheel_separation_m: 0.16, linear_m_s: 0.1, angular_rad_s: 0.5}"
+    with driven("mavlink-rover", velocity=(3.0, 0.0), robot=own) as bridge:
+        assert bridge.limits.linear_m_s == 0.1
+        assert bridge.limits.separation_m == 0.16
+        assert bridge.limits.wheel_m_s == pytest.approx(0.14)
+        bridge.steady()
+        assert bridge.wheels_m_s == pytest.approx((0.1, 0.1), rel=0.05)
+    with driven("mavlink-rover") as bridge:
+        assert (bridge.limits.linear_m_s, bridge.limits.separation_m) == (0.22, 0.16)
+        bridge.moves()
 
 
 class RecordedFace:

@@ -1,0 +1,334 @@
+"""A whole bridge that drives a simulated robot over real pseudo-terminals, with what its wheels were told kept.
+
+The loop runs in a thread of its own, the devices' threads in theirs. What counts is what the simulated motors are told
+to do, at the time at which they hear it: neither the daemon's own word for it nor the test's look at it.
+"""
+
+import logging
+import os
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+from robosc.execution.event_log import MemoryLog
+from robosc.supervisor import make_supervisor
+from robosc_bridge.configuration import parse, tie
+from robosc_bridge.daemon.assembly import Machine, assemble, safety_limits
+from robosc_bridge.daemon.states import State
+from robosc_bridge.safety import SafetyLimits
+from robosc_bridge.simulated import SimulatedTurtleBot3
+from robosc_bridge.simulated.line import Device, Sending
+from support.models import bundle_of
+
+LIMIT_S = 15.0
+"""Longer than anything takes that works."""
+
+PATIENT = "{answer_limit_s: 0.3}"
+"""Options of a drive whose answers come for certain, on a machine that may be busy."""
+
+# Its supervisor always wants to move: whatever stops the wheels is not it.
+MODEL = """
+robot Runner {
+    interface twist use Twist from geometry_msgs
+    datatype object Vector { x: double z: double }
+    datatype object Twist { linear: Vector angular: Vector }
+    component Wheels {
+        incoming message drive with identifier: "/cmd_vel", type: Twist links twist
+        outgoing message lost with identifier: "/lost", type: string
+        outgoing message back with identifier: "/back", type: string
+        behaviour {
+            initial marked state ready { on response from lost goto ready on response from back goto ready }
+        }
+    }
+    provide drive with { linear: { x: LINEAR }, angular: { z: ANGULAR } }
+}
+"""
+CHANNELS = """channels:
+  /cmd_vel: {channel: drive}
+  /lost: {channel: fault}
+  /back: {channel: fault, event: back}
+"""
+
+
+class Recorded:
+    """A device, and what the wheels' motors were told to do whenever something was heard or happened by itself.
+
+    Args:
+        device: The real one.
+        robot: Whose wheels are looked at.
+
+    Attributes:
+        told: Time, and speeds of the left and the right wheel in m/s; each entry differs from the one before.
+        heard_s: Times at which the host was heard.
+    """
+
+    def __init__(self, device: Device, robot: SimulatedTurtleBot3) -> None:
+        self._device = device
+        self._robot = robot
+        self.told: list[tuple[float, float, float]] = [(robot.time.now_s(), 0.0, 0.0)]
+        self.heard_s: list[float] = []
+
+    @property
+    def baud(self) -> int | None:
+        return self._device.baud
+
+    def receive(self, data: bytes, baud: int) -> Iterable[Sending]:
+        self.heard_s.append(self._robot.time.now_s())
+        return self._watched(list(self._device.receive(data, baud)))
+
+    def live(self) -> Iterable[Sending]:
+        return self._watched(list(self._device.live()))
+
+    def due_s(self) -> float:
+        return self._device.due_s()
+
+    def plug_in(self) -> None:
+        self._device.plug_in()
+
+    def look(self) -> None:
+        """Note what the motors are told now."""
+        with self._robot.time.lock:
+            world = self._robot.world
+            radius_m = world.body.wheel_radius_m
+            speeds = [radius_m * wheel.goal_rad_s if wheel.is_driven else 0.0 for wheel in (world.left, world.right)]
+            if tuple(speeds) != self.told[-1][1:]:
+                self.told.append((self._robot.time.now_s(), speeds[0], speeds[1]))
+
+    def _watched(self, sendings: list[Sending]) -> list[Sending]:
+        self.look()
+        return sendings
+
+
+class Lateness:
+    """How late a thread of this process is at its worst: a busy machine's share in what a test measures."""
+
+    def __init__(self) -> None:
+        self.worst_s = 0.0
+        self._is_over = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="lateness", daemon=True)
+
+    def _run(self) -> None:
+        while True:
+            begin_s = time.monotonic()
+            if self._is_over.wait(0.005):
+                return
+            self.worst_s = max(self.worst_s, time.monotonic() - begin_s - 0.005)
+
+    def __enter__(self) -> "Lateness":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._is_over.set()
+        self._thread.join()
+
+
+class HangingLog(MemoryLog):
+    """An event log that a test lets hang: it is written by the loop's thread, from inside the executor.
+
+    Attributes:
+        released: Cleared, the next entry waits until it is set.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.released = threading.Event()
+        self.released.set()
+
+    def write(self, entry: dict[str, Any]) -> None:
+        self.released.wait(LIMIT_S)
+        super().write(entry)
+
+    def events(self) -> list[str]:
+        """Names of the model's events so far."""
+        return [str(entry["event"]) for entry in tuple(self.entries) if entry["kind"] == "event"]
+
+
+@dataclass
+class Driven:
+    """A bridge at work.
+
+    Attributes:
+        robot: The simulated one.
+        machine: The daemon and its devices' threads.
+        limits: Of its safety layer.
+        log: Of the executor.
+        trace: What the wheels were told.
+        messages: What a person was told, warnings and worse.
+        thread: The loop's.
+        error: What has ended the loop.
+    """
+
+    robot: SimulatedTurtleBot3
+    machine: Machine
+    limits: SafetyLimits
+    log: HangingLog
+    trace: Recorded
+    messages: list[str]
+    error: Exception | None = None
+    thread: threading.Thread = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.thread = threading.Thread(target=self._run, name="loop", daemon=True)
+
+    def _run(self) -> None:
+        try:
+            self.machine.run()
+        except Exception as error:
+            self.error = error
+
+    @property
+    def state(self) -> State:
+        return self.machine.daemon.state
+
+    def until(self, condition: Callable[[], object], what: str, limit_s: float = LIMIT_S) -> None:
+        """Wait for something."""
+        end_s = time.monotonic() + limit_s
+        while not condition():
+            assert time.monotonic() < end_s, f"waited {limit_s} s in vain for {what}; told: {self.messages}"
+            time.sleep(0.002)
+
+    @property
+    def wheels_m_s(self) -> tuple[float, float]:
+        """What the motors are told now."""
+        self.trace.look()
+        return self.trace.told[-1][1:]
+
+    def moves(self) -> None:
+        """Wait until it moves."""
+        self.until(lambda: self.wheels_m_s != (0.0, 0.0), "the wheels to be told to turn")
+
+    def steady(self) -> None:
+        """Wait until it moves with the velocity that is wanted: nothing changes any more."""
+        self.moves()
+        self.until(lambda: time.monotonic() - self.trace.told[-1][0] > 0.3, "a steady motion")
+        assert self.wheels_m_s != (0.0, 0.0)
+
+    def stopped_after(self, cause: Callable[[], object], limit_s: float) -> float:
+        """Let something happen to a robot that moves; how long until both wheels' commanded speed is zero, for good.
+
+        Args:
+            cause: What happens.
+            limit_s: When it must have been so; a busy machine's lateness is added.
+        """
+        self.steady()
+        with Lateness() as lateness:
+            begin_s = self.robot.time.now_s()
+            cause()
+            self.until(lambda: self._is_still(begin_s), "the wheels to be told to stop")
+        self.trace.look()
+        told = self.trace.told
+        assert told[-1][1:] == (0.0, 0.0)
+        took_s = told[-1][0] - begin_s
+        assert took_s <= limit_s + lateness.worst_s, f"{took_s:.3f} s instead of {limit_s:.3f} s"
+        return took_s
+
+    def _is_still(self, begin_s: float) -> bool:
+        """Whether the wheels have been told to stand still, and nothing else since then."""
+        at_s, *wheels = self.trace.told[-1]
+        return at_s >= begin_s and wheels == [0.0, 0.0] and self.robot.time.now_s() - at_s > 0.15
+
+    def stays(self, seconds: float) -> None:
+        """See that nothing is set in motion for so long."""
+        before = len(self.trace.told)
+        assert self.wheels_m_s == (0.0, 0.0)
+        time.sleep(seconds)
+        self.trace.look()
+        assert all(wheels == [0.0, 0.0] for _, *wheels in self.trace.told[before:])
+
+    def was_told(self, text: str) -> None:
+        """See that a person was told so, once; waits for it."""
+        self.until(lambda: any(text in message for message in self.messages), f"the message {text!r}")
+        found = [message for message in self.messages if text in message]
+        assert len(found) == 1, found
+
+    def ended(self) -> str:
+        """Wait for the end of the run; the problem that it ended with."""
+        self.thread.join(LIMIT_S)
+        assert not self.thread.is_alive()
+        return self.machine.daemon.problem
+
+
+@contextmanager
+def preferred() -> Iterator[None]:
+    """This thread, and those that it starts, go before other programs where that is permitted.
+
+    A bridge and its devices live by the computer's clock: where neither gets any time for a fifth of a second, the
+    bridge rightly takes its motors for silent.
+    """
+    before = os.getpriority(os.PRIO_PROCESS, 0)
+    try:
+        os.setpriority(os.PRIO_PROCESS, 0, -15)
+    except PermissionError:
+        yield
+        return
+    try:
+        yield
+    finally:
+        os.setpriority(os.PRIO_PROCESS, 0, before)
+
+
+class _Messages(logging.Handler):
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.texts: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.texts.append(record.getMessage())
+
+
+def configured(robot: SimulatedTurtleBot3, base: str, lidar: str, sections: Mapping[str, str]) -> str:
+    """A configuration for a simulated robot; sections in YAML by name add to it."""
+    options = sections.get("options", PATIENT if base != "mavlink-rover" else "{}")
+    rest = "".join(f"{key}: {text}\n" for key, text in {"robot": "burger", **sections}.items() if key != "options")
+    return (
+        f"drive: {{driver: {base}, port: {robot.base_path}, options: {options}}}\n"
+        f"scanner: {{driver: {lidar}, port: {robot.scanner_path}}}\n{rest}{CHANNELS}"
+    )
+
+
+@contextmanager
+def driven(
+    base: str,
+    lidar: str = "lds03",
+    velocity: tuple[float, float] = (0.06, 1.0),
+    *,
+    before: Callable[[SimulatedTurtleBot3], None] = lambda robot: None,
+    **sections: str,
+) -> Iterator[Driven]:
+    """A bridge that begins to drive a Burger in a circle, until it is left.
+
+    Args:
+        base: Driver of its drive base.
+        lidar: Its LiDAR.
+        velocity: That its supervisor wants, always.
+        before: What happens to the robot before the bridge starts.
+        sections: Of the configuration, in YAML; `options`: of the drive (default: `PATIENT` where it is asked).
+    """
+    text = MODEL.replace("LINEAR", str(velocity[0])).replace("ANGULAR", str(velocity[1]))
+    made = make_supervisor(bundle_of(text))
+    assert made.supervisor is not None, made.reason
+    handler = _Messages()
+    logger = logging.getLogger("robosc_bridge")
+    logger.addHandler(handler)
+    with preferred(), SimulatedTurtleBot3("burger", base, lidar) as robot:
+        trace = Recorded(robot.base_line.device, robot)
+        robot.base_line.device = trace
+        before(robot)
+        configuration = parse(configured(robot, base, lidar, sections).encode(), "test.yaml").configuration
+        log = HangingLog()
+        ties = tie(made.supervisor.model, configuration)
+        machine = assemble(configuration, ties, made.supervisor, log, starts_itself=True)
+        found = Driven(robot, machine, safety_limits(configuration), log, trace, handler.texts)
+        found.thread.start()
+        try:
+            yield found
+        finally:
+            log.released.set()
+            machine.quit()
+            found.thread.join(LIMIT_S)
+            logger.removeHandler(handler)
+            assert not found.thread.is_alive()

@@ -104,6 +104,20 @@ def obtain(source: Source, tell: Callable[[str], None] = lambda text: None) -> S
     return _served(bundle, source.server, source, tell)
 
 
+def deployment_of(file: Path) -> Deployment:
+    """Where a file's supervisor says that it is to stand; a model may stand anywhere, and is taken for a controller.
+
+    Raises:
+        NoSupervisorError: A supervisor's file cannot be read.
+    """
+    if file.suffix != SUPERVISOR_SUFFIX:
+        return Deployment.CONTROLLER
+    try:
+        return decode(_bytes(file)).deployment
+    except RoboscError as error:
+        raise NoSupervisorError(f"{file}: {error}") from error
+
+
 def _read(source: Source, tell: Callable[[str], None]) -> Supervisor:
     """The supervisor of a file, by its signature or by its model."""
     file, data = source.file, _bytes(source.file)

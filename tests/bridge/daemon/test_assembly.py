@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from robosc.execution.event_log import NullLog
+from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor, make_supervisor
 from robosc_bridge.configuration import parse, tie
 from robosc_bridge.daemon.assembly import AssemblyError, Machine, assemble, check_settings
@@ -48,7 +49,7 @@ def test_what_needs_a_remote_face_is_refused_without_one(
 ) -> None:
     configuration = parse(CONFIGURATION.replace(*change).encode(), "test.yaml").configuration
     with pytest.raises(AssemblyError) as raised:
-        check_settings(configuration, tie(supervisor.model, configuration))
+        check_settings(configuration, tie(supervisor.model, configuration), Deployment.CONTROLLER)
     assert why in str(raised.value)
 
 

@@ -138,7 +138,7 @@ class VirtualThread:
 
 for module in (dynamixel, opencr, lidar):
     module.SerialLine = VirtualLine  # type: ignore[attr-defined]
-assembly.DeviceThread = VirtualThread  # type: ignore[assignment,attr-defined,misc]
+assembly.DeviceThread = VirtualThread  # type: ignore[assignment,attr-defined]
 
 
 def _virtual(thread: object) -> VirtualThread:

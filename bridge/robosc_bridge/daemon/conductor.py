@@ -65,6 +65,7 @@ class Conductor:
         self._after_stop = State.STANDBY
         self._is_drive_lost = False
         self._failed_turn = ""
+        self._missing = ""
         self._hurry: Callable[[], None] = lambda: None
         self._reset_drive: Callable[[], None] = lambda: None
         self._are_alive: Callable[[], bool] = lambda: True
@@ -325,7 +326,11 @@ class Conductor:
 
     def _look_for_devices(self) -> bool:
         """Leave the start once all devices are there; whether it does now."""
-        are_there = self.state is State.STARTING and not self._readiness.missing()
+        missing = self._readiness.missing() if self.state is State.STARTING else ""
+        if missing and missing != self._missing:
+            _log.info("waiting: %s", missing)
+        self._missing = missing
+        are_there = self.state is State.STARTING and not missing
         if are_there:
             self.state = State.STANDBY
             _log.info("standby")

@@ -23,7 +23,7 @@ from robosc_bridge.daemon.program_inbox import ProgramInbox
 from robosc_bridge.daemon.programs import FromProgram
 from robosc_bridge.daemon.programs_side import ProgramsSide
 from robosc_bridge.daemon.readiness import Readiness
-from robosc_bridge.daemon.reports import DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice
+from robosc_bridge.daemon.reports import DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice, Sighting
 from robosc_bridge.daemon.requesters import Requesters
 from robosc_bridge.daemon.robot import Robot
 from robosc_bridge.daemon.roster import Roster
@@ -85,7 +85,7 @@ class Daemon:
         self._inbox: queue.SimpleQueue[Item] = queue.SimpleQueue()
         self._from_programs = ProgramInbox(lambda: self._inbox.put(_Woken()))
         self._orders = Orders()
-        self._readiness = Readiness(needs_scanner=job.needs_scanner)
+        self._readiness = Readiness(needs_scanner=job.needs_scanner, needs_camera=job.needs_camera)
         self._conductor = conductor = Conductor(job, safety, self._readiness, self._orders, clock)
         listeners, roster = Listeners(job.ties), Roster()
         exchange = Exchange(job.ties, listeners, roster)
@@ -215,6 +215,9 @@ class Daemon:
                 self._readiness.scan = item
                 if executor is not None:
                     self._robot.saw_scan(item, executor)
+            case Sighting():
+                if executor is not None:
+                    self._robot.saw_line(item, executor)
             case DeviceUp(device):
                 self._conductor.device_came(device)
             case DeviceDown():

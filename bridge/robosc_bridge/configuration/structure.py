@@ -1,7 +1,7 @@
 """What a configuration says: frozen structures that checks, JSON schema and documentation are made from."""
 
 import json
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import msgspec
 from msgspec import Meta, Struct
@@ -21,6 +21,21 @@ _Option = bool | int | float | str
 
 class _Section(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What all sections have."""
+
+
+TurtleBot = Literal["burger", "waffle", "waffle_pi"]
+TURTLEBOTS: tuple[str, ...] = get_args(TurtleBot)
+"""The robots whose numbers the bridge knows."""
+
+
+class Body(_Section, frozen=True):
+    """A robot of one's own, for a drive that needs to know no more of it."""
+
+    wheel_separation_m: Annotated[
+        float, Meta(gt=0, le=5, description="Between its left and its right wheels, in metres.")
+    ]
+    linear_m_s: Annotated[float, Meta(gt=0, le=5, description="Fastest forward and backward, in m/s.")]
+    angular_rad_s: Annotated[float, Meta(gt=0, le=20, description="Fastest turn, in rad/s.")]
 
 
 class Drive(_Section, frozen=True):
@@ -164,6 +179,16 @@ class SupervisorSource(_Section, frozen=True):
         _Address | None,
         Meta(description="HOST:PORT of the synthesis server; null: none is asked."),
     ] = None
+    ca: Annotated[
+        _Text | None, Meta(description="File with certificates (PEM) that are believed there; null: without TLS.")
+    ] = None
+    certificate: Annotated[_Text | None, Meta(description="File with the bridge's own certificate chain (PEM).")] = None
+    key: Annotated[_Text | None, Meta(description="File with its private key (PEM).")] = None
+    token_file: Annotated[_Text | None, Meta(description="File with the bridge's token for the server.")] = None
+    trusted_keys: Annotated[
+        tuple[_Text, ...],
+        Meta(description="Whose signatures are believed: public keys (`ssh-ed25519 AAAA...`), or files with them."),
+    ] = ()
 
 
 class Log(_Section, frozen=True):
@@ -175,7 +200,7 @@ class Log(_Section, frozen=True):
 class Configuration(_Section, frozen=True):
     """A robot and what the communications of a model are tied to."""
 
-    robot: Annotated[Literal["burger", "waffle", "waffle_pi"], Meta(description="The TurtleBot3.")]
+    robot: Annotated[TurtleBot | Body, Meta(description="The TurtleBot3, or the body of another robot.")]
     drive: Annotated[Drive, Meta(description="The drive base.")]
     scanner: Annotated[Scanner | None, Meta(description="The LiDAR; null: there is none.")] = None
     execution: Annotated[Execution, Meta(description="How the supervisor is executed.")] = Execution()

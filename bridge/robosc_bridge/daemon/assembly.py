@@ -9,6 +9,7 @@ import msgspec
 
 from robosc.execution.clock import SystemClock
 from robosc.execution.event_log import EventLog
+from robosc.execution.runner import DeploymentError
 from robosc.execution.settings import Settings, SettingsError, require_settings_of
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
@@ -33,7 +34,8 @@ from robosc_bridge.daemon.states import Command
 from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
 from robosc_bridge.devices.interface import DriveBase, RangeScanner
 from robosc_bridge.devices.registry import make_drive_base, make_range_scanner
-from robosc_bridge.devices.robots import ROBOTS
+from robosc_bridge.devices.robots import ROBOTS, Body, Robot
+from robosc_bridge.drivers import facts_of
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.remote import settings_of
 from robosc_bridge.safety import SafetyLayer, SafetyLimits
@@ -64,10 +66,10 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
     Raises:
         AssemblyError: They do not go together.
     """
-    robot, chosen = ROBOTS[configuration.robot], configuration.safety
+    robot, chosen = _robot(configuration), configuration.safety
     if configuration.execution.period_s > LONGEST_PERIOD_S:
         raise AssemblyError(f"execution.period_s may be {LONGEST_PERIOD_S:g} at most")
-    can = robot.limits(robot.motor.velocity_limit_raw)
+    can = robot.limits if isinstance(robot, Body) else robot.limits(robot.motor.velocity_limit_raw)
     linear = chosen.linear_acceleration_m_s2
     angular = chosen.angular_acceleration_rad_s2
     try:
@@ -92,20 +94,36 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
         raise AssemblyError(f"safety: {error}") from error
 
 
-def check_settings(configuration: Configuration, ties: Ties) -> Settings:
+def check_settings(configuration: Configuration, ties: Ties, deployment: Deployment) -> Settings:
     """The executor's settings; whatever else `assemble` would refuse is found as well, but for the devices.
+
+    Args:
+        configuration: Of the robot.
+        ties: What the model's communications are tied to.
+        deployment: Where the supervisor stands.
 
     Raises:
         AssemblyError: Something does not fit; says what.
     """
     _require_served(configuration, ties)
+    if deployment is Deployment.LAYER and not is_remote(configuration):
+        raise AssemblyError("a supervision layer needs 'remote.grpc_address' or 'remote.mavlink_url' for who asks it")
     safety_limits(configuration)
     settings = ties.settings(configuration.execution)
     try:
-        require_settings_of(settings, str(Deployment.CONTROLLER))
+        require_settings_of(settings, str(deployment))
     except SettingsError as error:
         raise AssemblyError(f"execution: {error}") from error
     return settings
+
+
+def _robot(configuration: Configuration) -> Robot | Body:
+    """The robot, as its drive needs it."""
+    chosen, facts = configuration.robot, facts_of(configuration.drive.driver)
+    if isinstance(chosen, str):
+        known = ROBOTS[chosen]
+        return known if facts is not None and facts.needs_turtlebot3 else known.body
+    return Body(chosen.linear_m_s, chosen.angular_rad_s, chosen.wheel_separation_m)
 
 
 def drive_base(configuration: Configuration) -> DriveBase:
@@ -117,9 +135,7 @@ def drive_base(configuration: Configuration) -> DriveBase:
     """
     drive = configuration.drive
     try:
-        return make_drive_base(
-            drive.driver, **{"path": drive.port, "robot": ROBOTS[configuration.robot], **drive.options}
-        )
+        return make_drive_base(drive.driver, **{"path": drive.port, "robot": _robot(configuration), **drive.options})
     except (TypeError, ValueError) as error:
         raise AssemblyError(f"driver '{drive.driver}': {error}") from error
 
@@ -205,24 +221,39 @@ def _require_served(configuration: Configuration, ties: Ties) -> None:
 
 
 def assemble(
-    configuration: Configuration, ties: Ties, supervisor: Supervisor, log: EventLog, *, starts_itself: bool
+    configuration: Configuration,
+    ties: Ties,
+    supervisor: Supervisor,
+    log: EventLog,
+    deployment: Deployment = Deployment.CONTROLLER,
+    *,
+    starts_itself: bool,
 ) -> Machine:
     """Make everything; nothing is opened yet.
 
+    Args:
+        configuration: Of the robot.
+        ties: What the model's communications are tied to.
+        supervisor: What is executed.
+        log: Where its events are written.
+        deployment: Where it stands: it decides itself, or lets requests of programs through.
+        starts_itself: Whether it starts as soon as the devices are there.
+
     Raises:
-        AssemblyError: A device or number does not fit, or the supervisor is for a supervision layer.
+        AssemblyError: A device or number does not fit, or the supervisor stands elsewhere.
         UnknownDriverError: There is no such driver.
     """
-    if supervisor.deployment is not Deployment.CONTROLLER:
-        raise AssemblyError("the supervisor is for a supervision layer; the bridge runs controllers")
-    settings = check_settings(configuration, ties)
+    settings = check_settings(configuration, ties, deployment)
     if not starts_itself and not is_remote(configuration):
         raise AssemblyError("to wait in standby, the bridge needs 'remote.grpc_address' or 'remote.mavlink_url'")
     clock = SystemClock()
     limits = safety_limits(configuration)
     safety = SafetyLayer(limits)
     # Who can be reached can be told to start again.
-    job = Job(supervisor, ties, settings, configuration.scanner is not None, starts_itself, is_remote(configuration))
+    is_layer = deployment is Deployment.LAYER
+    job = Job(
+        supervisor, ties, settings, configuration.scanner is not None, starts_itself, is_remote(configuration), is_layer
+    )
     rotate = configuration.skills.rotate
     # A turn has a time limit, which goes by its speed.
     speed_rad_s = min(rotate.speed_rad_s, limits.angular_rad_s)
@@ -230,7 +261,10 @@ def assemble(
     rotate = msgspec.structs.replace(rotate, speed_rad_s=speed_rad_s, slowest_rad_s=slowest_rad_s)
     stop = EmergencyStop(configuration.skills.emergency_stop)
     feed = Feed()
-    daemon = Daemon(job, safety, Rotate(rotate), stop, clock, log, feed)
+    try:
+        daemon = Daemon(job, safety, Rotate(rotate), stop, clock, log, feed)
+    except (DeploymentError, SettingsError) as error:
+        raise AssemblyError(str(error)) from error
     worker = DriveWorker(drive_base(configuration), safety, daemon.post, EXCHANGE_S, clock.monotonic)
     drive = DeviceThread(worker, clock.monotonic)
     scanner = None
@@ -246,6 +280,6 @@ def assemble(
         scanner = DeviceThread(listener, clock.monotonic)
     daemon.connect(drive.hurry, worker.reset, lambda: drive.is_alive and (scanner is None or scanner.is_alive))
     operations = Operations(
-        supervisor.model, ties, feed, daemon.post, lambda: safety.operator_seen(clock.monotonic()), is_layer=False
+        supervisor.model, ties, feed, daemon.post, lambda: safety.operator_seen(clock.monotonic()), is_layer=is_layer
     )
     return Machine(daemon, drive, scanner, operations)

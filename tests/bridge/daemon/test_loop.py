@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from robosc_bridge.daemon.loop import STOP_LIMIT_S, Key
+from robosc_bridge.daemon.conductor import STOP_LIMIT_S
+from robosc_bridge.daemon.loop import Key
 from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, SafetyNotice
 from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.devices.interface import STANDSTILL, Velocity

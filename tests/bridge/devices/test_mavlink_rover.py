@@ -21,9 +21,10 @@ from robosc_bridge.devices.interface import (
     Scan,
     Velocity,
 )
-from robosc_bridge.devices.mavlink_rover import MavlinkRover, RoverBody
+from robosc_bridge.devices.mavlink_rover import MavlinkRover
 from robosc_bridge.devices.mavlink_signing import Signing
 from robosc_bridge.devices.registry import make_drive_base, make_range_scanner
+from robosc_bridge.devices.robots import Body
 from robosc_bridge.errors import (
     DeviceError,
     DeviceFaultError,
@@ -38,7 +39,7 @@ from robosc_bridge.simulated import BODIES, DatagramLine, Rover, SimulatedLine, 
 from robosc_bridge.simulated.rover import AUTO, GUIDED, HOLD, MANUAL
 from support.wire import wait_until
 
-BODY = RoverBody(0.5, 2.0, BODIES["burger"].wheel_separation_m)
+BODY = Body(0.5, 2.0, BODIES["burger"].wheel_separation_m)
 FORWARD = Velocity(0.2)
 POSE = (0.3, 0.2, 0.7)
 KEY = bytes(range(32))
@@ -519,7 +520,7 @@ def test_nothing_is_left_behind(any_bench: Bench) -> None:
 @pytest.mark.parametrize("values", [(0.0, 1.0, 0.3), (0.5, math.nan, 0.3), (0.5, 1.0, -1.0)])
 def test_a_body_needs_numbers(values: tuple[float, float, float]) -> None:
     with pytest.raises(ValueError, match="must be a positive number"):
-        RoverBody(*values)
+        Body(*values)
 
 
 # Signing.

@@ -1,6 +1,7 @@
 """`robosc-bridge`: run a supervisor on a robot's devices, and what is needed before that."""
 
 import argparse
+import dataclasses
 import json
 import logging
 import signal
@@ -15,16 +16,26 @@ from robosc.errors import LanguageError, RoboscError
 from robosc.execution.event_log import EventLog, NullLog, open_event_log
 from robosc.language import load_bundle
 from robosc.model import check
+from robosc.model.layers import layer_findings
 from robosc.model.structure import Deployment, Model
 from robosc_bridge.configuration import init, load, schema, tie
-from robosc_bridge.configuration.template import DriveDriver, Robot, ScannerDriver
+from robosc_bridge.configuration.structure import TURTLEBOTS
+from robosc_bridge.configuration.template import DriveDriver, ScannerDriver
 from robosc_bridge.daemon.assembly import assemble, check_settings, safety_limits
 from robosc_bridge.daemon.faces import make_faces
 from robosc_bridge.daemon.keyboard import Keyboard
 from robosc_bridge.daemon.loop import Key
-from robosc_bridge.daemon.supervisors import MODEL_SUFFIX, NoSupervisorError, Source, obtain
-from robosc_bridge.devices.registry import Kind, available_drivers
+from robosc_bridge.daemon.supervisors import (
+    MODEL_SUFFIX,
+    NoSupervisorError,
+    Source,
+    deployment_of,
+    obtain,
+    trusted_keys,
+)
+from robosc_bridge.drivers import Kind, available_drivers
 from robosc_bridge.errors import BridgeError
+from robosc_bridge.terminal.commands import add_commands
 
 OK, FAULT, WRONG_USE = 0, 1, 2
 
@@ -51,8 +62,11 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     run = commands.add_parser("run", help="execute a supervisor on a robot's devices", epilog=_EPILOG)
-    _model_argument(run, "the model (.rscd), or a supervisor (.rsup) with its model beside it, called alike")
+    _model_argument(
+        run, "the model (.rscd), or a supervisor (.rsup): signed, or with its model beside it, called alike"
+    )
     _configuration_argument(run)
+    _deployment_argument(run)
     run.add_argument("--server", metavar="HOST:PORT", help="a synthesis server that makes the supervisor of the model")
     run.add_argument("--keep", metavar="FOLDER", type=Path, help="folder for what the server made last")
     run.add_argument(
@@ -64,11 +78,12 @@ def _parser() -> argparse.ArgumentParser:
     checked = commands.add_parser("check", help="check a configuration against a model", epilog=_EPILOG)
     _model_argument(checked, "the model (.rscd)")
     _configuration_argument(checked)
+    _deployment_argument(checked)
     checked.set_defaults(run=_check)
 
     first = commands.add_parser("init", help="write a first configuration for a robot and a model", epilog=_EPILOG)
     _model_argument(first, "the model (.rscd)")
-    first.add_argument("--robot", choices=get_args(Robot), default="burger")
+    first.add_argument("--robot", choices=TURTLEBOTS, default="burger")
     first.add_argument("--drive", choices=get_args(DriveDriver), default="opencr")
     first.add_argument("--scanner", choices=get_args(ScannerDriver), default="lds02")
     first.add_argument("-o", "--output", metavar="FILE", type=Path, help="where to; standard output if it is left out")
@@ -80,6 +95,7 @@ def _parser() -> argparse.ArgumentParser:
     drivers = commands.add_parser("drivers", help="list the drivers of drive bases and range scanners")
     drivers.add_argument("--json", action="store_true", help="for programs")
     drivers.set_defaults(run=_drivers)
+    add_commands(commands)
     return parser
 
 
@@ -87,11 +103,20 @@ def _model_argument(parser: argparse.ArgumentParser, text: str) -> None:
     parser.add_argument("--model", metavar="FILE", type=Path, required=True, help=text)
 
 
+def _deployment_argument(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--deployment",
+        type=Deployment,
+        choices=tuple(Deployment),
+        help="controller, or layer before programs that ask for things; else what a .rsup says, or controller",
+    )
+
+
 def _configuration_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--config", metavar="FILE", type=Path, required=True, help="the configuration (YAML)")
 
 
-def _model(file: Path) -> Model:
+def _model(file: Path, deployment: Deployment = Deployment.CONTROLLER) -> Model:
     """The checked model of a file."""
     if file.suffix != MODEL_SUFFIX:
         raise NoSupervisorError(f"{file}: not a model ({MODEL_SUFFIX})")
@@ -99,6 +124,10 @@ def _model(file: Path) -> Model:
         checked = check(load_bundle(file))
     except LanguageError as error:
         raise NoSupervisorError("\n".join(map(str, error.diagnostics))) from error
+    if checked.model is not None and checked.places is not None and deployment is Deployment.LAYER:
+        ambiguous = layer_findings(checked.model, checked.places)
+        if ambiguous:
+            raise NoSupervisorError("\n".join(map(str, ambiguous)))
     if checked.model is None:
         raise NoSupervisorError("\n".join(map(str, checked.diagnostics)) or f"{file}: a library has no robot")
     return checked.model
@@ -106,8 +135,10 @@ def _model(file: Path) -> Model:
 
 def _check(arguments: argparse.Namespace) -> int:
     loaded = load(arguments.config)
-    ties = tie(_model(arguments.model), loaded.configuration, loaded.document)
-    check_settings(loaded.configuration, ties)
+    deployment = arguments.deployment or Deployment.CONTROLLER
+    ties = tie(_model(arguments.model, deployment), loaded.configuration, loaded.document)
+    check_settings(loaded.configuration, ties, deployment)
+    trusted_keys(loaded.configuration.supervisor.trusted_keys)
     sys.stdout.write(f"{arguments.config}: {len(ties.communications)} communications are tied\n")
     return OK
 
@@ -131,7 +162,7 @@ def _schema(arguments: argparse.Namespace) -> int:
 def _drivers(arguments: argparse.Namespace) -> int:
     found = [(kind, info) for kind in Kind for info in available_drivers(kind)]
     if arguments.json:
-        items = [{"kind": str(kind), "name": info.name, "description": info.description} for kind, info in found]
+        items = [{"kind": str(kind), **dataclasses.asdict(info)} for kind, info in found]
         sys.stdout.write(json.dumps(items, indent=2) + "\n")
     else:
         for kind, info in found:
@@ -149,13 +180,15 @@ def _run(arguments: argparse.Namespace) -> int:
     loaded = load(arguments.config)
     configuration = loaded.configuration
     server = arguments.server or configuration.supervisor.server
-    supervisor = obtain(Source(arguments.model, Deployment.CONTROLLER, server, arguments.keep), tell)
+    deployment = arguments.deployment or deployment_of(arguments.model)
+    trusted = trusted_keys(configuration.supervisor.trusted_keys)
+    supervisor = obtain(Source(arguments.model, deployment, server, arguments.keep, trusted), tell)
     ties = tie(supervisor.model, configuration, loaded.document)
     log: EventLog = NullLog()
     if configuration.log.folder is not None:
         log = open_event_log(configuration.log.folder, supervisor.model.name, time.time())
     try:
-        machine = assemble(configuration, ties, supervisor, log, starts_itself=not arguments.standby)
+        machine = assemble(configuration, ties, supervisor, log, deployment, starts_itself=not arguments.standby)
         faces = make_faces(configuration, machine.operations, safety_limits(configuration))
         for number in _SIGNALS:
             signal.signal(number, lambda *_: machine.quit())

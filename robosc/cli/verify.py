@@ -15,11 +15,14 @@ from robosc.cli.output import (
     print_diagnostics,
     print_json,
 )
+from robosc.cli.sign import read_supervisor, signer_of
 from robosc.errors import InvalidSupervisorError
 from robosc.model.structure import Deployment
+from robosc.signatures import SignatureError
 from robosc.source import visible
 
 if TYPE_CHECKING:
+    from robosc.signatures import PublicKey
     from robosc.supervisor.recheck import Fault, Recheck
     from robosc.supervisor.structure import Supervisor
 
@@ -27,12 +30,14 @@ FOREIGN_STATES = 1_000_000
 """States up to which a foreign supervisor is searched one by one: a minute or so at most."""
 
 _USAGE = """robosc verify [options] FILE.rsup MODEL
-       robosc verify [options] [FILE.rsup] MODEL --property PROPERTY"""
+       robosc verify [options] [FILE.rsup] MODEL --property PROPERTY
+       robosc verify FILE.rsup --signed-by FILE.pub"""
 
 _DESCRIPTION = """\
 With FILE.rsup: check a supervisor file against the texts of its model, believing nothing that the file says of itself:
 it must hold the model of the texts, its figures must be right, and the robot under it must be safe, controllable and
 nonblocking. That it forbids no more than it must is checked for systems of moderate size.
+With --signed-by: the file must be signed by that key, too; without MODEL, nothing else is checked.
 With properties: verify them in the robot under its supervisor, which is synthesized unless a file is given and passes,
 with a run that shows why each of them holds or fails.
 """
@@ -59,6 +64,15 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     )
     add_verify_limit_argument(parser, "--limit", FOREIGN_STATES)
     parser.add_argument("--strict", action="store_true", help="permissiveness must have been checked, too")
+    parser.add_argument(
+        "--signed-by",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="FILE.pub",
+        help="the supervisor file must be signed by a key of this file (may be repeated); without MODEL, that alone is "
+        "checked",
+    )
     parser.add_argument("-q", "--quiet", action="store_true", help="print what is wrong and nothing else")
     add_engine_options(parser)
     parser.set_defaults(run=run)
@@ -72,6 +86,8 @@ def run(arguments: argparse.Namespace) -> int:
     """
     has_properties = bool(arguments.property or arguments.properties)
     if arguments.supervisor is None and arguments.model.suffix == ".rsup":
+        if arguments.signed_by and not has_properties:
+            return _verify_signature(arguments)
         raise UsageError(f"{arguments.model} is a supervisor file: verify needs its model, too")
     if arguments.supervisor is not None:
         if not has_properties and (arguments.reorder or arguments.max_nodes):
@@ -82,8 +98,8 @@ def run(arguments: argparse.Namespace) -> int:
             "verify needs a supervisor file and its model (robosc verify FILE.rsup MODEL), "
             "or properties (robosc verify MODEL --property PROPERTY)"
         )
-    if arguments.strict or arguments.limit != FOREIGN_STATES:
-        raise UsageError("--limit and --strict say how to check a supervisor file: they need FILE.rsup")
+    if arguments.strict or arguments.limit != FOREIGN_STATES or arguments.signed_by:
+        raise UsageError("--limit, --strict and --signed-by say how to check a supervisor file: they need FILE.rsup")
     arguments.deployment = arguments.deployment or str(Deployment.CONTROLLER)
     return properties.run(arguments)
 
@@ -95,11 +111,13 @@ def _verify_supervisor(arguments: argparse.Namespace) -> int:
     from robosc.verification import Limits
 
     engine = resolve_engine(arguments.engine)
-    content = _read(arguments.supervisor)
+    content = read_supervisor(arguments.supervisor)
     bundle = read_bundle(arguments)
     try:
+        if arguments.signed_by:
+            _tell_signer(arguments, signer_of(arguments.supervisor, content, arguments.signed_by))
         supervisor = decode(content)
-    except InvalidSupervisorError as error:
+    except (InvalidSupervisorError, SignatureError) as error:
         return _report_malformed(arguments, error)
     progress = ProgressLine()
     try:
@@ -128,18 +146,33 @@ def _verify_supervisor(arguments: argparse.Namespace) -> int:
     return ExitCode.OK if has_passed else ExitCode.FAILED
 
 
-def _read(path: Path) -> bytes:
-    from robosc.supervisor.codec import MAXIMUM_BYTES
+def _verify_signature(arguments: argparse.Namespace) -> int:
+    """Whether a file alone is signed; its model is not looked at."""
+    from robosc.supervisor.codec import decode
 
+    arguments.supervisor = arguments.model
+    content = read_supervisor(arguments.supervisor)
     try:
-        with path.open("rb") as file:
-            # One byte more than is allowed tells that there are too many; a device could go on for ever.
-            return file.read(MAXIMUM_BYTES + 1)
-    except OSError as error:
-        raise UsageError(f"cannot read {path}: {error.strerror or error}") from error
+        key = signer_of(arguments.supervisor, content, arguments.signed_by)
+        supervisor = decode(content)
+        if arguments.deployment not in (None, str(supervisor.deployment)):
+            raise SignatureError(f"made for the deployment {supervisor.deployment}, not {arguments.deployment}")
+    except (InvalidSupervisorError, SignatureError) as error:
+        return _report_malformed(arguments, error)
+    if arguments.json:
+        print_json({"status": "signed", "model": supervisor.model.name, "deployment": str(supervisor.deployment),
+                    "signed_by": key.fingerprint})  # fmt: skip
+    else:
+        _tell_signer(arguments, key)
+    return ExitCode.OK
 
 
-def _report_malformed(arguments: argparse.Namespace, error: InvalidSupervisorError) -> ExitCode:
+def _tell_signer(arguments: argparse.Namespace, key: "PublicKey") -> None:
+    if not arguments.quiet and not arguments.json:
+        sys.stdout.write(visible(f"{arguments.supervisor}: signed by {key}") + "\n")
+
+
+def _report_malformed(arguments: argparse.Namespace, error: InvalidSupervisorError | SignatureError) -> ExitCode:
     if arguments.json:
         print_json({"status": "failed", "reason": str(error)})
     else:

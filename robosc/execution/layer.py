@@ -158,6 +158,17 @@ class Layer(Runner):
         finally:
             request_cancel(self._robot, goal)
 
+    @guarded
+    def on_silent(self, identifier: str) -> None:
+        """The existing controller is known to be gone from an identifier: its last message there is released now.
+
+        Args:
+            identifier: Where it sent messages; where none of them acts, nothing happens.
+        """
+        self._look_at_clock()
+        if self._releases.is_acting(identifier):
+            self._steps.release(identifier)
+
     # What comes from the robot, and time.
 
     def receive(self, identifier: str, data: Any) -> None:

@@ -1,15 +1,19 @@
 """A daemon turn by turn, on a clock that the test sets, with devices that the test plays."""
 
+import functools
 import math
+from collections.abc import Callable
 from typing import Any
 
 from robosc.execution.clock import ManualClock
 from robosc.execution.event_log import MemoryLog
-from robosc.supervisor import make_supervisor
+from robosc.model.structure import Deployment
+from robosc.supervisor import Supervisor, make_supervisor
 from robosc_bridge.configuration import parse, tie
 from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.jobs import Job
 from robosc_bridge.daemon.loop import Daemon
+from robosc_bridge.daemon.programs import Attached, Detached, FromProgram, Program, ToProgram
 from robosc_bridge.daemon.reports import Device, DeviceUp, ResetDone
 from robosc_bridge.devices.interface import BINS, STANDSTILL, DriveReading, Pose, RawScan, Scan
 from robosc_bridge.safety import SafetyLayer, SafetyLimits
@@ -79,18 +83,36 @@ LIMITS = SafetyLimits(
 PERIOD_S = 0.02
 
 
+@functools.cache
+def supervisor_of(text: str, deployment: Deployment = Deployment.CONTROLLER) -> Supervisor:
+    """The supervisor of a model's text."""
+    made = make_supervisor(bundle_of(text), deployment=deployment)
+    assert made.supervisor is not None, (made.reason, made.diagnostics)
+    return made.supervisor
+
+
 class Scene:
     """A daemon, and devices that a test plays."""
 
-    def __init__(self, *, starts_itself: bool = True, stays: bool = False, text: str = CONFIGURATION) -> None:
-        made = make_supervisor(bundle_of(MODEL))
-        assert made.supervisor is not None, made.reason
+    def __init__(
+        self,
+        *,
+        starts_itself: bool = True,
+        stays: bool = False,
+        text: str = CONFIGURATION,
+        model: str = MODEL,
+        is_layer: bool = False,
+        needs_scanner: bool = True,
+    ) -> None:
+        supervisor = supervisor_of(model, Deployment.LAYER if is_layer else Deployment.CONTROLLER)
         configuration = parse(text.encode(), "test.yaml").configuration
-        ties = tie(made.supervisor.model, configuration)
+        ties = tie(supervisor.model, configuration)
         self.clock = ManualClock(now_s=50.0)
         self.log = MemoryLog()
         self.safety = SafetyLayer(LIMITS)
-        job = Job(made.supervisor, ties, ties.settings(configuration.execution), True, starts_itself, stays)
+        job = Job(
+            supervisor, ties, ties.settings(configuration.execution), needs_scanner, starts_itself, stays, is_layer
+        )
         stop = EmergencyStop(configuration.skills.emergency_stop)
         self.feed = Feed()
         self.daemon = Daemon(
@@ -150,3 +172,40 @@ class Scene:
 
     def component(self, name: str) -> Any:
         return self.log.entries[-1]["state"][name]
+
+
+class Connected:
+    """A program that notes what it is told.
+
+    Args:
+        scene: With the daemon that it is connected to.
+        name: Its name.
+        serves: What of the model it answers.
+        may_request: Whether it may be the caller of a layer.
+    """
+
+    def __init__(self, scene: Scene, name: str, serves: tuple[str, ...] = (), *, may_request: bool = True) -> None:
+        self.scene = scene
+        self.told: list[ToProgram] = []
+        self.program = Program(name, self.told.append, frozenset(serves), may_request)
+        scene.daemon.post(Attached(self.program))
+
+    def say(self, make: Callable[..., FromProgram], *arguments: Any) -> list[ToProgram]:
+        """Tell the daemon something: what the program is told in the same turn."""
+        self.scene.daemon.post(make(self.program, *arguments))
+        return self.turn()
+
+    def turn(self) -> list[ToProgram]:
+        """What it is told in a turn of the loop."""
+        self.told.clear()
+        self.scene.daemon.turn()
+        return list(self.told)
+
+    def of[Kind](self, kind: type[Kind]) -> list[Kind]:
+        """Of a kind, among what it was told since its last word."""
+        return [item for item in self.told if isinstance(item, kind)]
+
+    def leave(self) -> None:
+        """The connection ends."""
+        self.scene.daemon.post(Detached(self.program))
+        self.scene.daemon.turn()

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from robosc_bridge.devices.dynamixel import DynamixelBase
 from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, exchange_limit_s
 from robosc_bridge.devices.interface import STANDSTILL, DriveReading, Velocity
-from robosc_bridge.devices.mavlink_rover import MavlinkRover, RoverBody
+from robosc_bridge.devices.mavlink_rover import MavlinkRover
 from robosc_bridge.devices.opencr import OpenCrBase
 from robosc_bridge.devices.robots import ROBOTS
 from robosc_bridge.simulated import SimulatedTurtleBot3
@@ -137,10 +137,7 @@ def rig(kind: str, robot: str = "burger", answer_limit_s: float = PATIENT_S, **a
         simulated.base_line.device = tap
         base: OpenCrBase | DynamixelBase | MavlinkRover
         if kind == "mavlink-rover":
-            body = ROBOTS[robot]
-            base = MavlinkRover(
-                simulated.base_path, RoverBody(body.linear_m_s, body.angular_rad_s, body.wheel_separation_m)
-            )
+            base = MavlinkRover(simulated.base_path, ROBOTS[robot].body)
         else:
             driver = OpenCrBase if kind == "opencr" else DynamixelBase
             base = driver(simulated.base_path, ROBOTS[robot], answer_limit_s=answer_limit_s)

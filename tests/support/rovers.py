@@ -11,11 +11,12 @@ from robosc_bridge.devices.interface import (
     DriveReading,
     Velocity,
 )
-from robosc_bridge.devices.mavlink_rover import MavlinkRover, RoverBody
+from robosc_bridge.devices.mavlink_rover import MavlinkRover
 from robosc_bridge.devices.registry import make_drive_base
+from robosc_bridge.devices.robots import Body
 from robosc_bridge.simulated import BODIES, DatagramLine, Rover, SimulatedLine, Timebase, World, room
 
-BODY = RoverBody(0.5, 2.0, BODIES["burger"].wheel_separation_m)
+BODY = Body(0.5, 2.0, BODIES["burger"].wheel_separation_m)
 FORWARD = Velocity(0.2)
 POSE = (0.3, 0.2, 0.7)
 KEY = bytes(range(32))

@@ -46,6 +46,8 @@ class _Decoder:
         structures = [item for item in members(plain) if is_struct(item)]
         if len(structures) > 1:
             return self._one_of(structures, given, path)
+        if structures and isinstance(given, Mapping):
+            return self._struct(structures[0], given, path)
         if NoneType in members(plain):
             if given is None:
                 return None

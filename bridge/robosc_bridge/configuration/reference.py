@@ -1,6 +1,7 @@
 """What every key means, from the structures themselves: for the template and the documentation."""
 
 from collections.abc import Iterator
+from types import NoneType
 from typing import Annotated, Any, get_args, get_origin
 
 import msgspec
@@ -53,8 +54,15 @@ def _keys(target: type[msgspec.Struct], before: str) -> Iterator[str]:
             yield f"| `{name}` | {_cell(expected(field.type))} | {_default(default)} | {_cell(summary(field.type))} |"
         else:
             shown_default = "required" if default is msgspec.NODEFAULT else "`null`" if default is None else "its own"
-            yield f"| `{name}` | a section | {shown_default} | {_cell(summary(field.type))} |"
+            value = " or ".join([*_others(field.type), "a section"])
+            yield f"| `{name}` | {_cell(value)} | {shown_default} | {_cell(summary(field.type))} |"
             yield from _keys(inner, f"{name}.")
+
+
+def _others(annotation: Any) -> list[str]:
+    """What a field may hold instead of a section."""
+    plain = get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
+    return [expected(item) for item in members(plain) if item is not NoneType and not is_struct(item)]
 
 
 def _default(default: Any) -> str:

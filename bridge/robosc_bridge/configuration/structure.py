@@ -1,7 +1,7 @@
 """What a configuration says: frozen structures that checks, JSON schema and documentation are made from."""
 
 import json
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import msgspec
 from msgspec import Meta, Struct
@@ -21,6 +21,21 @@ _Option = bool | int | float | str
 
 class _Section(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What all sections have."""
+
+
+TurtleBot = Literal["burger", "waffle", "waffle_pi"]
+TURTLEBOTS: tuple[str, ...] = get_args(TurtleBot)
+"""The robots whose numbers the bridge knows."""
+
+
+class Body(_Section, frozen=True):
+    """A robot of one's own, for a drive that needs to know no more of it."""
+
+    wheel_separation_m: Annotated[
+        float, Meta(gt=0, le=5, description="Between its left and its right wheels, in metres.")
+    ]
+    linear_m_s: Annotated[float, Meta(gt=0, le=5, description="Fastest forward and backward, in m/s.")]
+    angular_rad_s: Annotated[float, Meta(gt=0, le=20, description="Fastest turn, in rad/s.")]
 
 
 class Drive(_Section, frozen=True):
@@ -106,6 +121,21 @@ class Safety(_Section, frozen=True):
     scan_timeout_s: Annotated[
         float, Meta(ge=0.05, le=10, description="Seconds without a full turn of the LiDAR after which they stop.")
     ] = 0.6
+    min_valid_share: Annotated[
+        float,
+        Meta(
+            gt=0,
+            le=1,
+            description="Share of valid ranges, 30° to both sides of where it goes, below which it is blind.",
+        ),
+    ] = 0.05
+    stops_when_blind: Annotated[
+        bool, Meta(description="Whether it may not go where the LiDAR measures nothing; else somebody is warned.")
+    ] = False
+    bad_frames_share: Annotated[
+        float,
+        Meta(gt=0, le=1, description="Share of the LiDAR's frames that are damaged above which somebody is warned."),
+    ] = 0.1
     motor_timeout_s: Annotated[
         float, Meta(ge=0.02, le=10, description="Seconds without an answer of the drive after which it has failed.")
     ] = 0.2
@@ -137,6 +167,20 @@ class Remote(_Section, frozen=True):
         _Address | None,
         Meta(description="HOST:PORT to listen on, such as 127.0.0.1:50061; null: none."),
     ] = None
+    tls_certificate: Annotated[
+        _Text | None, Meta(description="File with the bridge's certificate chain (PEM); null: no TLS, loopback alone.")
+    ] = None
+    tls_key: Annotated[_Text | None, Meta(description="File with its private key (PEM).")] = None
+    client_ca: Annotated[
+        _Text | None,
+        Meta(description="File with certificates (PEM) of those who sign callers' ones; null: callers need none."),
+    ] = None
+    tokens: Annotated[
+        _Text | None, Meta(description="File of tokens, made by `robosc-bridge token`; null: callers need none.")
+    ] = None
+    insecure_beyond_loopback: Annotated[
+        bool, Meta(description="Listen without TLS where other machines reach it, on a network that is trusted.")
+    ] = False
     mavlink_url: Annotated[
         _Text | None,
         Meta(description="Where the ground station is, such as udpout:192.168.1.2:14550; null: none."),
@@ -162,6 +206,10 @@ class SupervisorSource(_Section, frozen=True):
         _Address | None,
         Meta(description="HOST:PORT of the synthesis server; null: none is asked."),
     ] = None
+    trusted_keys: Annotated[
+        tuple[_Text, ...],
+        Meta(description="Whose signatures are believed: public keys (`ssh-ed25519 AAAA...`), or files with them."),
+    ] = ()
 
 
 class Log(_Section, frozen=True):
@@ -173,7 +221,7 @@ class Log(_Section, frozen=True):
 class Configuration(_Section, frozen=True):
     """A robot and what the communications of a model are tied to."""
 
-    robot: Annotated[Literal["burger", "waffle", "waffle_pi"], Meta(description="The TurtleBot3.")]
+    robot: Annotated[TurtleBot | Body, Meta(description="The TurtleBot3, or the body of another robot.")]
     drive: Annotated[Drive, Meta(description="The drive base.")]
     scanner: Annotated[Scanner | None, Meta(description="The LiDAR; null: there is none.")] = None
     execution: Annotated[Execution, Meta(description="How the supervisor is executed.")] = Execution()

@@ -12,10 +12,10 @@ from robosc.model.structure import Communication, CommunicationKind, Model
 from robosc_bridge.configuration import channels as kinds
 from robosc_bridge.configuration.channels import CHANNELS, Channel, channel_name
 from robosc_bridge.configuration.reference import default_of, struct_of, summary
-from robosc_bridge.configuration.structure import Configuration, Safety, Scanner
-from robosc_bridge.configuration.ties import PANEL, why_not
+from robosc_bridge.configuration.structure import Configuration, Safety, Scanner, TurtleBot
+from robosc_bridge.configuration.ties import why_not
+from robosc_bridge.drivers import PANEL, Facts, facts_of
 
-Robot = Literal["burger", "waffle", "waffle_pi"]
 DriveDriver = Literal["opencr", "dynamixel"]
 ScannerDriver = Literal["lds01", "lds02", "lds03"]
 
@@ -36,7 +36,7 @@ _IN, _OUT = CommunicationKind.INCOMING_MESSAGE, CommunicationKind.OUTGOING_MESSA
 _SKILLS = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
 
 
-def init(robot: Robot, drive: DriveDriver, scanner: ScannerDriver, model: Model) -> str:
+def init(robot: TurtleBot, drive: DriveDriver, scanner: ScannerDriver, model: Model) -> str:
     """The text of a configuration, with every setting and what it means.
 
     What cannot be guessed stands there without a value: such a file cannot be loaded, and the error lists it.
@@ -66,9 +66,20 @@ def obvious_channel(model: Model, communication: Communication, drive: str) -> C
     for words, used, channel in _guesses(communication):
         is_meant = communication.kind in used and _last_words(communication.identifier) in words
         if is_meant and not why_not(model, communication, type(channel)):
-            needs_panel = isinstance(channel, kinds.ButtonChannel | kinds.BumperChannel | kinds.ImuChannel)
-            return None if needs_panel and drive != "opencr" else channel
+            return channel if _has(facts_of(drive) or Facts(), channel) else None
     return None
+
+
+def _has(facts: Facts, channel: Channel) -> bool:
+    """Whether a drive has what a channel is about."""
+    match channel:
+        case kinds.ButtonChannel(name=name):
+            return name in facts.buttons
+        case kinds.BumperChannel():
+            return facts.has_bumpers
+        case kinds.ImuChannel():
+            return facts.has_imu
+    return True
 
 
 def _last_words(identifier: str) -> str:

@@ -23,15 +23,8 @@ from robosc_bridge.configuration.channels import (
 from robosc_bridge.configuration.document import Document
 from robosc_bridge.configuration.problems import ConfigurationError, Path, Problem, hint
 from robosc_bridge.configuration.shapes import Shape, Way, misfits
-from robosc_bridge.configuration.structure import Configuration, Execution
-
-PANEL = ("button_1", "button_2", "bumper_1", "bumper_2")
-"""Buttons of an OpenCR board: the bumpers are the one in front and the one behind."""
-
-BUTTONS: dict[str, tuple[str, ...]] = {"opencr": PANEL, "dynamixel": (), "mavlink-rover": ()}
-"""Of the built-in drivers of drive bases; what those of others have, only they know."""
-
-_WITHOUT_IMU = ("dynamixel",)
+from robosc_bridge.configuration.structure import TURTLEBOTS, Body, Configuration, Execution
+from robosc_bridge.drivers import facts_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +122,7 @@ class _Tying:
     def __init__(self, model: Model, configuration: Configuration) -> None:
         self._model = model
         self._configuration = configuration
+        self._facts = facts_of(configuration.drive.driver)
         self.channels: dict[str, Channel] = {}
 
     def problems(self) -> list[tuple[Path, str]]:
@@ -180,16 +174,18 @@ class _Tying:
 
     def _missing_devices(self) -> Iterator[tuple[Path, str]]:
         configuration = self._configuration
-        driver = configuration.drive.driver
+        driver, facts = configuration.drive.driver, self._facts
+        if facts is not None and facts.needs_turtlebot3 and isinstance(configuration.robot, Body):
+            yield ("robot",), f"the drive '{driver}' is that of a TurtleBot3; it must be one of {', '.join(TURTLEBOTS)}"
         for key, channel in configuration.channels.items():
             path = ("channels", key)
             is_scanner = isinstance(channel, ScannerChannel)
             if is_scanner or (isinstance(channel, FaultChannel) and channel.device == "scanner"):
                 if configuration.scanner is None:
                     yield path, "there is no scanner: the section 'scanner' is missing"
-            elif isinstance(channel, ImuChannel) and driver in _WITHOUT_IMU:
+            elif isinstance(channel, ImuChannel) and facts is not None and not facts.has_imu:
                 yield path, f"the drive '{driver}' measures no accelerations and turn rates"
-            elif isinstance(channel, BumperChannel) and not BUTTONS.get(driver, PANEL):
+            elif isinstance(channel, BumperChannel) and facts is not None and not facts.has_bumpers:
                 yield path, f"the drive '{driver}' has no bumpers"
             elif isinstance(channel, ButtonChannel):
                 yield from self._missing_buttons((*path, "name"), (channel.name,))
@@ -199,10 +195,9 @@ class _Tying:
 
     def _missing_buttons(self, path: Path, names: Iterable[str]) -> Iterator[tuple[Path, str]]:
         driver = self._configuration.drive.driver
-        there = BUTTONS.get(driver)
         for name in names:
-            if there is not None and name not in there:
-                yield path, f"the drive '{driver}' has no button '{name}'; {hint(name, there)}"
+            if self._facts is not None and name not in self._facts.buttons:
+                yield path, f"the drive '{driver}' has no button '{name}'; {hint(name, self._facts.buttons)}"
 
     def _unknown_names(self) -> Iterator[tuple[Path, str]]:
         """Settings of the executor that name what the model does not have."""

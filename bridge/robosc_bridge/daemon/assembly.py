@@ -9,17 +9,12 @@ import msgspec
 
 from robosc.execution.clock import SystemClock
 from robosc.execution.event_log import EventLog
+from robosc.execution.runner import DeploymentError
 from robosc.execution.settings import Settings, SettingsError, require_settings_of
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
-from robosc_bridge.configuration.channels import (
-    Channel,
-    FaultChannel,
-    GrpcChannel,
-    LineChannel,
-    LineLostChannel,
-    channel_name,
-)
+from robosc_api.security import SecurityError, check_listening
+from robosc_bridge.configuration.channels import GrpcChannel
 from robosc_bridge.configuration.structure import Configuration, Scanner
 from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.device_thread import DeviceThread
@@ -28,13 +23,16 @@ from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.jobs import Job
 from robosc_bridge.daemon.loop import Daemon
 from robosc_bridge.daemon.operations import Operations
+from robosc_bridge.daemon.sight import camera_worker, needs_camera, sight_problems
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
 from robosc_bridge.devices.interface import DriveBase, RangeScanner, Velocity
 from robosc_bridge.devices.registry import make_drive_base, make_range_scanner
-from robosc_bridge.devices.robots import ROBOTS
+from robosc_bridge.devices.robots import ROBOTS, Body, Robot
+from robosc_bridge.drivers import facts_of
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.ground import ground_settings
+from robosc_bridge.remote import settings_of
 from robosc_bridge.safety import SafetyLayer, SafetyLimits
 from robosc_bridge.skills import EmergencyStop, Rotate
 
@@ -49,8 +47,6 @@ LONGEST_PERIOD_S = 0.9
 
 # Longer than anything that a device's thread does at once, such as calibrating a gyroscope.
 _THREAD_LIMIT_S = 10.0
-_NOT_SERVED: tuple[type[Channel], ...] = (LineChannel, LineLostChannel)
-_FACES_NOT_SERVED = ("grpc_address",)
 
 
 class AssemblyError(BridgeError):
@@ -63,10 +59,10 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
     Raises:
         AssemblyError: They do not go together.
     """
-    robot, chosen = ROBOTS[configuration.robot], configuration.safety
+    robot, chosen = _robot(configuration), configuration.safety
     if configuration.execution.period_s > LONGEST_PERIOD_S:
         raise AssemblyError(f"execution.period_s may be {LONGEST_PERIOD_S:g} at most")
-    can = robot.limits(robot.motor.velocity_limit_raw)
+    can = robot.limits if isinstance(robot, Body) else robot.limits(robot.motor.velocity_limit_raw)
     linear = chosen.linear_acceleration_m_s2
     angular = chosen.angular_acceleration_rad_s2
     try:
@@ -86,27 +82,48 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
             operator_timeout_s=chosen.operator_link_timeout_s,
             battery_warn_v=chosen.battery_warning_v,
             battery_stop_v=chosen.battery_stop_v,
+            min_valid_share=chosen.min_valid_share,
+            is_stopped_when_blind=chosen.stops_when_blind,
         )
     except ValueError as error:
         raise AssemblyError(f"safety: {error}") from error
 
 
-def check_settings(configuration: Configuration, ties: Ties) -> Settings:
+def check_settings(configuration: Configuration, ties: Ties, deployment: Deployment) -> Settings:
     """The executor's settings; whatever else `assemble` would refuse is found as well, but for the devices.
+
+    Args:
+        configuration: Of the robot.
+        ties: What the model's communications are tied to.
+        deployment: Where the supervisor stands.
 
     Raises:
         AssemblyError: Something does not fit; says what.
         GroundSettingsError: The ground station cannot be reached as it is said.
     """
-    _require_served(configuration, ties)
+    _require_faces(configuration, ties)
+    if deployment is Deployment.LAYER and not is_remote(configuration):
+        raise AssemblyError("a supervision layer needs 'remote.grpc_address' or 'remote.mavlink_url' for who asks it")
     limits = safety_limits(configuration)
     ground_settings(configuration, Velocity(limits.linear_m_s, limits.angular_rad_s))
     settings = ties.settings(configuration.execution)
+    problems = sight_problems(configuration.skills.line, ties, settings)
+    if problems:
+        raise AssemblyError("; ".join(problems))
     try:
-        require_settings_of(settings, str(Deployment.CONTROLLER))
+        require_settings_of(settings, str(deployment))
     except SettingsError as error:
         raise AssemblyError(f"execution: {error}") from error
     return settings
+
+
+def _robot(configuration: Configuration) -> Robot | Body:
+    """The robot, as its drive needs it."""
+    chosen, facts = configuration.robot, facts_of(configuration.drive.driver)
+    if isinstance(chosen, str):
+        known = ROBOTS[chosen]
+        return known if facts is not None and facts.needs_turtlebot3 else known.body
+    return Body(chosen.linear_m_s, chosen.angular_rad_s, chosen.wheel_separation_m)
 
 
 def drive_base(configuration: Configuration) -> DriveBase:
@@ -118,9 +135,7 @@ def drive_base(configuration: Configuration) -> DriveBase:
     """
     drive = configuration.drive
     try:
-        return make_drive_base(
-            drive.driver, **{"path": drive.port, "robot": ROBOTS[configuration.robot], **drive.options}
-        )
+        return make_drive_base(drive.driver, **{"path": drive.port, "robot": _robot(configuration), **drive.options})
     except (TypeError, ValueError) as error:
         raise AssemblyError(f"driver '{drive.driver}': {error}") from error
 
@@ -141,12 +156,14 @@ class Machine:
         daemon: The loop, run by whoever calls `run`.
         drive: The drive base's thread.
         scanner: The LiDAR's; None: there is none.
+        camera: The camera's; None: nothing is tied to what it shows.
         operations: The daemon as remote faces see it.
     """
 
     daemon: Daemon
     drive: DeviceThread
     scanner: DeviceThread | None
+    camera: DeviceThread | None
     operations: Operations
 
     def run(self, faces: Sequence[Face] = ()) -> bool:
@@ -158,7 +175,7 @@ class Machine:
         Raises:
             BridgeError: A face cannot be started; no device was opened then.
         """
-        threads = [self.drive, *([self.scanner] if self.scanner else [])]
+        threads = [thread for thread in (self.drive, self.scanner, self.camera) if thread]
         with contextlib.ExitStack() as stack:
             for face in faces:
                 stack.callback(face.stop)
@@ -177,47 +194,62 @@ class Machine:
         self.daemon.post(Command.QUIT)
 
 
-def _require_served(configuration: Configuration, ties: Ties) -> None:
-    """What is asked for must be there; all that is not is listed."""
-    missing = [
-        f"'{item.name}' ('{item.identifier}') is tied to '{channel_name(kind)}'"
-        for kind in _NOT_SERVED
-        for item, _ in ties.tied_to(kind)
-    ]
-    missing += [
-        f"'{item.name}' ('{item.identifier}') is tied to 'fault' of a camera"
-        for item, tied in ties.tied_to(FaultChannel)
-        if isinstance(tied, FaultChannel) and tied.device == "camera"
-    ]
-    missing += [f"'remote.{name}'" for name in _FACES_NOT_SERVED if getattr(configuration.remote, name) is not None]
-    if missing:
-        raise AssemblyError(f"not served by this version of the bridge: {'; '.join(missing)}")
+def _require_faces(configuration: Configuration, ties: Ties) -> None:
+    """What is reached from elsewhere needs a remote face that may listen where it is to."""
     needing = [f"'{item.name}' ('{item.identifier}')" for item, _ in ties.tied_to(GrpcChannel)]
     if needing and configuration.remote.grpc_address is None:
         raise AssemblyError(f"tied to 'grpc', which needs 'remote.grpc_address': {', '.join(needing)}")
     if configuration.safety.operator_link_timeout_s is not None and not is_remote(configuration):
         raise AssemblyError("'safety.operator_link_timeout_s' needs 'remote.grpc_address' or 'remote.mavlink_url'")
+    face = settings_of(configuration)
+    if face is not None:
+        try:
+            check_listening(face.address, face.security)
+        except (SecurityError, ValueError) as error:
+            raise AssemblyError(f"remote: {error}") from error
 
 
 def assemble(
-    configuration: Configuration, ties: Ties, supervisor: Supervisor, log: EventLog, *, starts_itself: bool
+    configuration: Configuration,
+    ties: Ties,
+    supervisor: Supervisor,
+    log: EventLog,
+    deployment: Deployment = Deployment.CONTROLLER,
+    *,
+    starts_itself: bool,
 ) -> Machine:
     """Make everything; nothing is opened yet.
 
+    Args:
+        configuration: Of the robot.
+        ties: What the model's communications are tied to.
+        supervisor: What is executed.
+        log: Where its events are written.
+        deployment: Where it stands: it decides itself, or lets requests of programs through.
+        starts_itself: Whether it starts as soon as the devices are there.
+
     Raises:
-        AssemblyError: A device or number does not fit, or the supervisor is for a supervision layer.
+        AssemblyError: A device or number does not fit, or the supervisor stands elsewhere.
         UnknownDriverError: There is no such driver.
     """
-    if supervisor.deployment is not Deployment.CONTROLLER:
-        raise AssemblyError("the supervisor is for a supervision layer; the bridge runs controllers")
-    settings = check_settings(configuration, ties)
+    settings = check_settings(configuration, ties, deployment)
     if not starts_itself and not is_remote(configuration):
         raise AssemblyError("to wait in standby, the bridge needs 'remote.grpc_address' or 'remote.mavlink_url'")
     clock = SystemClock()
     limits = safety_limits(configuration)
     safety = SafetyLayer(limits)
     # Who can be reached can be told to start again.
-    job = Job(supervisor, ties, settings, configuration.scanner is not None, starts_itself, is_remote(configuration))
+    is_layer = deployment is Deployment.LAYER
+    job = Job(
+        supervisor,
+        ties,
+        settings,
+        needs_scanner=configuration.scanner is not None,
+        needs_camera=needs_camera(ties),
+        starts_itself=starts_itself,
+        stays_after_fault=is_remote(configuration),
+        is_layer=is_layer,
+    )
     rotate = configuration.skills.rotate
     # A turn has a time limit, which goes by its speed.
     speed_rad_s = min(rotate.speed_rad_s, limits.angular_rad_s)
@@ -225,7 +257,10 @@ def assemble(
     rotate = msgspec.structs.replace(rotate, speed_rad_s=speed_rad_s, slowest_rad_s=slowest_rad_s)
     stop = EmergencyStop(configuration.skills.emergency_stop)
     feed = Feed()
-    daemon = Daemon(job, safety, Rotate(rotate), stop, clock, log, feed)
+    try:
+        daemon = Daemon(job, safety, Rotate(rotate), stop, clock, log, feed)
+    except (DeploymentError, SettingsError) as error:
+        raise AssemblyError(str(error)) from error
     worker = DriveWorker(drive_base(configuration), safety, daemon.post, EXCHANGE_S, clock.monotonic)
     drive = DeviceThread(worker, clock.monotonic)
     scanner = None
@@ -237,10 +272,15 @@ def assemble(
             configuration.safety.scan_timeout_s,
             RESTART_S,
             clock.monotonic,
+            bad_frames_share=configuration.safety.bad_frames_share,
         )
         scanner = DeviceThread(listener, clock.monotonic)
-    daemon.connect(drive.hurry, worker.reset, lambda: drive.is_alive and (scanner is None or scanner.is_alive))
+    camera = None
+    if job.needs_camera:
+        camera = DeviceThread(camera_worker(configuration.skills.line, daemon.post, clock.monotonic), clock.monotonic)
+    threads = [thread for thread in (drive, scanner, camera) if thread]
+    daemon.connect(drive.hurry, worker.reset, lambda: all(thread.is_alive for thread in threads))
     operations = Operations(
-        supervisor.model, ties, feed, daemon.post, lambda: safety.operator_seen(clock.monotonic()), is_layer=False
+        supervisor.model, ties, feed, daemon.post, lambda: safety.operator_seen(clock.monotonic()), is_layer=is_layer
     )
-    return Machine(daemon, drive, scanner, operations)
+    return Machine(daemon, drive, scanner, camera, operations)

@@ -7,8 +7,10 @@ from robosc.execution.clock import Clock
 from robosc.execution.event_log import EventLog
 from robosc.execution.executor import Executor
 from robosc.execution.interpreter import InterpretedSystem
+from robosc.execution.layer import Layer
 from robosc.execution.protocol import requesting
 from robosc_bridge.daemon.jobs import Job
+from robosc_bridge.daemon.requesters import Requesters
 from robosc_bridge.daemon.robot import Robot
 
 
@@ -18,8 +20,13 @@ class Execution:
     Args:
         job: What is executed.
         robot: What it makes move.
+        requesters: Who asks for it, where it is a supervision layer.
         clock: The only source of time.
         log: The event log.
+
+    Raises:
+        DeploymentError: The supervisor was made for another deployment, or cannot be deployed like this.
+        SettingsError: A setting is wrong, or names what the model does not have.
 
     Attributes:
         executor: At work; None: nothing is executed.
@@ -27,33 +34,49 @@ class Execution:
         overruns: How many decisions were left out because the one before took too long.
     """
 
-    def __init__(self, job: Job, robot: Robot, clock: Clock, log: EventLog) -> None:
-        self.executor: Executor | None = None
+    def __init__(self, job: Job, robot: Robot, requesters: Requesters, clock: Clock, log: EventLog) -> None:
+        self.executor: Executor | Layer | None = None
         self.due_s = clock.monotonic()
         self.overruns = 0
         self._job = job
         self._robot = robot
+        self._requesters = requesters
         self._clock = clock
         self._log = log
         self._system: InterpretedSystem | None = None
         # Another run is another state, whatever its system has counted.
         self._run = 0
-        self._names: tuple[str, ...] = ()
+        # Once now, so that what cannot be executed is found at the start of the program.
+        _, system = self._made()
+        self._names = tuple(info.name for info in requesting(system.description.communications))
 
-    def begin(self) -> Executor:
+    @property
+    def layer(self) -> Layer | None:
+        """The executor, if it is one of a supervision layer."""
+        return self.executor if isinstance(self.executor, Layer) else None
+
+    def begin(self) -> Executor | Layer:
         """A new run, from the initial state; `start` of its executor is still to be called."""
         self._run += 1 << 32
-        self._system = InterpretedSystem(self._job.supervisor)
-        self._names = tuple(info.name for info in requesting(self._system.description.communications))
-        self._robot.begin()
-        self.executor = Executor(self._system, self._robot, self._job.settings, self._clock, self._log)
+        self._robot.forget()
+        self._requesters.forget()
+        self.executor, self._system = self._made()
         self.due_s = self._clock.monotonic()
         return self.executor
+
+    def _made(self) -> tuple[Executor | Layer, InterpretedSystem]:
+        system = InterpretedSystem(self._job.supervisor)
+        settings, clock, log = self._job.settings, self._clock, self._log
+        if self._job.is_layer:
+            return Layer(system, self._robot, self._requesters, settings, clock, log), system
+        return Executor(system, self._robot, settings, clock, log), system
 
     def end(self) -> None:
         """The run is over."""
         self._run += 1 << 32
         self.executor = self._system = None
+        self._robot.forget()
+        self._requesters.forget()
 
     def decide(self, now_s: float, *, is_running: bool) -> None:
         """A period has passed; decisions that come too late by whole periods are left out."""

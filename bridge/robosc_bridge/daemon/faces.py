@@ -6,6 +6,7 @@ from robosc_bridge.configuration.structure import Configuration
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.devices.interface import Velocity
 from robosc_bridge.ground import GroundLink, ground_settings
+from robosc_bridge.remote import RemoteFace, settings_of
 from robosc_bridge.safety import SafetyLimits
 
 
@@ -35,6 +36,9 @@ def make_faces(configuration: Configuration, operations: Operations, limits: Saf
         BridgeError: One cannot be made as it is configured.
     """
     faces: list[Face] = []
+    remote = settings_of(configuration)
+    if remote is not None:
+        faces.append(RemoteFace(operations, remote))
     ground = ground_settings(configuration, Velocity(limits.linear_m_s, limits.angular_rad_s))
     if ground is not None:
         faces.append(GroundLink(operations, ground))

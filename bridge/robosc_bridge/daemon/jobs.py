@@ -18,6 +18,8 @@ class Job:
         needs_scanner: Whether a LiDAR must be there before it starts.
         starts_itself: Whether it starts as soon as the devices are there; else it stays in standby.
         stays_after_fault: Whether it waits for somebody to start it again after a fault; else it ends.
+        is_layer: Whether it is a supervision layer, so that programs ask for what it lets through; else a controller.
+        needs_camera: Whether a camera must be there before it starts.
     """
 
     supervisor: Supervisor
@@ -26,3 +28,5 @@ class Job:
     needs_scanner: bool
     starts_itself: bool
     stays_after_fault: bool = False
+    is_layer: bool = False
+    needs_camera: bool = False

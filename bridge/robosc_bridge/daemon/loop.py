@@ -1,7 +1,7 @@
 """The loop: executes the supervisor at its period, between what devices tell and what the safety layer lets through.
 
 One thread runs it and calls the executor; the devices' threads, remote faces and signal handlers only put something
-into its inbox. What each command of an operator does in each state stands in docs/bridge-daemon.md.
+into its inbox.
 """
 
 import logging
@@ -12,34 +12,33 @@ from typing import assert_never
 
 from robosc.execution.clock import Clock
 from robosc.execution.event_log import EventLog
+from robosc_bridge.daemon.conductor import OVER, Conductor
+from robosc_bridge.daemon.exchange import Exchange
 from robosc_bridge.daemon.execution import Execution
 from robosc_bridge.daemon.feed import Feed, WatchedLog
 from robosc_bridge.daemon.jobs import Job
 from robosc_bridge.daemon.motion import Motion
-from robosc_bridge.daemon.orders import HALTS, Orders, Until, answer, unanswered
-from robosc_bridge.daemon.programs import Attached, Detached, FromProgram, Refused
+from robosc_bridge.daemon.orders import HALTS, Orders, answer, unanswered
+from robosc_bridge.daemon.program_inbox import ProgramInbox
+from robosc_bridge.daemon.programs import FromProgram
+from robosc_bridge.daemon.programs_side import ProgramsSide
 from robosc_bridge.daemon.readiness import Readiness
-from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice
-from robosc_bridge.daemon.robot import STOP_HELD, Robot
+from robosc_bridge.daemon.reports import DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice, Sighting
+from robosc_bridge.daemon.requesters import Requesters
+from robosc_bridge.daemon.robot import Robot
+from robosc_bridge.daemon.roster import Roster
 from robosc_bridge.daemon.snapshots import Snapshots
 from robosc_bridge.daemon.states import Command, Order, State
+from robosc_bridge.daemon.stop_switch import StopSwitch
+from robosc_bridge.daemon.supervised import Listeners
 from robosc_bridge.devices.interface import DriveReading, Scan, Velocity
-from robosc_bridge.safety import LATCHING, Reason, SafetyLayer
+from robosc_bridge.safety import SafetyLayer
 from robosc_bridge.skills import EmergencyStop, Rotate
 
 _log = logging.getLogger(__name__)
 
-STOP_LIMIT_S = 3.0
-"""How long the motors may take to let go."""
-
-RESET_LIMIT_S = 15.0
-"""How long a reset of the motors may take."""
-
-# They end by themselves, and belong to every start and stop.
-_ORDINARY = frozenset({Reason.STANDBY, Reason.TORQUE_AWAITED, Reason.COMMAND_SILENT})
-# An operator's stop is no fault; what is wrong with the supervisor is told by itself.
-_GRAVE = frozenset(LATCHING) - {Reason.OPERATOR_STOP, Reason.SUPERVISOR_FAULT}
-_OVER = "the bridge has ended"
+PROGRAM_SHARE = 50
+"""How much of what programs have sent is taken up in one turn."""
 
 
 @dataclass(frozen=True)
@@ -49,11 +48,16 @@ class Key:
     key: str
 
 
-Item = Report | Order | Key | FromProgram
+@dataclass(frozen=True)
+class _Woken:
+    """Programs have sent something."""
+
+
+Item = Report | Order | Key | _Woken
 
 
 class Daemon:
-    """The loop and its state.
+    """The loop.
 
     Args:
         job: What is executed.
@@ -63,10 +67,6 @@ class Daemon:
         clock: The only source of time.
         log: The executor's event log.
         feed: Where everything is shown; None: nobody looks.
-
-    Attributes:
-        state: What it is doing.
-        problem: The fault that has stopped it; empty: none.
     """
 
     def __init__(
@@ -79,38 +79,45 @@ class Daemon:
         log: EventLog,
         feed: Feed | None = None,
     ) -> None:
-        self.state = State.STARTING
-        self.problem = ""
-        self._job = job
-        self._starts_itself = job.starts_itself
         self._safety = safety
         self._clock = clock
-        self._feed = feed or Feed()
+        feed = feed or Feed()
         self._inbox: queue.SimpleQueue[Item] = queue.SimpleQueue()
+        self._from_programs = ProgramInbox(lambda: self._inbox.put(_Woken()))
         self._orders = Orders()
+        self._readiness = Readiness(needs_scanner=job.needs_scanner, needs_camera=job.needs_camera)
+        self._conductor = conductor = Conductor(job, safety, self._readiness, self._orders, clock)
+        listeners, roster = Listeners(job.ties), Roster()
+        exchange = Exchange(job.ties, listeners, roster)
+        self._switch = StopSwitch(emergency_stop, listeners, conductor.operator_stop, conductor.operator_resume)
         self._motion = Motion(rotate, self._command)
         self._robot = Robot(
             job.ties,
+            listeners,
             self._motion,
-            emergency_stop,
-            self._operator_stop,
-            self._operator_resume,
-            self._turn_failed,
+            self._switch,
+            exchange,
+            conductor.turn_failed,
             job.settings.service_timeout_s,
             clock.monotonic,
         )
-        self._readiness = Readiness(needs_scanner=job.needs_scanner)
-        self._execution = Execution(job, self._robot, clock, WatchedLog(log, self._feed))
-        self._snapshots = Snapshots(self._feed, self._execution, self._readiness, clock)
-        self._notice = SafetyNotice((), ())
+        requesters = Requesters(job.supervisor.model, job.ties, roster, self._robot.abandon)
+        self._execution = Execution(job, self._robot, requesters, clock, WatchedLog(log, feed))
+        self._programs = ProgramsSide(roster, exchange, requesters, self._execution, self._robot, is_layer=job.is_layer)
+        self._snapshots = Snapshots(feed, self._execution, self._readiness, clock)
+        conductor.lead(self._execution, self._robot, self._motion, self._switch, self._snapshots.note)
         self._wish = Velocity()
-        self._stop_end_s = self._reset_end_s = 0.0
-        self._after_stop = State.STANDBY
         self._hurry: Callable[[], None] = lambda: None
-        self._reset_drive: Callable[[], None] = lambda: None
-        self._are_alive: Callable[[], bool] = lambda: True
-        self._is_drive_lost = False
-        self._failed_turn = ""
+
+    @property
+    def state(self) -> State:
+        """What it is doing."""
+        return self._conductor.state
+
+    @property
+    def problem(self) -> str:
+        """The fault that has stopped it; empty: none."""
+        return self._conductor.problem
 
     @property
     def overruns(self) -> int:
@@ -122,11 +129,13 @@ class Daemon:
     ) -> None:
         """Tell how the drive base's thread is told to hurry and to reset its motors, and whether all threads live."""
         self._hurry = hurry
-        self._reset_drive = reset_drive
-        self._are_alive = are_alive
+        self._conductor.connect(hurry, reset_drive, are_alive)
 
-    def post(self, item: Item | Command) -> None:
+    def post(self, item: Report | Key | Command | Order | FromProgram) -> None:
         """Tell the loop something; from any thread or signal handler, never waits."""
+        if isinstance(item, FromProgram):
+            self._from_programs.put(item)
+            return
         if isinstance(item, Command):
             item = Order(item, "", unanswered)
         if isinstance(item, Order) and item.command in HALTS:
@@ -143,19 +152,22 @@ class Daemon:
         try:
             while self.state is not State.OVER:
                 try:
-                    item = self._inbox.get(timeout=max(self._execution.due_s - self._clock.monotonic(), 0.0))
+                    item = self._inbox.get(timeout=self._pause_s())
                 except queue.Empty:
                     self.turn()
                 else:
                     self.turn(item)
         finally:
-            self.state = State.OVER
+            self._conductor.state = State.OVER
             self._close()
+
+    def _pause_s(self) -> float:
+        return max(self._execution.due_s - self._clock.monotonic(), 0.0) if self._from_programs.is_empty else 0.0
 
     def _close(self) -> None:
         """Nothing is done any more: whoever waits for something is told so."""
         self._drain()
-        self._orders.close(_OVER)
+        self._orders.close(OVER)
 
     def _drain(self) -> None:
         while True:
@@ -164,7 +176,7 @@ class Daemon:
             except queue.Empty:
                 break
             if isinstance(item, Order):
-                answer(item, "" if item.command is Command.QUIT else _OVER)
+                answer(item, "" if item.command is Command.QUIT else OVER)
 
     def turn(self, *items: Item) -> None:
         """Handle what has come, and decide if it is time."""
@@ -175,16 +187,18 @@ class Daemon:
         # Not what comes meanwhile: nobody can keep the loop from its turn.
         for _ in range(self._inbox.qsize()):
             self._handle(self._inbox.get_nowait())
+        for arrived in self._from_programs.take(PROGRAM_SHARE):
+            self._programs.take(arrived)
         now_s = self._clock.monotonic()
         if now_s >= self._execution.due_s:
             self._execution.decide(now_s, is_running=self.state is State.RUNNING)
-        self._look_at_state(now_s)
+        self._conductor.look(now_s)
         executor = self._execution.executor
         if self.state is State.RUNNING and executor is not None:
             # In a safe stop nothing moves, whatever identifiers are released.
             self._motion.pause(bool(executor.reasons), now_s)
             self._motion.refresh(now_s)
-        self._snapshots.look(self.state, self.problem, self._notice)
+        self._snapshots.look(self.state, self.problem, self._conductor.notice)
         if self.state is State.OVER:
             self._close()
 
@@ -201,295 +215,30 @@ class Daemon:
                 self._readiness.scan = item
                 if executor is not None:
                     self._robot.saw_scan(item, executor)
+            case Sighting():
+                if executor is not None:
+                    self._robot.saw_line(item, executor)
             case DeviceUp(device):
-                self._device_came(device)
+                self._conductor.device_came(device)
             case DeviceDown():
-                self._device_went(item)
+                self._conductor.device_went(item)
             case SafetyNotice():
-                self._heed(item)
+                self._conductor.heed(item)
             case ResetDone(problem):
-                self._reset_done(problem)
+                self._conductor.reset_done(problem)
             case Key(key):
-                self._robot.saw_key(key, executor)
+                self._switch.saw_key(key, executor)
+                if executor is not None:
+                    self._robot.saw_key(key, executor)
             case Order():
-                self._obey(item)
-            case Attached() | Detached():
-                pass
+                self._conductor.obey(item)
+            case _Woken():
+                pass  # What they have sent is taken up in any turn.
             case _:
-                item.program.tell(Refused("nothing of this model is tied to programs"))
-
-    # Devices and the safety layer.
-
-    def _device_came(self, device: Device) -> None:
-        _log.info("the %s is there", device)
-        is_news = self._readiness.came(device)
-        executor = self._execution.executor
-        if is_news:
-            self._snapshots.note("device", f"the {device} is there")
-        if executor is not None and is_news:
-            self._robot.saw_device(device, f"the {device} is back", executor, is_lost=False)
-
-    def _device_went(self, report: DeviceDown) -> None:
-        is_news = self._readiness.went(report.device)
-        if report.is_first:
-            _log.error("%s: %s", report.device, report.problem)
-            self._snapshots.note("device", f"{report.device}: {report.problem}")
-        executor = self._execution.executor
-        if executor is None or not is_news:
-            return
-        self._robot.saw_device(report.device, report.problem, executor, is_lost=True)
-        if report.device is Device.DRIVE:
-            self._is_drive_lost = True
-            self._fault(f"the drive base is lost: {report.problem}")
-
-    def _heed(self, notice: SafetyNotice) -> None:
-        """Tell a person why nothing moves; what only a person can end ends the run."""
-        self._notice = notice
-        for warning in notice.warnings:
-            _log.warning("%s", warning)
-        for reason in notice.reasons:
-            # Before the start, nothing has told anything yet.
-            is_news = self.state is State.RUNNING and reason not in _ORDINARY
-            _log.log(logging.WARNING if is_news else logging.DEBUG, "%s", reason)
-        grave = [reason for reason in notice.reasons if reason in _GRAVE]
-        if grave and self.state is State.RUNNING:
-            self._fault(" ".join(grave))
-
-    # Commands.
-
-    def _obey(self, order: Order) -> None:
-        self._orders.arrived(order)
-        command = order.command
-        text = f"{command} ({order.by})" if order.by else str(command)
-        _log.info("%s", text)
-        self._snapshots.note("order", text)
-        if self.state is State.OVER:
-            answer(order, _OVER)
-            return
-        match command:
-            case Command.START:
-                self._order_start(order)
-            case Command.STOP:
-                if self.state is State.STOPPING:
-                    # A reset that waits for the standstill would forget this stop, which came after it.
-                    self._orders.settle(Until.RESET, str(Reason.OPERATOR_STOP))
-                self._robot.stop_remotely(self._execution.executor)
-                answer(order, "")
-            case Command.STANDBY:
-                self._order_standby(order)
-            case Command.RESUME:
-                answer(order, self._robot.resume_remotely(self._execution.executor))
-            case Command.RESET:
-                self._order_reset(order)
-            case Command.QUIT:
-                self._orders.wait(Until.RESTING, order)
-                if self.state is not State.STOPPING:
-                    self._end("the bridge ends", State.OVER)
-                self._after_stop = State.OVER
-            case _:
-                assert_never(command)
-
-    def _order_start(self, order: Order) -> None:
-        self._look_for_devices()
-        why = self._why_not_start()
-        if why:
-            answer(order, why)
-            return
-        if self.state is State.STANDBY:
-            self._begin()
-        # What the first steps of the supervisor lead to is known at the end of this turn.
-        self._orders.wait(Until.STARTED, order)
-
-    def _why_not_start(self) -> str:
-        if self.state is State.STARTING:
-            return f"the robot is starting: {self._readiness.missing()}"
-        if self.state is State.STOPPING:
-            return "the robot is being stopped"
-        if self.state is State.FAULT:
-            return f"the robot is in fault: {self.problem}; reset it first"
-        if self._orders.is_stop_coming:
-            return "it was told to stop meanwhile"
-        if self._orders.is_waiting(Until.RESET):
-            return "the motors are being reset"
-        latched = self._latched()
-        if latched:
-            return f"{latched} Resume or reset it first."
-        return "" if self.state is State.RUNNING else self._readiness.missing() or self._dead_thread()
-
-    def _dead_thread(self) -> str:
-        return "" if self._are_alive() else "a device's thread has ended; the bridge must be started anew"
-
-    def _latched(self) -> str:
-        """What holds until somebody says otherwise."""
-        reasons = [reason for reason in self._notice.reasons if reason in LATCHING]
-        if self._robot.is_stopped and Reason.OPERATOR_STOP not in reasons:
-            reasons.append(Reason.OPERATOR_STOP)
-        return " ".join(reasons)
-
-    def _order_standby(self, order: Order) -> None:
-        match self.state:
-            case State.STARTING:
-                self._starts_itself = False
-                answer(order, "")
-            case State.STANDBY:
-                answer(order, "")
-            case State.RUNNING:
-                self._orders.wait(Until.RESTING, order)
-                self._end("standby", State.STANDBY)
-            case State.STOPPING:
-                self._orders.wait(Until.RESTING, order)
-            case _:
-                answer(order, f"the robot is in fault: {self.problem}; reset it first")
-
-    def _order_reset(self, order: Order) -> None:
-        if self.state is State.STOPPING and not self._orders.is_waiting(Until.RESET):
-            answer(order, "the robot is being stopped")
-            return
-        self._orders.wait(Until.RESET, order)
-        if self.state is State.RUNNING:
-            # First to standby: motors that move are not reset.
-            self._end("reset", State.STANDBY)
-        elif self.state is not State.STOPPING:
-            self._reset()
-
-    def _reset(self) -> None:
-        """Forget what has latched, and let the drive base reset its motors."""
-        why = "" if self._readiness.is_drive_there else "the drive base is not there"
-        why = why or (STOP_HELD if self._robot.is_stop_held else "") or self._release_safety()
-        if why:
-            _log.error("reset: %s", why)
-            self._orders.settle(Until.RESET, why)
-            return
-        self._robot.forget_stop()
-        self._reset_end_s = self._clock.monotonic() + RESET_LIMIT_S
-        self._reset_drive()
-
-    def _reset_done(self, problem: str) -> None:
-        _log.log(logging.ERROR if problem else logging.INFO, "reset: %s", problem or "done")
-        if self.state is State.FAULT and not problem and self._orders.is_waiting(Until.RESET):
-            self.state, self.problem = State.STANDBY, ""
-        self._orders.settle(Until.RESET, problem)
-
-    def _release_safety(self) -> str:
-        """Let the safety layer forget what has latched; why it does not."""
-        if self._orders.is_stop_coming:
-            return str(Reason.OPERATOR_STOP)
-        remaining = self._safety.reset()
-        if remaining:
-            return " ".join(remaining)
-        if self._orders.is_stop_coming:
-            # It came between the two, and may have been forgotten with the others.
-            self._safety.operator_stop()
-            return str(Reason.OPERATOR_STOP)
-        self._notice = SafetyNotice(
-            tuple(reason for reason in self._notice.reasons if reason not in LATCHING), self._notice.warnings
-        )
-        return ""
-
-    # Runs.
-
-    def _begin(self) -> None:
-        executor = self._execution.begin()
-        self.problem = ""
-        self.state = State.RUNNING
-        self._safety.enable()
-        executor.start()
-        self._robot.tell_stop(executor)
-        if self._readiness.scan is not None:
-            # It must not decide on nothing while the last one is at hand.
-            self._robot.saw_scan(self._readiness.scan, executor)
-        _log.info("running")
-
-    def _end(self, reason: str, then: State) -> None:
-        """Bring the robot to rest; `then` follows once the motors have let go."""
-        if self._execution.executor is not None:
-            self._execution.executor.stop(reason)
-        self._motion.stop(self._clock.monotonic(), reason)
-        self._safety.disable()
-        self._hurry()
-        if self.state is not State.STOPPING or self._after_stop is not State.OVER:
-            # Who wants the bridge to end gets that, whatever fails on the way.
-            self._after_stop = then
-        self.state = State.STOPPING
-        self._stop_end_s = self._clock.monotonic() + STOP_LIMIT_S
-
-    def _fault(self, problem: str) -> None:
-        _log.error("%s", problem)
-        self._end(problem, State.FAULT if self._job.stays_after_fault else State.OVER)
-        self.problem = problem
-
-    def _look_at_state(self, now_s: float) -> None:
-        if self.state is State.RUNNING and not self._are_alive():
-            self._fault("a device's thread has ended")
-        if self._failed_turn and self.state is State.RUNNING:
-            self._fault(f"a turn has failed, and no message of the model tells it so: {self._failed_turn}")
-        self._failed_turn = ""
-        executor = self._execution.executor
-        if self.state is State.RUNNING and executor is not None and executor.is_faulty:
-            self._safety.supervisor_fault()
-            self._fault("; ".join(executor.reasons))
-        self._orders.settle(Until.STARTED, "" if self.state is State.RUNNING else self.problem or "it was stopped")
-        match self.state:
-            case State.STARTING if self._look_for_devices() and self._starts_itself:
-                self._begin()
-            case State.STOPPING if not self._readiness.has_torque or now_s >= self._stop_end_s:
-                self._come_to_rest()
-            case State.FAULT if self._is_drive_lost and self._readiness.is_drive_there:
-                # Nothing moves before somebody says so.
-                self._is_drive_lost = False
-                self.problem = ""
-                self.state = State.STANDBY
-        if self._orders.is_waiting(Until.RESET) and self.state is not State.STOPPING and now_s >= self._reset_end_s:
-            self._orders.settle(Until.RESET, f"the motors were not reset within {RESET_LIMIT_S:g} s")
-
-    def _look_for_devices(self) -> bool:
-        """Leave the start once all devices are there; whether it does now."""
-        are_there = self.state is State.STARTING and not self._readiness.missing()
-        if are_there:
-            self.state = State.STANDBY
-            _log.info("standby")
-        return are_there
-
-    def _come_to_rest(self) -> None:
-        """What was executed is at rest, or will not come to rest."""
-        has_let_go = not self._readiness.has_torque
-        if not has_let_go:
-            self.problem = self.problem or f"the motors have not let go within {STOP_LIMIT_S:g} s"
-            _log.error("%s", self.problem)
-        self._execution.end()
-        self.state = self._after_stop
-        if self.state is State.STANDBY and not has_let_go:
-            self.state = State.FAULT
-        _log.info("%s", self.state)
-        self._orders.settle(Until.RESTING, "" if has_let_go and self.state is not State.FAULT else self.problem)
-        if self._orders.is_waiting(Until.RESET) and self.state is not State.OVER:
-            self._reset()
+                assert_never(item)
 
     def _command(self, velocity: Velocity, now_s: float) -> None:
         self._safety.command(velocity, now_s)
         if velocity != self._wish:
             self._wish = velocity
             self._hurry()
-
-    def _operator_stop(self) -> None:
-        self._safety.operator_stop()
-        self._hurry()
-        # What was wanted before does not move the robot afterwards.
-        self._robot.stop("the operator has stopped the robot", None)
-
-    def _operator_resume(self) -> str:
-        """Let the robot go on after an operator's stop; why it cannot."""
-        if self.state in (State.STOPPING, State.OVER):
-            return "the robot is being stopped"
-        if self.state is State.FAULT:
-            return f"the robot is in fault: {self.problem}; reset it first"
-        others = [reason for reason in self._notice.reasons if reason in _GRAVE]
-        why = f"{' '.join(others)} Reset it first." if others else self._release_safety()
-        if why:
-            _log.error("the robot cannot go on: %s", why)
-        elif self.state is State.RUNNING:
-            self._safety.enable()
-        return why
-
-    def _turn_failed(self, reason: str) -> None:
-        self._failed_turn = reason or "it was ended"

@@ -1,21 +1,31 @@
 """Where the supervisor comes from, and why it is trusted.
 
 It is made here, by this machine's synthesizer, or it is foreign: a file, or what a synthesis server sends. A foreign
-one is untrusted input, whatever digest it carries: it is validated, and executed only if the independent verifier
-passes it against the texts of the model. What a server made last for the same texts is kept, so that the robot starts
-without a network, too; it is checked again like any other file.
+one is untrusted input, whatever digest it carries: it is validated, and executed only if a key that this bridge was
+given has signed the file, or else if the independent verifier passes it against the texts of the model. What a server
+made last for the same texts is kept, so that the robot starts without a network, too; it is checked again like any
+other file.
 """
 
 import contextlib
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from robosc.errors import LanguageError, RoboscError
 from robosc.language import load_bundle
 from robosc.model.structure import Deployment
+from robosc.signatures import (
+    MAXIMUM_KEY_BYTES,
+    MAXIMUM_SIGNATURE_BYTES,
+    PublicKey,
+    UnknownSignerError,
+    read_public_keys,
+    signature_file,
+    signer,
+)
 from robosc.source import Bundle
 from robosc.supervisor import Supervisor, decode, make_supervisor
 from robosc.supervisor.codec import MAXIMUM_BYTES
@@ -37,20 +47,43 @@ class Source:
     """What to execute.
 
     Attributes:
-        file: The model (`.rscd`), or a supervisor (`.rsup`) with its model's text beside it, called alike.
+        file: The model (`.rscd`), or a supervisor (`.rsup`); that has its signature or its model's text beside it.
         deployment: Where the supervisor is to stand.
         server: HOST:PORT of a synthesis server that makes it of the model; None: it is made here.
         kept: Folder for what a server made last.
+        trusted: Keys whose signatures of supervisor files are believed.
     """
 
     file: Path
     deployment: Deployment
     server: str | None = None
     kept: Path | None = None
+    trusted: tuple[PublicKey, ...] = ()
+
+
+def trusted_keys(entries: Iterable[str]) -> tuple[PublicKey, ...]:
+    """The public keys of a configuration.
+
+    Args:
+        entries: Each a key as `robosc key` writes it, or a file with such lines.
+
+    Raises:
+        NoSupervisorError: An entry is neither.
+    """
+    found: list[PublicKey] = []
+    for entry in entries:
+        try:
+            text = entry
+            if not entry.startswith("ssh-"):
+                text = _bytes(Path(entry), MAXIMUM_KEY_BYTES, "keys").decode("utf-8", "replace")
+            found += read_public_keys(text, "supervisor.trusted_keys" if text is entry else entry)
+        except RoboscError as error:
+            raise NoSupervisorError(str(error)) from error
+    return tuple(found)
 
 
 def obtain(source: Source, tell: Callable[[str], None] = lambda text: None) -> Supervisor:
-    """The supervisor, verified.
+    """The supervisor, verified or vouched for.
 
     Args:
         source: Where it comes from.
@@ -60,10 +93,7 @@ def obtain(source: Source, tell: Callable[[str], None] = lambda text: None) -> S
         NoSupervisorError: There is none that can be trusted.
     """
     if source.file.suffix == SUPERVISOR_SUFFIX:
-        model = source.file.with_suffix(MODEL_SUFFIX)
-        if not model.is_file():
-            raise NoSupervisorError(f"{source.file}: the model that it is checked against is missing: no {model}")
-        return _checked(_bytes(source.file), str(source.file), _bundle(model), source.deployment, tell)
+        return _read(source, tell)
     if source.file.suffix != MODEL_SUFFIX:
         raise NoSupervisorError(
             f"{source.file}: neither a model ({MODEL_SUFFIX}) nor a supervisor ({SUPERVISOR_SUFFIX})"
@@ -72,6 +102,70 @@ def obtain(source: Source, tell: Callable[[str], None] = lambda text: None) -> S
     if source.server is None:
         return _made(bundle, source.deployment, tell)
     return _served(bundle, source.server, source, tell)
+
+
+def deployment_of(file: Path) -> Deployment:
+    """Where a file's supervisor says that it is to stand; a model may stand anywhere, and is taken for a controller.
+
+    Raises:
+        NoSupervisorError: A supervisor's file cannot be read.
+    """
+    if file.suffix != SUPERVISOR_SUFFIX:
+        return Deployment.CONTROLLER
+    try:
+        return decode(_bytes(file)).deployment
+    except RoboscError as error:
+        raise NoSupervisorError(f"{file}: {error}") from error
+
+
+def _read(source: Source, tell: Callable[[str], None]) -> Supervisor:
+    """The supervisor of a file, by its signature or by its model."""
+    file, data = source.file, _bytes(source.file)
+    model = file.with_suffix(MODEL_SUFFIX)
+    bundle = _bundle(model) if model.is_file() else None
+    key = _signer(file, data, source.trusted, tell)
+    if key is not None:
+        tell(f"{file}: signed by {key}")
+        return _signed(file, data, bundle, source.deployment)
+    if bundle is None:
+        reason = "is not signed by a trusted key, and the" if source.trusted else "the"
+        raise NoSupervisorError(f"{file}: {reason} model that it is checked against is missing: no {model}")
+    return _checked(data, str(file), bundle, source.deployment, tell)
+
+
+def _signer(file: Path, data: bytes, trusted: tuple[PublicKey, ...], tell: Callable[[str], None]) -> PublicKey | None:
+    """The trusted key that has signed a file; None: none has, so that the verifier decides.
+
+    Raises:
+        NoSupervisorError: The signature does not fit the file: somebody has changed one of them.
+    """
+    place = signature_file(file)
+    if not trusted or not place.exists():
+        return None
+    try:
+        return signer(data, _bytes(place, MAXIMUM_SIGNATURE_BYTES, "a signature"), trusted)
+    except UnknownSignerError as error:
+        tell(f"{file}: {error}: it is verified instead")
+        return None
+    except RoboscError as error:
+        raise NoSupervisorError(f"{place}: {error}") from error
+
+
+def _signed(file: Path, data: bytes, bundle: Bundle | None, deployment: Deployment) -> Supervisor:
+    """A supervisor that somebody vouches for: what it is for stands in it."""
+    try:
+        supervisor = decode(data)
+    except RoboscError as error:
+        raise NoSupervisorError(f"{file}: {error}") from error
+    _require_deployment(supervisor, deployment, str(file))
+    if bundle is not None and supervisor.certificate.bundle_sha256 != bundle.digest:
+        raise NoSupervisorError(f"{file}: it is signed, but was made of other texts than {bundle.main.name} beside it")
+    return supervisor
+
+
+def _require_deployment(supervisor: Supervisor, deployment: Deployment, place: str) -> None:
+    if supervisor.deployment is not deployment:
+        raise NoSupervisorError(f"{place}: made for the deployment {supervisor.deployment}, not {deployment}")
 
 
 def _bundle(model: Path) -> Bundle:
@@ -83,14 +177,14 @@ def _bundle(model: Path) -> Bundle:
         raise NoSupervisorError(f"{model}: {error}") from error
 
 
-def _bytes(file: Path) -> bytes:
+def _bytes(file: Path, most: int = MAXIMUM_BYTES, what: str = "a supervisor") -> bytes:
     try:
         with file.open("rb") as stream:
-            data = stream.read(MAXIMUM_BYTES + 1)
+            data = stream.read(most + 1)
     except OSError as error:
         raise NoSupervisorError(f"{file}: {error.strerror or error}") from error
-    if len(data) > MAXIMUM_BYTES:
-        raise NoSupervisorError(f"{file}: larger than any supervisor may be ({MAXIMUM_BYTES} bytes)")
+    if len(data) > most:
+        raise NoSupervisorError(f"{file}: more bytes than {what} may have ({most})")
     return data
 
 
@@ -112,8 +206,7 @@ def _checked(
     tell(f"{place}: verification against {bundle.main.name}")
     try:
         supervisor = decode(data)
-        if supervisor.deployment is not deployment:
-            raise NoSupervisorError(f"{place}: made for the deployment {supervisor.deployment}, not {deployment}")
+        _require_deployment(supervisor, deployment, place)
         found = recheck(supervisor, bundle, Limits.of(DEFAULT_STATES), deployment=deployment)
     except RoboscError as error:
         raise NoSupervisorError(f"{place}: {error}") from error

@@ -10,7 +10,6 @@ import contextlib
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from robosc_bridge.devices.following import FollowingWatch
 from robosc_bridge.devices.interface import STANDSTILL, DriveLimits, DriveReading, MotorFault, Velocity
@@ -18,6 +17,7 @@ from robosc_bridge.devices.kinematics import wheel_speeds, within_limits
 from robosc_bridge.devices.mavlink_link import BAUD, LinkSettings, VehicleLink, acquire, release
 from robosc_bridge.devices.mavlink_odometry import VehicleOdometry, estimate
 from robosc_bridge.devices.mavlink_state import Told, VehicleState
+from robosc_bridge.devices.robots import Body
 from robosc_bridge.errors import (
     BridgeError,
     DeviceError,
@@ -67,33 +67,6 @@ _FOLLOWING_LIMIT_S = 2.0
 _MM = 1000
 
 
-@dataclass(frozen=True, slots=True)
-class RoverBody:
-    """What a rover can do, as its owner knows it.
-
-    Attributes:
-        linear_m_s: Fastest forward and backward; not more than its parameter CRUISE_SPEED, at which it caps.
-        angular_rad_s: Fastest turn.
-        wheel_separation_m: Between its left and its right wheels.
-    """
-
-    linear_m_s: float
-    angular_rad_s: float
-    wheel_separation_m: float
-
-    def __post_init__(self) -> None:
-        for name in ("linear_m_s", "angular_rad_s", "wheel_separation_m"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"{name} of a rover must be a positive number, and is {value}")
-
-    @property
-    def limits(self) -> DriveLimits:
-        """Of the body; each wheel may be as fast as both together make it."""
-        wheel_m_s = self.linear_m_s + self.angular_rad_s * self.wheel_separation_m / 2
-        return DriveLimits(self.linear_m_s, self.angular_rad_s, wheel_m_s)
-
-
 class MavlinkRover:
     """A `DriveBase`. Used from one thread.
 
@@ -115,7 +88,7 @@ class MavlinkRover:
     def __init__(
         self,
         path: str,
-        robot: RoverBody,
+        robot: Body,
         baud: int = BAUD,
         *,
         system: int | None = None,

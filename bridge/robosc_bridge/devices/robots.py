@@ -1,4 +1,4 @@
-"""TurtleBot3 robots as data.
+"""Robots as data: the TurtleBot3s, and bodies of one's own.
 
 Sources: ROBOTIS e-Manual, "TurtleBot3: Features"; ROBOTIS-GIT/OpenCR 1.5.3, `turtlebot3_ros2` (what its firmware makes
 of a command); e-Manual pages XL430-W250 and XM430-W210.
@@ -54,6 +54,33 @@ class Battery:
 
 
 @dataclass(frozen=True, slots=True)
+class Body:
+    """What a robot can do, as its owner knows it: all that a drive needs that sees to its motors itself.
+
+    Attributes:
+        linear_m_s: Fastest forward and backward; of a MAVLink rover, not more than its parameter CRUISE_SPEED.
+        angular_rad_s: Fastest turn.
+        wheel_separation_m: Between its left and its right wheels.
+    """
+
+    linear_m_s: float
+    angular_rad_s: float
+    wheel_separation_m: float
+
+    def __post_init__(self) -> None:
+        for name in ("linear_m_s", "angular_rad_s", "wheel_separation_m"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"{name} of a robot must be a positive number, and is {value}")
+
+    @property
+    def limits(self) -> DriveLimits:
+        """Of the body; each wheel may be as fast as both together make it."""
+        wheel_m_s = self.linear_m_s + self.angular_rad_s * self.wheel_separation_m / 2
+        return DriveLimits(self.linear_m_s, self.angular_rad_s, wheel_m_s)
+
+
+@dataclass(frozen=True, slots=True)
 class Robot:
     """A differential-drive robot.
 
@@ -90,6 +117,11 @@ class Robot:
     def tick_m(self) -> float:
         """Way of a wheel in one tick of its encoder."""
         return 2 * math.pi / TICKS_PER_TURN * self.wheel_radius_m
+
+    @property
+    def body(self) -> Body:
+        """What it is to a drive that sees to its motors itself."""
+        return Body(self.linear_m_s, self.angular_rad_s, self.wheel_separation_m)
 
     def limits(self, velocity_limit_raw: int) -> DriveLimits:
         """What the robot can do with servos that take goal velocities up to a limit."""

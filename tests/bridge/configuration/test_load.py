@@ -103,7 +103,8 @@ zz: 1
     channels += "odometry, rotate, rotated, scanner, stop"
     safety = ", ".join(structure_module.Safety.__struct_fields__)
     assert found == [
-        'c.yaml:1: robot: is "burgr"; it must be one of burger, waffle, waffle_pi',
+        'c.yaml:1: robot: is "burgr"; it must be one of burger, waffle, waffle_pi or a mapping with '
+        "wheel_separation_m, linear_m_s, angular_rad_s",
         "c.yaml:2: drive.prt: there is no such key; did you mean 'port'?",
         "c.yaml:2: drive: 'port' is missing: a text of 1 to 4096 characters",
         "c.yaml:2: drive.options.a: is a mapping; it must be true or false or a whole number or a number or a text or "
@@ -271,3 +272,17 @@ def test_the_decoder_takes_what_msgspec_takes(given_values: dict[str, object], i
 def test_a_channel_keeps_its_options() -> None:
     found = configuration("channels: {/r: {channel: rotate, unit: radians, direction: right}}")
     assert found.channels == {"/r": RotateChannel(unit="radians", direction="right")}
+
+
+def test_a_body_of_ones_own_is_checked_part_by_part() -> None:
+    head = "robot: {wheel_separation_m: 0, linear_m_s: fast, wheels: 4}\ndrive: {driver: x, port: y}\n"
+    with pytest.raises(ConfigurationError) as raised:
+        parse(head.encode(), "c.yaml")
+    assert str(raised.value).splitlines() == [
+        "c.yaml:1: robot.wheels: there is no such key; there is angular_rad_s, linear_m_s, wheel_separation_m",
+        "c.yaml:1: robot.wheel_separation_m: is 0; it must be a number above 0, at most 5",
+        'c.yaml:1: robot.linear_m_s: is "fast"; it must be a number above 0, at most 5',
+        "c.yaml:1: robot: 'angular_rad_s' is missing: a number above 0, at most 20",
+    ]
+    found = parse(head.replace("0,", "0.3,").replace("fast, wheels: 4", "1, angular_rad_s: 2").encode(), "c.yaml")
+    assert found.configuration.robot == structure_module.Body(wheel_separation_m=0.3, linear_m_s=1.0, angular_rad_s=2.0)

@@ -13,13 +13,12 @@ from robosc.model.structure import Model
 from robosc_bridge.configuration import Configuration, ConfigurationError, init, parse, tie
 from robosc_bridge.configuration import template as template_module
 from robosc_bridge.configuration.document import parse_document
+from robosc_bridge.configuration.structure import TurtleBot
 from robosc_bridge.configuration.template import quoted
 from support.models import EXAMPLES, bundle_of
 
 COMBINATIONS = list(
-    itertools.product(
-        *map(get_args, (template_module.Robot, template_module.DriveDriver, template_module.ScannerDriver))
-    )
+    itertools.product(*map(get_args, (TurtleBot, template_module.DriveDriver, template_module.ScannerDriver)))
 )
 # What an engineer has to say: nothing on a robot tells it.
 OPEN = {
@@ -53,7 +52,7 @@ def test_every_example_is_covered() -> None:
 @pytest.mark.parametrize("name", [name for name, missing in OPEN.items() if not missing])
 @pytest.mark.parametrize(("robot", "drive", "scanner"), COMBINATIONS)
 def test_what_is_plain_is_tied(
-    name: str, robot: template_module.Robot, drive: template_module.DriveDriver, scanner: template_module.ScannerDriver
+    name: str, robot: TurtleBot, drive: template_module.DriveDriver, scanner: template_module.ScannerDriver
 ) -> None:
     model = example(name)
     loaded = parse(init(robot, drive, scanner, model).encode(), "c.yaml")

@@ -3,6 +3,7 @@ import pytest
 from robosc.language import load_bundle
 from robosc.model import check
 from robosc.model.structure import Model
+from robosc_bridge import drivers
 from robosc_bridge.configuration import ConfigurationError, Ties, parse, tie, why_not
 from robosc_bridge.configuration import channels as kinds
 from support.models import EXAMPLES, bundle_of
@@ -260,7 +261,21 @@ def test_services_and_actions_are_tied_to_skills(declaration: str, channel: str,
         assert reason in line
 
 
-def test_devices_that_are_not_there_are_told() -> None:
+def test_a_robot_of_ones_own_is_not_for_the_drives_of_a_turtlebot3() -> None:
+    model = with_message("outgoing", "none")
+    own = "robot: {wheel_separation_m: 0.3, linear_m_s: 0.8, angular_rad_s: 1.5}\n"
+    for driver in ("opencr", "dynamixel"):
+        head = f"{own}drive: {{driver: {driver}, port: /dev/ttyUSB1}}\n"
+        (line,) = errors_of(model, "channels: {/m: {channel: none}}", head)
+        problem = f"the drive '{driver}' is that of a TurtleBot3; it must be one of burger, waffle, waffle_pi"
+        assert line == f"c.yaml:1: robot: {problem}"
+    for driver in ("mavlink-rover", "of_a_plug_in"):
+        head = f"{own}drive: {{driver: {driver}, port: /dev/ttyUSB1}}\n"
+        assert tied(model, "channels: {/m: {channel: none}}", head).channels.keys() == {"m"}
+
+
+def test_devices_that_are_not_there_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(drivers, "_registered", {})
     model = with_message("outgoing", "none")
     head = "robot: burger\ndrive: {driver: dynamixel, port: /dev/ttyUSB1}\n"
 
@@ -279,6 +294,13 @@ def test_devices_that_are_not_there_are_told() -> None:
     )
     (line,) = errors_of(model, "channels: {/m: {channel: button, name: buton_1}}")
     assert line.endswith("the drive 'opencr' has no button 'buton_1'; did you mean 'button_1'?")
+    # What a plug-in declares counts, and where it declares nothing, all may be there.
+    drivers.register(drivers.Driver(drivers.Kind.DRIVE_BASE, "cart", "a cart", object, drivers.Facts(("button_7",))))
+    cart = head.replace("dynamixel", "cart")
+    assert tied(model, "channels: {/m: {channel: button, name: button_7}}", cart).channels.keys() == {"m"}
+    for channel in ("{channel: button, name: button_1}", "{channel: bumper}", "{channel: imu}"):
+        (line,) = errors_of(model, f"channels: {{/m: {channel}}}", cart)
+        assert "the drive 'cart' " in line
     plug_in = head.replace("dynamixel", "of_a_plug_in")
     for channel in ("{channel: button, name: any}", "{channel: bumper}", "{channel: imu}"):
         assert tied(model, f"channels: {{/m: {channel}}}", plug_in).channels.keys() == {"m"}

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from robosc.execution.event_log import NullLog
+from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor, make_supervisor
 from robosc_bridge.configuration import parse, tie
 from robosc_bridge.daemon.assembly import AssemblyError, Machine, assemble, check_settings
@@ -12,6 +13,7 @@ from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.simulated import SimulatedTurtleBot3
 from support.daemons import CONFIGURATION, MODEL
+from support.driven import driven
 from support.models import bundle_of
 
 
@@ -47,13 +49,27 @@ def test_what_needs_a_remote_face_is_refused_without_one(
 ) -> None:
     configuration = parse(CONFIGURATION.replace(*change).encode(), "test.yaml").configuration
     with pytest.raises(AssemblyError) as raised:
-        check_settings(configuration, tie(supervisor.model, configuration))
+        check_settings(configuration, tie(supervisor.model, configuration), Deployment.CONTROLLER)
     assert why in str(raised.value)
 
 
 def test_nobody_waits_in_standby_for_somebody_who_cannot_come(supervisor: Supervisor) -> None:
     with pytest.raises(AssemblyError, match="to wait in standby, the bridge needs "):
         machine(supervisor, CONFIGURATION, starts_itself=False)
+
+
+def test_a_rover_is_driven_within_its_own_limits() -> None:
+    """Those of its body, not those of a TurtleBot3; one that is called like one has its numbers."""
+    own = "{wheel_separation_m: 0.16, linear_m_s: 0.1, angular_rad_s: 0.5}"
+    with driven("mavlink-rover", velocity=(3.0, 0.0), robot=own) as bridge:
+        assert bridge.limits.linear_m_s == 0.1
+        assert bridge.limits.separation_m == 0.16
+        assert bridge.limits.wheel_m_s == pytest.approx(0.14)
+        bridge.steady()
+        assert bridge.wheels_m_s == pytest.approx((0.1, 0.1), rel=0.05)
+    with driven("mavlink-rover") as bridge:
+        assert (bridge.limits.linear_m_s, bridge.limits.separation_m) == (0.22, 0.16)
+        bridge.moves()
 
 
 class RecordedFace:
@@ -91,3 +107,21 @@ def test_a_face_that_cannot_start_opens_no_device_and_stops_the_others(superviso
         made.run([first, second])
     assert first.told == ["start False", "stop False None"]
     assert not made.drive.is_alive
+
+
+@pytest.mark.parametrize(
+    ("remote", "why"),
+    [
+        ("{grpc_address: '0.0.0.0:50061'}", "remote: 0.0.0.0:50061 can be reached from other machines"),
+        ("{grpc_address: '127.0.0.1:70000'}", "remote: not HOST:PORT"),
+        ("{grpc_address: '127.0.0.1:1', tls_key: k}", "remote: a certificate and its key belong together"),
+        ("{grpc_address: '127.0.0.1:1', client_ca: c}", "remote: callers' certificates are checked with TLS only"),
+    ],
+)
+def test_a_face_that_may_not_listen_so_is_refused_before_anything_is_made(
+    remote: str, why: str, supervisor: Supervisor
+) -> None:
+    configuration = parse(f"{CONFIGURATION}\nremote: {remote}\n".encode(), "test.yaml").configuration
+    with pytest.raises(AssemblyError) as raised:
+        check_settings(configuration, tie(supervisor.model, configuration), supervisor.deployment)
+    assert why in str(raised.value)

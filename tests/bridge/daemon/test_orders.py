@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import pytest
 
-from robosc_bridge.daemon.loop import RESET_LIMIT_S, STOP_LIMIT_S
+from robosc_bridge.daemon.conductor import RESET_LIMIT_S, STOP_LIMIT_S
 from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, ResetDone
 from robosc_bridge.daemon.states import Command, Order, State
 from robosc_bridge.devices.interface import STANDSTILL
@@ -311,6 +311,17 @@ def test_a_fault_is_left_by_a_reset_that_is_done_and_not_before() -> None:
     assert (answers, scene.daemon.state, scene.daemon.problem) == ([DONE], State.STANDBY, "")
     assert scene.ask(Command.START, 1.0) == [DONE]
     assert scene.out.linear_m_s == 0.1
+
+
+def test_a_reset_that_is_overtaken_by_a_stop_forgets_nothing() -> None:
+    scene = supervisor_fault()
+    scene.live(0.1)
+    answers = scene.order(Command.RESET)
+    scene.order(Command.STOP)
+    scene.live(0.1)
+    assert answers == [str(Reason.OPERATOR_STOP)]
+    reasons = scene.safety.output(scene.clock.monotonic()).reasons
+    assert {Reason.SUPERVISOR_FAULT, Reason.OPERATOR_STOP} <= set(reasons)
 
 
 @pytest.mark.parametrize("problem", ["the motor is hot", None])

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from robosc.cli.main import main as robosc
 from robosc_bridge.simulated import SimulatedTurtleBot3
 from support.models import EXAMPLES
 
@@ -38,6 +39,7 @@ def configured(folder: Path, robot: SimulatedTurtleBot3, base: str) -> Path:
     ports = iter((robot.base_path, robot.scanner_path))
     text = re.sub(r"^  port: .*$", lambda _: f"  port: {next(ports)}", made.stdout, flags=re.MULTILINE)
     # A machine on which tests run is not one for robots.
+    text = text.replace("\nscanner:\n", "  options: {answer_limit_s: 0.3}\n\nscanner:\n", 1)
     text = re.sub(r"^  (overrun_s|motor_timeout_s|scan_timeout_s): .*$", r"  \1: 1.0", text, flags=re.MULTILINE)
     file = folder / "bridge.yaml"
     file.write_text(text)
@@ -114,15 +116,47 @@ def test_what_is_not_tied_is_listed(tmp_path: Path) -> None:
         assert "Traceback" not in done.stderr
 
 
+def test_a_signed_supervisor_is_run_without_its_model(tmp_path: Path) -> None:
+    supervisor = tmp_path / "maze.rsup"
+    for command in (
+        ("synth", str(MODEL), "-o", str(supervisor)),
+        ("key", str(tmp_path / "ours")),
+        ("sign", str(supervisor), "--key", str(tmp_path / "ours.key")),
+    ):
+        assert robosc(list(command)) == 0
+    with SimulatedTurtleBot3("burger", "opencr", "lds01") as robot:
+        file = configured(tmp_path, robot, "opencr")
+        text = file.read_text()
+        assert "  trusted_keys: []\n" in text
+        file.write_text(text.replace("  trusted_keys: []\n", f"  trusted_keys: [{tmp_path / 'ours.pub'}]\n"))
+        command_line = ["run", "--model", str(supervisor), "--config", str(file)]
+        process = subprocess.Popen(
+            [sys.executable, "-m", "robosc_bridge.main", *command_line], stderr=subprocess.PIPE, text=True
+        )
+        try:
+            start = robot.world.pose
+            wait_until(lambda: robot.world.pose != start, "the robot to move", process, START_LIMIT_S)
+            process.send_signal(signal.SIGTERM)
+            _, errors = process.communicate(timeout=LIMIT_S)
+        finally:
+            process.kill()
+            process.communicate()
+        assert process.returncode == 0, errors
+        assert "maze.rsup: signed by SHA256:" in errors
+        supervisor.write_bytes(supervisor.read_bytes() + b" ")
+        refused = bridge(*command_line)
+        assert (refused.returncode, "has been changed" in refused.stderr) == (2, True)
+
+
 def test_what_is_not_served_is_refused(tmp_path: Path) -> None:
     model = EXAMPLES / "line_follower" / "line_follower.rscd"
     made = bridge("init", "--model", str(model))
     file = tmp_path / "bridge.yaml"
-    file.write_text(made.stdout)
+    file.write_text(made.stdout.replace("grpc_address: null", "grpc_address: 127.0.0.1:50061"))
     done = bridge("run", "--model", str(model), "--config", str(file))
     assert done.returncode == 2
     assert "not served by this version of the bridge: " in done.stderr
-    assert "is tied to 'line'" in done.stderr
+    assert "'remote.grpc_address'" in done.stderr
 
 
 def test_standby_without_a_remote_face_is_refused(tmp_path: Path) -> None:

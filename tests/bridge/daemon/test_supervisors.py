@@ -1,15 +1,19 @@
-"""Supervisors are made here, read, or asked for; a foreign one is executed only if the verifier passes it."""
+"""Supervisors are made here, read, or asked for; a foreign one is executed if it is signed or verified."""
 
 import json
 import os
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from robosc.language import load_bundle
 from robosc.model.structure import Deployment
+from robosc.signatures import PublicKey, make_key_pair, read_private_key, sign, signature_file
 from robosc.supervisor import Supervisor, encode, make_supervisor
-from robosc_bridge.daemon.supervisors import NoSupervisorError, Source, obtain
+from robosc_bridge.daemon.supervisors import NoSupervisorError, Source, obtain, trusted_keys
 from support.service import served
 
 GATE = """robot Carrier {
@@ -117,6 +121,121 @@ def test_a_robot_without_a_supervisor_is_told_so(tmp_path: Path) -> None:
         provide drive with 0.2
     }"""
     assert "no supervisor exists" in refusal(Source(written(tmp_path, text), CONTROLLER))
+
+
+# Signed.
+
+
+@dataclass(frozen=True)
+class Signed:
+    """A signed supervisor without its model beside it, and keys."""
+
+    file: Path
+    ours: PublicKey
+    others: PublicKey
+
+    @property
+    def signature(self) -> Path:
+        return signature_file(self.file)
+
+    def source(self, *keys: PublicKey) -> Source:
+        return Source(self.file, CONTROLLER, trusted=keys)
+
+
+@pytest.fixture
+def signed(tmp_path: Path) -> Signed:
+    model = written(tmp_path)
+    file = tmp_path / "carrier.rsup"
+    file.write_bytes(encode(supervisor_of(model)))
+    model.unlink()
+    ours, others = (make_key_pair(tmp_path / f"{name}.key", tmp_path / f"{name}.pub", name) for name in ("a", "b"))
+    found = Signed(file, ours, others)
+    found.signature.write_bytes(sign(file.read_bytes(), read_private_key(tmp_path / "a.key")))
+    return found
+
+
+def test_a_signed_file_is_taken_without_its_model_and_without_verification(
+    signed: Signed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr("robosc_bridge.daemon.supervisors.recheck")
+    told: list[str] = []
+    found = obtain(signed.source(signed.others, signed.ours), told.append)
+    assert encode(found) == signed.file.read_bytes()
+    assert told == [f"{signed.file}: signed by {signed.ours}"]
+
+
+def test_a_signature_that_is_not_trusted_is_none(signed: Signed, tmp_path: Path) -> None:
+    problem = "is not signed by a trusted key, and the model that it is checked against is missing"
+    assert problem in refusal(signed.source(signed.others))
+    assert "the model that it is checked against is missing" in refusal(signed.source())
+    # With its model, the verifier decides.
+    written(tmp_path)
+    told: list[str] = []
+    obtain(signed.source(signed.others), told.append)
+    assert "which is not a trusted key: it is verified instead" in told[0]
+    assert "verification against carrier.rscd" in told[1]
+    signed.signature.unlink()
+    assert obtain(signed.source(signed.ours)) == supervisor_of(tmp_path / "carrier.rscd")
+
+
+@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(place=st.integers(0, 10**6), change=st.integers(1, 255), is_file=st.booleans())
+def test_a_byte_that_is_changed_is_refused(signed: Signed, place: int, change: int, is_file: bool) -> None:
+    target = signed.file if is_file else signed.signature
+    before = target.read_bytes()
+    place %= len(before)
+    target.write_bytes(before[:place] + bytes((before[place] ^ change,)) + before[place + 1 :])
+    try:
+        problem = refusal(signed.source(signed.ours))
+        assert is_file is ("the file or its signature has been changed" in problem) or not is_file
+    finally:
+        target.write_bytes(before)
+
+
+def test_a_changed_file_is_refused_though_the_verifier_would_pass_it(signed: Signed, tmp_path: Path) -> None:
+    """Somebody has been at it: that is not passed over."""
+    written(tmp_path)
+    signed.file.write_bytes(signed.file.read_bytes().replace(b"\n", b" \n"))
+    assert obtain(signed.source())
+    assert "does not fit: the file or its signature has been changed" in refusal(signed.source(signed.ours))
+
+
+def test_a_signed_file_beside_another_model_is_refused(signed: Signed, tmp_path: Path) -> None:
+    written(tmp_path, GATE.replace("0.2", "0.3"))
+    problem = "it is signed, but was made of other texts than carrier.rscd beside it"
+    assert problem in refusal(signed.source(signed.ours))
+    written(tmp_path)
+    assert obtain(signed.source(signed.ours))
+
+
+def test_a_signed_file_for_another_deployment_is_refused(signed: Signed) -> None:
+    source = replace(signed.source(signed.ours), deployment=Deployment.LAYER)
+    assert "made for the deployment controller, not layer" in refusal(source)
+
+
+def test_what_is_signed_and_no_supervisor_is_refused(signed: Signed) -> None:
+    signed.file.write_bytes(b"{}")
+    signed.signature.write_bytes(sign(b"{}", read_private_key(signed.file.with_name("a.key"))))
+    assert "carrier.rsup: " in refusal(signed.source(signed.ours))
+
+
+def test_a_signature_that_is_too_large_is_refused(signed: Signed) -> None:
+    signed.signature.write_bytes(b"x" * 100_000)
+    assert "more bytes than a signature may have (1024)" in refusal(signed.source(signed.ours))
+
+
+def test_trusted_keys_are_lines_or_files(signed: Signed) -> None:
+    file = signed.file.with_name("a.pub")
+    assert trusted_keys([str(file), f"{signed.others.line} b"]) == (signed.ours, signed.others)
+    assert trusted_keys([]) == ()
+    for entry, problem in {
+        "ssh-ed25519 AAAA": "supervisor.trusted_keys: no public key (ssh-ed25519 AAAA...)",
+        str(file.with_name("none.pub")): "none.pub: No such file or directory",
+        str(signed.file): "carrier.rsup: no public key",
+    }.items():
+        with pytest.raises(NoSupervisorError) as raised:
+            trusted_keys([entry])
+        assert problem in str(raised.value)
 
 
 # From a server.

@@ -21,7 +21,8 @@ from robosc_bridge.devices.lidar import (
     make_lds02,
     make_lds03,
 )
-from robosc_bridge.devices.registry import Kind, available_drivers, make_range_scanner
+from robosc_bridge.devices.registry import make_range_scanner
+from robosc_bridge.drivers import Kind, available_drivers
 from robosc_bridge.errors import LineError, LineLostError, LineMissingError
 from robosc_bridge.transport.serial_line import SerialLine
 from support.lidar_frames import lds01_frame, lds02_frame, lds03_frame

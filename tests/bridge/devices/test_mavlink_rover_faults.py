@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from robosc_bridge.devices import mavlink_rover
-from robosc_bridge.devices.mavlink_rover import RoverBody
 from robosc_bridge.devices.registry import make_drive_base, make_range_scanner
+from robosc_bridge.devices.robots import Body
 from robosc_bridge.errors import (
     DeviceError,
     DeviceSilentError,
@@ -126,7 +126,7 @@ def test_nothing_is_left_behind(any_bench: Bench) -> None:
 @pytest.mark.parametrize("values", [(0.0, 1.0, 0.3), (0.5, math.nan, 0.3), (0.5, 1.0, -1.0)])
 def test_a_body_needs_numbers(values: tuple[float, float, float]) -> None:
     with pytest.raises(ValueError, match="must be a positive number"):
-        RoverBody(*values)
+        Body(*values)
 
 
 def test_a_signed_vehicle_is_driven_with_its_key_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,377 @@
+"""What the bridge is doing, and what changes that: operators' commands, devices, the safety layer, the supervisor.
+
+What each command does in each state stands in docs/bridge-daemon.md.
+"""
+
+import logging
+from collections.abc import Callable
+from typing import assert_never
+
+from robosc.execution.clock import Clock
+from robosc_bridge.daemon.execution import Execution
+from robosc_bridge.daemon.jobs import Job
+from robosc_bridge.daemon.motion import Motion
+from robosc_bridge.daemon.orders import Orders, Until, answer
+from robosc_bridge.daemon.readiness import Readiness
+from robosc_bridge.daemon.reports import Device, DeviceDown, SafetyNotice
+from robosc_bridge.daemon.robot import Robot
+from robosc_bridge.daemon.states import Command, Order, State
+from robosc_bridge.daemon.stop_switch import STOP_HELD, StopSwitch
+from robosc_bridge.safety import LATCHING, Reason, SafetyLayer
+
+_log = logging.getLogger(__name__)
+
+STOP_LIMIT_S = 3.0
+"""How long the motors may take to let go."""
+
+RESET_LIMIT_S = 15.0
+"""How long a reset of the motors may take."""
+
+OVER = "the bridge has ended"
+
+# They end by themselves, and belong to every start and stop.
+_ORDINARY = frozenset({Reason.STANDBY, Reason.TORQUE_AWAITED, Reason.COMMAND_SILENT})
+# An operator's stop is no fault; what is wrong with the supervisor is told by itself.
+_GRAVE = frozenset(LATCHING) - {Reason.OPERATOR_STOP, Reason.SUPERVISOR_FAULT}
+
+
+class Conductor:
+    """The state of the bridge; used by the loop's thread.
+
+    Args:
+        job: What is executed.
+        safety: Through which all motion passes.
+        readiness: What is known of the devices.
+        orders: Orders without an answer.
+        clock: The only source of time.
+
+    Attributes:
+        state: What the bridge is doing.
+        problem: The fault that has stopped it; empty: none.
+        notice: What the safety layer says.
+    """
+
+    def __init__(self, job: Job, safety: SafetyLayer, readiness: Readiness, orders: Orders, clock: Clock) -> None:
+        self.state = State.STARTING
+        self.problem = ""
+        self.notice = SafetyNotice((), ())
+        self._stays_after_fault = job.stays_after_fault
+        self._starts_itself = job.starts_itself
+        self._safety = safety
+        self._readiness = readiness
+        self._orders = orders
+        self._clock = clock
+        self._stop_end_s = self._reset_end_s = 0.0
+        self._after_stop = State.STANDBY
+        self._is_drive_lost = False
+        self._failed_turn = self._missing = ""
+        self._hurry: Callable[[], None] = lambda: None
+        self._reset_drive: Callable[[], None] = lambda: None
+        self._are_alive: Callable[[], bool] = lambda: True
+
+    def lead(
+        self, execution: Execution, robot: Robot, motion: Motion, switch: StopSwitch, note: Callable[[str, str], None]
+    ) -> None:
+        """What it brings to work and to rest, and where it notes what watchers want to see."""
+        self._execution = execution
+        self._robot = robot
+        self._motion = motion
+        self._switch = switch
+        self._note = note
+
+    def connect(
+        self, hurry: Callable[[], None], reset_drive: Callable[[], None], are_alive: Callable[[], bool]
+    ) -> None:
+        """Tell how the drive base's thread is told to hurry and to reset its motors, and whether all threads live."""
+        self._hurry = hurry
+        self._reset_drive = reset_drive
+        self._are_alive = are_alive
+
+    # Devices and the safety layer.
+
+    def device_came(self, device: Device) -> None:
+        """A device works."""
+        _log.info("the %s is there", device)
+        is_news = self._readiness.came(device)
+        executor = self._execution.executor
+        if is_news:
+            self._note("device", f"the {device} is there")
+        if executor is not None and is_news:
+            self._robot.saw_device(device, f"the {device} is back", executor, is_lost=False)
+
+    def device_went(self, report: DeviceDown) -> None:
+        """A device does not work."""
+        is_news = self._readiness.went(report.device)
+        if report.is_first:
+            _log.error("%s: %s", report.device, report.problem)
+            self._note("device", f"{report.device}: {report.problem}")
+        executor = self._execution.executor
+        if executor is None or not is_news:
+            return
+        self._robot.saw_device(report.device, report.problem, executor, is_lost=True)
+        if report.device is Device.DRIVE:
+            self._is_drive_lost = True
+            self._fault(f"the drive base is lost: {report.problem}")
+
+    def heed(self, notice: SafetyNotice) -> None:
+        """Tell a person why nothing moves; what only a person can end ends the run."""
+        known, self.notice = self.notice.warnings, notice
+        for warning in notice.warnings:
+            if warning not in known:
+                _log.warning("%s", warning)
+        for reason in notice.reasons:
+            # Before the start, nothing has told anything yet.
+            is_news = self.state is State.RUNNING and reason not in _ORDINARY
+            _log.log(logging.WARNING if is_news else logging.DEBUG, "%s", reason)
+        grave = [reason for reason in notice.reasons if reason in _GRAVE]
+        if grave and self.state is State.RUNNING:
+            self._fault(" ".join(grave))
+
+    # Commands.
+
+    def obey(self, order: Order) -> None:
+        """Do what is ordered, or answer why not."""
+        self._orders.arrived(order)
+        command = order.command
+        text = f"{command} ({order.by})" if order.by else str(command)
+        _log.info("%s", text)
+        self._note("order", text)
+        if self.state is State.OVER:
+            answer(order, OVER)
+            return
+        match command:
+            case Command.START:
+                self._order_start(order)
+            case Command.STOP:
+                if self.state is State.STOPPING:
+                    # A reset that waits for the standstill would forget this stop, which came after it.
+                    self._orders.settle(Until.RESET, str(Reason.OPERATOR_STOP))
+                self._switch.stop(self._execution.executor)
+                self._settle()
+                answer(order, "")
+            case Command.STANDBY:
+                self._order_standby(order)
+            case Command.RESUME:
+                why = self._switch.resume(self._execution.executor)
+                self._settle()
+                answer(order, why)
+            case Command.RESET:
+                self._order_reset(order)
+            case Command.QUIT:
+                self._orders.wait(Until.RESTING, order)
+                if self.state is not State.STOPPING:
+                    self._end("the bridge ends", State.OVER)
+                self._after_stop = State.OVER
+            case _:
+                assert_never(command)
+
+    def _settle(self) -> None:
+        if self._execution.executor is not None:
+            self._robot.settle(self._execution.executor)
+
+    def _order_start(self, order: Order) -> None:
+        self._look_for_devices()
+        why = self._why_not_start()
+        if why:
+            answer(order, why)
+            return
+        if self.state is State.STANDBY:
+            self._begin()
+        # What the first steps of the supervisor lead to is known at the end of this turn.
+        self._orders.wait(Until.STARTED, order)
+
+    def _why_not_start(self) -> str:
+        if self.state is State.STARTING:
+            return f"the robot is starting: {self._readiness.missing()}"
+        if self.state is State.STOPPING:
+            return "the robot is being stopped"
+        if self.state is State.FAULT:
+            return f"the robot is in fault: {self.problem}; reset it first"
+        if self._orders.is_stop_coming:
+            return "it was told to stop meanwhile"
+        if self._orders.is_waiting(Until.RESET):
+            return "the motors are being reset"
+        latched = self._latched()
+        if latched:
+            return f"{latched} Resume or reset it first."
+        return "" if self.state is State.RUNNING else self._readiness.missing() or self._dead_thread()
+
+    def _dead_thread(self) -> str:
+        return "" if self._are_alive() else "a device's thread has ended; the bridge must be started anew"
+
+    def _latched(self) -> str:
+        """What holds until somebody says otherwise."""
+        reasons = [reason for reason in self.notice.reasons if reason in LATCHING]
+        if self._switch.is_stopped and Reason.OPERATOR_STOP not in reasons:
+            reasons.append(Reason.OPERATOR_STOP)
+        return " ".join(reasons)
+
+    def _order_standby(self, order: Order) -> None:
+        match self.state:
+            case State.STARTING:
+                self._starts_itself = False
+                answer(order, "")
+            case State.STANDBY:
+                answer(order, "")
+            case State.RUNNING:
+                self._orders.wait(Until.RESTING, order)
+                self._end("standby", State.STANDBY)
+            case State.STOPPING:
+                self._orders.wait(Until.RESTING, order)
+            case _:
+                answer(order, f"the robot is in fault: {self.problem}; reset it first")
+
+    def _order_reset(self, order: Order) -> None:
+        if self.state is State.STOPPING and not self._orders.is_waiting(Until.RESET):
+            answer(order, "the robot is being stopped")
+            return
+        self._orders.wait(Until.RESET, order)
+        if self.state is State.RUNNING:
+            # First to standby: motors that move are not reset.
+            self._end("reset", State.STANDBY)
+        elif self.state is not State.STOPPING:
+            self._reset()
+
+    def _reset(self) -> None:
+        """Forget what has latched, and let the drive base reset its motors."""
+        why = "" if self._readiness.is_drive_there else "the drive base is not there"
+        why = why or (STOP_HELD if self._switch.is_held else "") or self._release_safety()
+        if why:
+            _log.error("reset: %s", why)
+            self._orders.settle(Until.RESET, why)
+            return
+        self._switch.reset()
+        self._reset_end_s = self._clock.monotonic() + RESET_LIMIT_S
+        self._reset_drive()
+
+    def reset_done(self, problem: str) -> None:
+        """The drive base has reset its motors; empty: without a problem."""
+        _log.log(logging.ERROR if problem else logging.INFO, "reset: %s", problem or "done")
+        if self.state is State.FAULT and not problem and self._orders.is_waiting(Until.RESET):
+            self.state, self.problem = State.STANDBY, ""
+        self._orders.settle(Until.RESET, problem)
+
+    def _release_safety(self) -> str:
+        """Let the safety layer forget what has latched; why it does not."""
+        if self._orders.is_stop_coming:
+            return str(Reason.OPERATOR_STOP)
+        remaining = self._safety.reset()
+        if remaining:
+            return " ".join(remaining)
+        if self._orders.is_stop_coming:
+            # It came between the two, and may have been forgotten with the others.
+            self._safety.operator_stop()
+            return str(Reason.OPERATOR_STOP)
+        self.notice = SafetyNotice(
+            tuple(reason for reason in self.notice.reasons if reason not in LATCHING), self.notice.warnings
+        )
+        return ""
+
+    # Runs.
+
+    def _begin(self) -> None:
+        executor = self._execution.begin()
+        self.problem = ""
+        self.state = State.RUNNING
+        self._safety.enable()
+        executor.start()
+        self._switch.begin(executor)
+        if self._readiness.scan is not None:
+            # It must not decide on nothing while the last one is at hand.
+            self._robot.saw_scan(self._readiness.scan, executor)
+        _log.info("running")
+
+    def _end(self, reason: str, then: State) -> None:
+        """Bring the robot to rest; `then` follows once the motors have let go."""
+        if self._execution.executor is not None:
+            self._execution.executor.stop(reason)
+        self._motion.stop(self._clock.monotonic(), reason)
+        self._safety.disable()
+        self._hurry()
+        if self.state is not State.STOPPING or self._after_stop is not State.OVER:
+            # Who wants the bridge to end gets that, whatever fails on the way.
+            self._after_stop = then
+        self.state = State.STOPPING
+        self._stop_end_s = self._clock.monotonic() + STOP_LIMIT_S
+
+    def _fault(self, problem: str) -> None:
+        _log.error("%s", problem)
+        self._end(problem, State.FAULT if self._stays_after_fault else State.OVER)
+        self.problem = problem
+
+    def look(self, now_s: float) -> None:
+        """At the end of a turn: whether the state becomes another."""
+        if self.state is State.RUNNING and not self._are_alive():
+            self._fault("a device's thread has ended")
+        if self._failed_turn and self.state is State.RUNNING:
+            self._fault(f"a turn has failed, and no message of the model tells it so: {self._failed_turn}")
+        self._failed_turn = ""
+        executor = self._execution.executor
+        if self.state is State.RUNNING and executor is not None and executor.is_faulty:
+            self._safety.supervisor_fault()
+            self._fault("; ".join(executor.reasons))
+        self._orders.settle(Until.STARTED, "" if self.state is State.RUNNING else self.problem or "it was stopped")
+        match self.state:
+            case State.STARTING if self._look_for_devices() and self._starts_itself:
+                self._begin()
+            case State.STOPPING if not self._readiness.has_torque or now_s >= self._stop_end_s:
+                self._come_to_rest()
+            case State.FAULT if self._is_drive_lost and self._readiness.is_drive_there:
+                # Nothing moves before somebody says so.
+                self._is_drive_lost = False
+                self.problem = ""
+                self.state = State.STANDBY
+        if self._orders.is_waiting(Until.RESET) and self.state is not State.STOPPING and now_s >= self._reset_end_s:
+            self._orders.settle(Until.RESET, f"the motors were not reset within {RESET_LIMIT_S:g} s")
+
+    def _look_for_devices(self) -> bool:
+        """Leave the start once all devices are there; whether it does now."""
+        missing = self._readiness.missing() if self.state is State.STARTING else ""
+        if missing and missing != self._missing:
+            _log.info("waiting: %s", missing)
+        self._missing = missing
+        are_there = self.state is State.STARTING and not missing
+        if are_there:
+            self.state = State.STANDBY
+            _log.info("standby")
+        return are_there
+
+    def _come_to_rest(self) -> None:
+        """What was executed is at rest, or will not come to rest."""
+        has_let_go = not self._readiness.has_torque
+        if not has_let_go:
+            self.problem = self.problem or f"the motors have not let go within {STOP_LIMIT_S:g} s"
+            _log.error("%s", self.problem)
+        self._execution.end()
+        self.state = self._after_stop
+        if self.state is State.STANDBY and not has_let_go:
+            self.state = State.FAULT
+        _log.info("%s", self.state)
+        self._orders.settle(Until.RESTING, "" if has_let_go and self.state is not State.FAULT else self.problem)
+        if self._orders.is_waiting(Until.RESET) and self.state is not State.OVER:
+            self._reset()
+
+    def operator_stop(self) -> None:
+        """The operator stops the robot."""
+        self._safety.operator_stop()
+        self._hurry()
+        # What was wanted before does not move the robot afterwards.
+        self._robot.stop("the operator has stopped the robot")
+
+    def operator_resume(self) -> str:
+        """Let the robot go on after an operator's stop; why it cannot."""
+        if self.state in (State.STOPPING, State.OVER):
+            return "the robot is being stopped"
+        if self.state is State.FAULT:
+            return f"the robot is in fault: {self.problem}; reset it first"
+        others = [reason for reason in self.notice.reasons if reason in _GRAVE]
+        why = f"{' '.join(others)} Reset it first." if others else self._release_safety()
+        if why:
+            _log.error("the robot cannot go on: %s", why)
+        elif self.state is State.RUNNING:
+            self._safety.enable()
+        return why
+
+    def turn_failed(self, reason: str) -> None:
+        """A turn has failed of which the model hears nothing."""
+        self._failed_turn = reason or "it was ended"

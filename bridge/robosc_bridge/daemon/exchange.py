@@ -1,0 +1,180 @@
+"""The model's other side on the channel `grpc`: messages, services and actions of connected programs.
+
+Numbers of calls and goals are never used again while the bridge runs, so that what a program answers late, or to an
+earlier run, is told from what is awaited now.
+"""
+
+import logging
+from dataclasses import dataclass
+from typing import Any
+
+from robosc.model.structure import Communication, CommunicationKind
+from robosc_bridge.configuration.channels import GrpcChannel
+from robosc_bridge.configuration.ties import Ties
+from robosc_bridge.daemon.programs import (
+    CallFailed,
+    CallMade,
+    CancelMade,
+    FeedbackGiven,
+    GoalAccepted,
+    GoalEnded,
+    GoalMade,
+    MessageSent,
+    Program,
+    Replied,
+    Told,
+)
+from robosc_bridge.daemon.roster import Roster
+from robosc_bridge.daemon.supervised import Listeners, Supervised
+
+_log = logging.getLogger(__name__)
+
+OUTCOMES = ("succeeded", "aborted", "cancelled", "rejected")
+"""How a program may say that a goal has ended."""
+
+_SERVED = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
+
+Answer = Replied | CallFailed | GoalAccepted | FeedbackGiven | GoalEnded
+"""What a program says about a call or goal of the model."""
+
+
+@dataclass
+class _Open:
+    """A call or goal that a program has been told of, and whose end it has not told.
+
+    Attributes:
+        program: That serves it.
+        name: Of the service or action.
+        number: Of the executor.
+        is_goal: Whether it is a goal.
+        is_cancelled: Whether the program was told to end it.
+    """
+
+    program: Program
+    name: str
+    number: int
+    is_goal: bool
+    is_cancelled: bool = False
+
+
+class Exchange:
+    """What the model and programs tell each other.
+
+    Args:
+        ties: What each communication of the model is tied to.
+        listeners: Who is told what.
+        roster: Programs that are there.
+    """
+
+    def __init__(self, ties: Ties, listeners: Listeners, roster: Roster) -> None:
+        tied = [item for item, _ in ties.tied_to(GrpcChannel)]
+        self._services = {item.name: item for item in tied if item.kind in _SERVED}
+        self._heard = frozenset(identifier for identifier, _ in listeners.of(GrpcChannel))
+        self._roster = roster
+        self._servers: dict[str, Program] = {}
+        self._open: dict[int, _Open] = {}
+        self._next_number = 1
+
+    # The model's side.
+
+    def forget(self) -> None:
+        """A run is over, or a new one begins: calls and goals of before mean nothing any more."""
+        for number in [number for number, item in self._open.items() if item.is_goal]:
+            self._cancel(number)
+        self._open.clear()
+
+    def send(self, communication: Communication, data: Any) -> None:
+        """The model sends a message."""
+        self._roster.tell_all(MessageSent(communication.name, communication.identifier, data))
+
+    def call(self, communication: Communication, number: int, data: Any) -> str:
+        """The model calls a service; why nobody is asked."""
+        return self._ask(communication, number, data, is_goal=False)
+
+    def send_goal(self, communication: Communication, number: int, data: Any) -> bool:
+        """The model asks for an action; whether somebody is asked."""
+        return not self._ask(communication, number, data, is_goal=True)
+
+    def cancel(self, number: int) -> None:
+        """The model wants a goal to end."""
+        for own, item in self._open.items():
+            if item.is_goal and item.number == number:
+                self._cancel(own)
+
+    def _ask(self, communication: Communication, number: int, data: Any, *, is_goal: bool) -> str:
+        name = communication.name
+        program = self._servers.get(name)
+        if program is None:
+            why = f"no program serves '{name}' ('{communication.identifier}')"
+            _log.warning("%s", why)
+            return why
+        # The model asks anew: it has given up what it asked for before, such as a call that nobody answered.
+        self._open = {own: item for own, item in self._open.items() if item.name != name}
+        own, self._next_number = self._next_number, self._next_number + 1
+        self._open[own] = _Open(program, name, number, is_goal)
+        self._roster.tell(program, GoalMade(name, own, data) if is_goal else CallMade(name, own, data))
+        return ""
+
+    def _cancel(self, own: int) -> None:
+        item = self._open[own]
+        if not item.is_cancelled:
+            item.is_cancelled = True
+            self._roster.tell(item.program, CancelMade(item.name, own))
+
+    # The programs' side.
+
+    def attach(self, program: Program) -> None:
+        """A program is there: what it serves that nobody serves yet is asked of it from now on."""
+        for name in sorted(program.serves):
+            if name not in self._services:
+                self._roster.refuse(program, f"'{name}' is no service or action of the model that is tied to grpc")
+            elif name in self._servers:
+                self._roster.refuse(program, f"'{name}' is served by {self._servers[name].name} already")
+            else:
+                self._servers[name] = program
+
+    def detach(self, program: Program, executor: Supervised | None) -> None:
+        """A program is gone: what it was asked for has failed."""
+        self._servers = {name: server for name, server in self._servers.items() if server is not program}
+        lost = [own for own, item in self._open.items() if item.program is program]
+        for item in [self._open.pop(own) for own in lost]:
+            why = f"{program.name}, which served '{item.name}', is gone"
+            _log.warning("%s", why)
+            if executor is not None and item.is_goal:
+                executor.on_goal_ended(item.number, "lost")
+            elif executor is not None:
+                executor.on_call_failed(item.number, why)
+
+    def hear(self, item: Told, executor: Supervised | None) -> None:
+        """A program tells the model something; while nothing is executed, nobody listens."""
+        if item.identifier not in self._heard:
+            self._roster.refuse(item.program, f"the model hears nothing on '{item.identifier:.255}' from programs")
+        elif executor is not None:
+            executor.receive(item.identifier, item.data)
+
+    def take(self, item: Answer, executor: Supervised | None) -> None:
+        """A program says what has become of a call or goal of the model."""
+        asked = self._open.get(item.number)
+        is_goal = not isinstance(item, Replied | CallFailed)
+        if executor is None or asked is None or asked.program is not item.program or asked.is_goal is not is_goal:
+            what = "goal" if is_goal else "call"
+            self._roster.refuse(item.program, f"{item.number} is no {what} that this program is asked for now")
+            return
+        number = asked.number
+        match item:
+            case GoalAccepted():
+                executor.on_goal_accepted(number)
+            case FeedbackGiven(data=data):
+                executor.on_feedback(number, data)
+            case GoalEnded(outcome=outcome) if outcome not in OUTCOMES:
+                self._roster.refuse(item.program, f"a goal ends as one of {', '.join(OUTCOMES)}")
+            case GoalEnded(outcome=outcome, data=data):
+                del self._open[item.number]
+                executor.on_goal_ended(number, outcome, data)
+            case Replied(data=data):
+                del self._open[item.number]
+                executor.on_reply(number, data)
+            case CallFailed(reason=reason):
+                del self._open[item.number]
+                _log.warning("%s: '%s' has failed: %.200r", item.program.name, asked.name, reason)
+                executor.on_call_failed(number, reason)

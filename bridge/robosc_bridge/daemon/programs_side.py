@@ -1,0 +1,100 @@
+"""What programs send, brought to where it is meant: the model's other side, or the caller's side of a layer."""
+
+from typing import assert_never
+
+from robosc_bridge.daemon.exchange import Exchange
+from robosc_bridge.daemon.execution import Execution
+from robosc_bridge.daemon.program_inbox import Arrived, Overflowed, Unreadable
+from robosc_bridge.daemon.programs import (
+    Attached,
+    Called,
+    CallFailed,
+    CancelWanted,
+    Detached,
+    FeedbackGiven,
+    GoalAccepted,
+    GoalEnded,
+    GoalSent,
+    Program,
+    Replied,
+    Requested,
+    Told,
+)
+from robosc_bridge.daemon.requesters import Requesters
+from robosc_bridge.daemon.robot import Robot
+from robosc_bridge.daemon.roster import Roster
+
+
+class ProgramsSide:
+    """Takes up what programs send, in the loop's thread.
+
+    Args:
+        roster: Programs that are there.
+        exchange: The model's other side.
+        requesters: The caller's side of a layer.
+        execution: The supervisor at work.
+        robot: Tells the executor what has become of its requests.
+        is_layer: Whether programs may ask for anything.
+    """
+
+    def __init__(
+        self,
+        roster: Roster,
+        exchange: Exchange,
+        requesters: Requesters,
+        execution: Execution,
+        robot: Robot,
+        *,
+        is_layer: bool,
+    ) -> None:
+        self._roster = roster
+        self._exchange = exchange
+        self._requesters = requesters
+        self._execution = execution
+        self._robot = robot
+        self._is_layer = is_layer
+
+    def take(self, item: Arrived) -> None:
+        """Do what a program wants, or tell it why that makes no sense."""
+        program = item.program
+        if isinstance(item, Attached):
+            self._attach(program)
+        elif program in self._roster:
+            # What comes from others is too late: they are gone.
+            self._take(item)
+        if self._execution.executor is not None:
+            self._robot.settle(self._execution.executor)
+
+    def _attach(self, program: Program) -> None:
+        if program in self._roster:
+            self._roster.refuse(program, "this program is there already")
+            return
+        self._roster.add(program)
+        self._exchange.attach(program)
+
+    def _take(self, item: Arrived) -> None:
+        program, executor, layer = item.program, self._execution.executor, self._execution.layer
+        match item:
+            case Attached():
+                pass
+            case Detached():
+                self._roster.remove(program)
+                self._exchange.detach(program, executor)
+                self._requesters.detach(program, layer)
+            case Unreadable(why=why):
+                self._roster.refuse(program, why)
+            case Overflowed(lost=lost):
+                self._roster.refuse(program, f"this program sends too much at once: {lost} of it were not looked at")
+                if layer is not None:
+                    self._requesters.silence(program, layer)
+            case Told():
+                self._exchange.hear(item, executor)
+            case Replied() | CallFailed() | GoalAccepted() | FeedbackGiven() | GoalEnded():
+                self._exchange.take(item, executor)
+            case Requested() | Called() | GoalSent() | CancelWanted():
+                if self._is_layer:
+                    self._requesters.take(item, layer)
+                else:
+                    self._roster.refuse(program, "the supervisor is a controller: it lets nobody ask for anything")
+            case _:
+                assert_never(item)

@@ -1,0 +1,261 @@
+"""The caller's side of a supervision layer: programs that may ask for what the layer lets through or holds back.
+
+Ids of calls and goals are each program's own. What a program asked for ends with its connection: goals are cancelled,
+and what its messages and calls keep moving stands still at once, without waiting for `command_timeout_s`.
+"""
+
+import logging
+import math
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from robosc.execution.layer import Layer
+from robosc.model.structure import Communication, CommunicationKind, Model
+from robosc_bridge.configuration.channels import CHANNELS, Channel, RotateChannel, channel_name
+from robosc_bridge.configuration.shapes import Shape
+from robosc_bridge.configuration.ties import Ties
+from robosc_bridge.daemon.plain_data import accepted, completed, is_number, why_not_shaped, why_not_typed
+from robosc_bridge.daemon.programs import (
+    Answered,
+    Blocked,
+    Called,
+    CancelWanted,
+    FeedbackPassed,
+    GoalOver,
+    GoalRejected,
+    GoalSent,
+    GoalTaken,
+    PassedOn,
+    Program,
+    Requested,
+)
+from robosc_bridge.daemon.roster import Roster
+from robosc_bridge.daemon.wheel_messages import angle_of
+from robosc_bridge.skills.rotate import MAXIMUM_ANGLE_RAD
+
+_log = logging.getLogger(__name__)
+
+MAXIMUM_ID = 255
+"""Characters of an id of a program's own."""
+
+Asked = Requested | Called | GoalSent | CancelWanted
+"""What a program asks for."""
+
+_Id = tuple[Program, str]
+_GONE = "the program that asked for it is gone"
+
+
+class Requesters:
+    """What programs ask a supervision layer for, and what they are told of it.
+
+    Args:
+        model: Of the supervisor.
+        ties: What each communication is tied to.
+        roster: Programs that are there.
+        abandon: Ends a turn that a communication asked for, with the reason.
+    """
+
+    def __init__(self, model: Model, ties: Ties, roster: Roster, abandon: Callable[[str, str], None]) -> None:
+        self._model = model
+        self._channels = ties.channels
+        self._roster = roster
+        self._abandon = abandon
+        self._messages: dict[str, list[Communication]] = {}
+        self._others: dict[tuple[CommunicationKind, str], Communication] = {}
+        for item in ties.communications:
+            if item.kind is CommunicationKind.INCOMING_MESSAGE:
+                self._messages.setdefault(item.identifier, []).append(item)
+            elif item.kind is not CommunicationKind.OUTGOING_MESSAGE:
+                self._others[item.kind, item.name] = item
+        self._shapes: dict[str, Shape] = {}
+        for item in (*(item for found in self._messages.values() for item in found), *self._others.values()):
+            shape = CHANNELS[type(ties.channels[item.name])].uses[item.kind].request
+            self._shapes[item.name] = accepted(model, item.request, shape)
+        self._asker: Program | None = None
+        self._was_blocked = False
+        # Whose message went through last, by identifier; calls and goals under way.
+        self._senders: dict[str, Program] = {}
+        self._calls: dict[_Id, str] = {}
+        self._goals: dict[_Id, str] = {}
+
+    def forget(self) -> None:
+        """A run is over, or a new one begins: what is still awaited of the one before never comes."""
+        for (program, call_id), _ in self._calls.items():
+            self._roster.tell(program, Answered(call_id, None, is_default=True))
+        for (program, goal_id), _ in self._goals.items():
+            self._roster.tell(program, GoalOver(goal_id, "aborted", None))
+        self._senders.clear()
+        self._calls.clear()
+        self._goals.clear()
+
+    def detach(self, program: Program, layer: Layer | None) -> None:
+        """A program is gone: what it asked for ends."""
+        if layer is not None:
+            self.silence(program, layer)
+            for (owner, goal_id), action in tuple(self._goals.items()):
+                if owner is program:
+                    layer.on_cancel(action, (program, goal_id))
+            for (owner, _), service in tuple(self._calls.items()):
+                if owner is program:
+                    self._abandon(service, _GONE)
+        self._calls = {item: name for item, name in self._calls.items() if item[0] is not program}
+        self._goals = {item: name for item, name in self._goals.items() if item[0] is not program}
+
+    def silence(self, program: Program, layer: Layer) -> None:
+        """What a program's messages keep moving stands still."""
+        for identifier, sender in tuple(self._senders.items()):
+            if sender is program:
+                del self._senders[identifier]
+                layer.on_silent(identifier)
+                for item in self._messages[identifier]:
+                    self._abandon(item.name, _GONE)
+
+    # What programs ask for.
+
+    def take(self, item: Asked, layer: Layer | None) -> None:
+        """A program asks for something."""
+        program = item.program
+        why = self._why_refused(item)
+        if why:
+            self._roster.refuse(program, why)
+        elif layer is None:
+            self._hold_back(item)
+        else:
+            self._asker, self._was_blocked = program, False
+            self._pass(item, layer)
+            self._asker = None
+
+    def _pass(self, item: Asked, layer: Layer) -> None:
+        match item:
+            case Requested(program=program, identifier=identifier, data=data):
+                for message in self._messages[identifier]:
+                    data = completed(self._model, message.request, data)
+                layer.on_request(identifier, data)
+                if not self._was_blocked:
+                    self._senders[identifier] = program
+            case Called(program=program, service=service, call_id=call_id, data=data):
+                self._calls[program, call_id] = service
+                layer.on_call(service, (program, call_id), self._completed(CommunicationKind.SERVICE, service, data))
+            case GoalSent(program=program, action=action, goal_id=goal_id, data=data):
+                self._goals[program, goal_id] = action
+                layer.on_goal(action, (program, goal_id), self._completed(CommunicationKind.ACTION, action, data))
+            case CancelWanted(program=program, action=action, goal_id=goal_id):
+                layer.on_cancel(action, (program, goal_id))
+
+    def _completed(self, kind: CommunicationKind, name: str, data: Any) -> Any:
+        return completed(self._model, self._others[kind, name].request, data)
+
+    def _hold_back(self, item: Asked) -> None:
+        """Nothing is executed: everything is held back."""
+        match item:
+            case Requested(program=program, identifier=identifier):
+                self._roster.tell(program, Blocked(identifier))
+            case Called(program=program, service=service, call_id=call_id):
+                self._roster.tell(program, Answered(call_id, None, is_default=True))
+                self._roster.tell(program, Blocked(self._others[CommunicationKind.SERVICE, service].identifier))
+            case GoalSent(program=program, action=action, goal_id=goal_id):
+                self._roster.tell(program, GoalRejected(goal_id))
+                self._roster.tell(program, Blocked(self._others[CommunicationKind.ACTION, action].identifier))
+
+    # Whether it makes sense.
+
+    def _why_refused(self, item: Asked) -> str:
+        """Why what a program asks for makes no sense, one sentence; empty: it does."""
+        if not item.program.may_request:
+            return "this program may not ask for anything"
+        match item:
+            case Requested(identifier=identifier, data=data):
+                meant = self._messages.get(identifier)
+                if meant is None:
+                    return f"the model has no message to the robot on '{identifier:.255}'"
+                # Which of them it is, the layer finds out: it must fit any.
+                return next(filter(None, (self._why_unfit(message, data) for message in meant)), "")
+            case Called(program=program, service=service, call_id=call_id, data=data):
+                return self._why_no_start(CommunicationKind.SERVICE, service, (program, call_id), data)
+            case GoalSent(program=program, action=action, goal_id=goal_id, data=data):
+                return self._why_no_start(CommunicationKind.ACTION, action, (program, goal_id), data)
+            case CancelWanted(program=program, action=action, goal_id=goal_id):
+                is_own = self._goals.get((program, goal_id)) == action
+                return "" if is_own else f"'{goal_id:.255}' is no goal of '{action:.255}' that is under way"
+
+    def _why_no_start(self, kind: CommunicationKind, name: str, own: _Id, data: Any) -> str:
+        asked = self._others.get((kind, name))
+        if asked is None:
+            return f"the model has no {kind} '{name:.255}'"
+        if not 1 <= len(own[1]) <= MAXIMUM_ID:
+            return f"an id has 1 to {MAXIMUM_ID} characters"
+        if own in self._calls or own in self._goals:
+            return f"the id '{own[1]}' is in use"
+        return self._why_unfit(asked, data)
+
+    def _why_unfit(self, communication: Communication, data: Any) -> str:
+        """Why data is nothing that the channel and the model take."""
+        channel = self._channels[communication.name]
+        info = CHANNELS[type(channel)]
+        why = why_not_shaped(self._shapes[communication.name], data)
+        why = why or why_not_typed(self._model, communication.request, data)
+        if why:
+            return f"'{communication.name}': {why}"
+        for path, value in _leaves(data, ""):
+            if info.heeded and path not in info.heeded and value:
+                return f"'{communication.name}': '{path}' must be 0: '{channel_name(channel)}' does not go by it"
+        return _why_not_turned(communication, channel, data)
+
+    # What the layer tells.
+
+    def pass_on(self, identifier: str, message: Any) -> None:
+        """A message of the robot, after the supervisor has seen it."""
+        self._roster.tell_all(PassedOn(identifier, message))
+
+    def blocked(self, identifier: str) -> None:
+        """A request on an identifier was held back."""
+        self._was_blocked = True
+        if self._asker is not None:
+            self._roster.tell(self._asker, Blocked(identifier))
+
+    def answer(self, communication: str, call_id: _Id, data: Any) -> None:
+        """The service's reply to a call."""
+        self._calls.pop(call_id, None)
+        self._roster.tell(call_id[0], Answered(call_id[1], data, is_default=False))
+
+    def answer_default(self, communication: str, call_id: _Id) -> None:
+        """A default reply to a call that was held back or has failed."""
+        self._calls.pop(call_id, None)
+        self._roster.tell(call_id[0], Answered(call_id[1], None, is_default=True))
+
+    def accept_goal(self, communication: str, goal_id: _Id) -> None:
+        """A goal is let through."""
+        self._roster.tell(goal_id[0], GoalTaken(goal_id[1]))
+
+    def reject_goal(self, communication: str, goal_id: _Id) -> None:
+        """A goal is held back."""
+        self._goals.pop(goal_id, None)
+        self._roster.tell(goal_id[0], GoalRejected(goal_id[1]))
+
+    def pass_feedback(self, communication: str, goal_id: _Id, data: Any) -> None:
+        """Feedback of a goal."""
+        self._roster.tell(goal_id[0], FeedbackPassed(goal_id[1], data))
+
+    def end_goal(self, communication: str, goal_id: _Id, outcome: str, data: Any) -> None:
+        """An accepted goal has ended for its caller."""
+        self._goals.pop(goal_id, None)
+        self._roster.tell(goal_id[0], GoalOver(goal_id[1], outcome, data))
+
+
+def _why_not_turned(communication: Communication, channel: Channel, data: Any) -> str:
+    """Why no turn can be made of an angle; one that is not finite is held back by the layer."""
+    if isinstance(channel, RotateChannel):
+        angle = angle_of(data)
+        rad = math.radians(angle) if channel.unit == "degrees" else angle
+        if math.isfinite(rad) and abs(rad) > MAXIMUM_ANGLE_RAD:
+            return f"'{communication.name}': an angle of {angle:g} {channel.unit} is beyond a hundred turns"
+    return ""
+
+
+def _leaves(data: Any, path: str) -> Iterator[tuple[str, float]]:
+    """Numbers of plain data, by where they stand in it."""
+    if isinstance(data, dict):
+        for name, part in data.items():
+            yield from _leaves(part, f"{path}.{name}" if path else name)
+    elif is_number(data):
+        yield path, data

@@ -1,0 +1,83 @@
+"""The operator's stop and resume, from buttons, keys and elsewhere: to the safety layer first, then to the model."""
+
+from collections.abc import Callable, Collection
+
+from robosc_bridge.configuration.channels import EmergencyStopChannel
+from robosc_bridge.daemon.supervised import Listeners, Supervised
+from robosc_bridge.skills import EmergencyStop, StopEvent
+
+STOP_HELD = "a button that stops the robot is pressed"
+"""Why nothing can go on."""
+
+
+class StopSwitch:
+    """What the operator wants, wherever it comes from.
+
+    Args:
+        skill: What buttons, keys and calls mean.
+        listeners: Who is told.
+        on_stop: Called when the operator stops the robot, before the model hears of it.
+        on_resume: Called when the operator lets it go on; why it cannot, or nothing.
+    """
+
+    def __init__(
+        self, skill: EmergencyStop, listeners: Listeners, on_stop: Callable[[], None], on_resume: Callable[[], str]
+    ) -> None:
+        self._skill = skill
+        self._listeners = listeners
+        self._on_stop = on_stop
+        self._on_resume = on_resume
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether the operator has stopped the robot, and not let it go on since."""
+        return self._skill.is_stopped
+
+    @property
+    def is_held(self) -> bool:
+        """Whether a button that stops the robot is pressed."""
+        return self._skill.is_held
+
+    def saw_buttons(self, held: Collection[str], executor: Supervised | None) -> None:
+        """Which buttons are pressed now."""
+        self._take(self._skill.update(held_buttons=held), executor)
+
+    def saw_key(self, key: str, executor: Supervised | None) -> None:
+        """A key was typed in the terminal."""
+        self._take(self._skill.update(keys=(key,)), executor)
+
+    def stop(self, executor: Supervised | None) -> None:
+        """The operator stops the robot from elsewhere."""
+        self._take(self._skill.update(remote=StopEvent.STOP), executor)
+
+    def resume(self, executor: Supervised | None) -> str:
+        """The operator lets it go on from elsewhere; why it cannot."""
+        if not self._skill.is_stopped:
+            return "no operator has stopped the robot"
+        event = self._skill.update(remote=StopEvent.RESUME)
+        return STOP_HELD if event is None else self._take(event, executor)
+
+    def begin(self, executor: Supervised) -> None:
+        """A new run has begun: a stop from before it still holds."""
+        if self._skill.is_stopped:
+            self._tell(StopEvent.STOP, executor)
+
+    def reset(self) -> None:
+        """Everything is reset."""
+        self._skill.is_stopped = False
+
+    def _take(self, event: StopEvent | None, executor: Supervised | None) -> str:
+        """The operator did something; why it has no effect."""
+        if event is StopEvent.STOP:
+            self._on_stop()
+        why = self._on_resume() if event is StopEvent.RESUME else ""
+        if why:
+            self._skill.is_stopped = True
+        elif executor is not None and event is not None:
+            self._tell(event, executor)
+        return why
+
+    def _tell(self, event: StopEvent, executor: Supervised) -> None:
+        for identifier, channel in self._listeners.of(EmergencyStopChannel):
+            if channel.event == event:
+                executor.receive(identifier, None)

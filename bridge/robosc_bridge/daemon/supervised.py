@@ -1,0 +1,50 @@
+"""What the robot and programs tell an executor, and on which identifiers it hears what."""
+
+from typing import Any, Protocol
+
+from robosc.model.structure import CommunicationKind
+from robosc_bridge.configuration.channels import Channel
+from robosc_bridge.configuration.ties import Ties
+
+
+class Supervised(Protocol):
+    """What an executor of either deployment is told."""
+
+    def receive(self, identifier: str, data: Any) -> None:
+        """A message came."""
+
+    def on_reply(self, request_id: int, data: Any) -> None:
+        """A call was answered."""
+
+    def on_call_failed(self, request_id: int, reason: str) -> None:
+        """A call failed."""
+
+    def on_goal_accepted(self, goal_id: int) -> None:
+        """A goal is under way."""
+
+    def on_feedback(self, goal_id: int, data: Any) -> None:
+        """How far a goal is."""
+
+    def on_goal_ended(self, goal_id: int, outcome: str, data: Any = None) -> None:
+        """A goal has ended."""
+
+
+class Listeners:
+    """Which identifiers are told what, by kind of channel; each identifier once.
+
+    Args:
+        ties: What each communication is tied to.
+    """
+
+    def __init__(self, ties: Ties) -> None:
+        self._channels: dict[str, Channel] = {}
+        for item in ties.communications:
+            if item.kind is CommunicationKind.OUTGOING_MESSAGE:
+                self._channels.setdefault(item.identifier, ties.channels[item.name])
+        self._found: dict[type, tuple[tuple[str, Any], ...]] = {}
+
+    def of[Kind: Channel](self, kind: type[Kind]) -> tuple[tuple[str, Kind], ...]:
+        """Identifiers and channels of a kind, in the model's order."""
+        if kind not in self._found:
+            self._found[kind] = tuple((name, item) for name, item in self._channels.items() if isinstance(item, kind))
+        return self._found[kind]

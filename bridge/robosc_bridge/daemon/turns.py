@@ -1,0 +1,145 @@
+"""Turns by an angle that the model asked for, one at a time: who wants to know of their end, and is told so."""
+
+import logging
+import math
+from collections.abc import Callable
+from typing import Any
+
+from robosc.model.structure import Communication, CommunicationKind
+from robosc_bridge.configuration.channels import RotateChannel, RotatedChannel
+from robosc_bridge.daemon.motion import Motion
+from robosc_bridge.daemon.supervised import Listeners, Supervised
+from robosc_bridge.daemon.wheel_messages import angle_of
+
+_log = logging.getLogger(__name__)
+
+_SERVICE_SHARE = 0.9
+"""How much of a call's time a turn may take."""
+
+
+class _Turn:
+    """A turn under way."""
+
+    def __init__(self, asked: Communication, channel: RotateChannel, number: int | None, end_s: float) -> None:
+        self.asked = asked
+        self.channel = channel
+        self.number = number
+        self.end_s = end_s
+
+
+class Turns:
+    """The turn under way.
+
+    Args:
+        motion: What moves the wheels.
+        listeners: Who is told of the end of a turn that a message asked for.
+        owe: Takes what the executor is to be told, once it is not at work.
+        on_failed: Called with the reason when a turn has failed of which the model hears nothing.
+        service_timeout_s: When the executor takes a call for failed; None: never.
+        clock: What the time is, in seconds.
+    """
+
+    def __init__(
+        self,
+        motion: Motion,
+        listeners: Listeners,
+        owe: Callable[[Callable[[Supervised], None]], None],
+        on_failed: Callable[[str], None],
+        service_timeout_s: float | None,
+        clock: Callable[[], float],
+    ) -> None:
+        self._motion = motion
+        self._listeners = listeners
+        self._owe = owe
+        self._on_failed = on_failed
+        self._service_timeout_s = math.inf if service_timeout_s is None else service_timeout_s
+        self._clock = clock
+        self._turn: _Turn | None = None
+
+    @property
+    def is_under_way(self) -> bool:
+        """Whether somebody waits for the end of a turn."""
+        return self._turn is not None
+
+    @property
+    def asked_by(self) -> str | None:
+        """Name of the communication that asked for the turn under way; None: there is none."""
+        return None if self._turn is None else self._turn.asked.name
+
+    def forget(self) -> None:
+        """A new run: who asked for a turn in an earlier one is not told."""
+        self._turn = None
+
+    def begin(self, asked: Communication, channel: RotateChannel, number: int | None, message: Any) -> None:
+        """Begin a turn; none is under way.
+
+        Args:
+            asked: What asked for it.
+            channel: That it is tied to.
+            number: Of the call or goal; None: a message asked for it.
+            message: With the angle.
+        """
+        # Before the executor believes that a call failed, it must have.
+        is_call = asked.kind is CommunicationKind.SERVICE
+        end_s = self._clock() + self._service_timeout_s * _SERVICE_SHARE if is_call else math.inf
+        angle = angle_of(message) * (1.0 if channel.direction == "left" else -1.0)
+        self._turn = _Turn(asked, channel, number, end_s)
+        self._motion.turn(math.radians(angle) if channel.unit == "degrees" else angle, self._clock())
+
+    def end(self, reason: str, *, is_own: bool = False) -> None:
+        """End a turn that is under way: it has failed; `is_own`: because the model asked for another motion."""
+        if self._turn is not None:
+            self._motion.stop(self._clock(), reason)
+            self.look(is_own=is_own)
+
+    def cancel(self, communication: str, number: int) -> None:
+        """End a turn that an action asked for."""
+        turn = self._turn
+        if turn is not None and turn.number == number and turn.asked.name == communication:
+            self._turn = None
+            self._motion.stop(self._clock(), "it was cancelled")
+            self._owe(lambda executor: executor.on_goal_ended(number, "cancelled"))
+
+    def look(self, *, is_own: bool = False) -> None:
+        """Whether a turn has ended: who asked for it is told so, later."""
+        turn = self._turn
+        if turn is not None and self._motion.is_turning and self._clock() >= turn.end_s:
+            self._motion.stop(self._clock(), "the turn takes longer than a call may")
+        if turn is None or self._motion.is_turning:
+            return
+        self._turn = None
+        has_arrived, reason, number = self._motion.has_arrived, self._motion.reason, turn.number
+        if not has_arrived:
+            _log.warning("the turn asked for by %s has failed: %s", turn.asked.identifier, reason)
+        if number is None:
+            self._tell_end(reason, has_arrived=has_arrived, is_own=is_own)
+        elif turn.asked.kind is CommunicationKind.ACTION:
+            outcome = "succeeded" if has_arrived else "aborted"
+            self._owe(lambda executor: executor.on_goal_ended(number, outcome, done(reason)))
+        elif has_arrived:
+            self._owe(lambda executor: executor.on_reply(number, done("")))
+        else:
+            self._owe(lambda executor: executor.on_call_failed(number, reason))
+
+    def _tell_end(self, reason: str, *, has_arrived: bool, is_own: bool) -> None:
+        """A turn that a message asked for has ended."""
+        outcomes = ("done", "any") if has_arrived else ("failed", "any")
+        told = [name for name, channel in self._listeners.of(RotatedChannel) if channel.outcome in outcomes]
+        for identifier in told:
+            self._owe(lambda executor, name=identifier: executor.receive(name, None))  # type: ignore[misc]
+        if not has_arrived and not is_own and not told:
+            self._on_failed(reason)
+
+    def report(self, executor: Supervised) -> None:
+        """Tell how far a turn is that an action asked for."""
+        turn = self._turn
+        if turn is not None and turn.number is not None and turn.asked.kind is CommunicationKind.ACTION:
+            left = self._motion.remaining_rad * (1.0 if turn.channel.direction == "left" else -1.0)
+            left = math.degrees(left) if turn.channel.unit == "degrees" else left
+            feedback = turn.asked.feedback
+            executor.on_feedback(turn.number, {"remaining": left} if hasattr(feedback, "name") else left)
+
+
+def done(reason: str) -> dict[str, Any]:
+    """The answer of the bridge's own services and actions: whether it is done, or why not."""
+    return {"success": not reason, "message": reason}

@@ -1,0 +1,195 @@
+"""The registry of drivers: found by kind and name, with what their devices have, and imported when they are used.
+
+Built-in drivers are listed here; an installed distribution adds its own through the entry-point group
+`robosc_bridge.devices` (name = driver, value = `module:attribute` of a `Driver`), a program through `register`. A
+configuration is checked against the facts without any device's code: so this module imports none, and `make` of a
+plug-in had better import what it needs when it is called.
+"""
+
+import importlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from difflib import get_close_matches
+from enum import StrEnum
+from importlib.metadata import entry_points
+from typing import Any
+
+from robosc_bridge.errors import BridgeError
+
+ENTRY_POINT_GROUP = "robosc_bridge.devices"
+
+
+class Kind(StrEnum):
+    """What a driver is one of."""
+
+    DRIVE_BASE = "drive base"
+    RANGE_SCANNER = "range scanner"
+
+
+PANEL = ("button_1", "button_2", "bumper_1", "bumper_2")
+"""Buttons of an OpenCR board: the bumpers are the one in front and the one behind."""
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What a drive base has, beside wheels.
+
+    Attributes:
+        buttons: Names that its readings tell; those of bumpers are `bumper_1` (in front) and `bumper_2` (behind).
+        has_imu: Whether its readings tell accelerations and turn rates.
+        needs_turtlebot3: Whether its argument `robot` is a `devices.robots.Robot`, whose motors or board it drives;
+            else it is a `devices.robots.Body`, and the robot may be any.
+    """
+
+    buttons: tuple[str, ...] = ()
+    has_imu: bool = False
+    needs_turtlebot3: bool = False
+
+    @property
+    def has_bumpers(self) -> bool:
+        """Whether it tells of any."""
+        return any(name.startswith("bumper_") for name in self.buttons)
+
+
+@dataclass(frozen=True, slots=True)
+class Driver:
+    """A driver: what it drives, and how one is made.
+
+    Attributes:
+        kind: What it is one of; `make` returns a `DriveBase` or a `RangeScanner` accordingly.
+        name: What it is asked for by.
+        description: One line for a person.
+        make: Makes one, without opening anything. Its arguments are `path`, of a drive base `robot`, and the options of
+            the configuration, which are the driver's own.
+        facts: Of a drive base; None: it does not say, and whatever a configuration ties is taken to be there.
+    """
+
+    kind: Kind
+    name: str
+    description: str
+    make: Callable[..., Any]
+    facts: Facts | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class DriverInfo:
+    """A driver as users see it."""
+
+    name: str
+    description: str
+    facts: Facts | None = None
+
+
+class UnknownDriverError(BridgeError, LookupError):
+    """There is no driver of that kind and name, or it cannot be used here."""
+
+
+# Description, place (`module:callable`) and facts of the built-in drivers: listing them imports none.
+_BUILT_IN: dict[Kind, dict[str, tuple[str, str, Facts | None]]] = {
+    Kind.DRIVE_BASE: {
+        "dynamixel": (
+            "two Dynamixel X wheels (XL430-W250, XM430-W210) on a U2D2 or another half-duplex adapter",
+            "robosc_bridge.devices.dynamixel:DynamixelBase",
+            Facts(needs_turtlebot3=True),
+        ),
+        "mavlink-rover": (
+            "a MAVLink rover: ArduPilot Rover, driven in its mode GUIDED over a serial line, UDP or TCP",
+            "robosc_bridge.devices.mavlink_rover:MavlinkRover",
+            Facts(has_imu=True),
+        ),
+        "opencr": (
+            "a stock TurtleBot3: its OpenCR board with the ROS 2 firmware",
+            "robosc_bridge.devices.opencr:OpenCrBase",
+            Facts(PANEL, has_imu=True, needs_turtlebot3=True),
+        ),
+    },
+    Kind.RANGE_SCANNER: {
+        "lds01": (
+            "the LiDAR LDS-01 (HLS-LFCD2): 0.12 to 3.5 m, 5 turns a second",
+            "robosc_bridge.devices.lidar:make_lds01",
+            None,
+        ),
+        "lds02": (
+            "the LiDAR LDS-02 (LD08): 0.16 to 8 m, 6 turns a second",
+            "robosc_bridge.devices.lidar:make_lds02",
+            None,
+        ),
+        "lds03": (
+            "the LiDAR LDS-03 (COIN-D4): 0.05 to 12 m, 10 turns a second",
+            "robosc_bridge.devices.lidar:make_lds03",
+            None,
+        ),
+        "mavlink-rover": (
+            "the obstacles that a MAVLink rover tells of, also on the line of its drive base",
+            "robosc_bridge.devices.mavlink_obstacles:MavlinkObstacles",
+            None,
+        ),
+    },
+}
+
+_registered: dict[tuple[Kind, str], Driver] = {}
+
+
+def register(driver: Driver) -> None:
+    """Make a driver known to this process; one of the same kind and name is replaced."""
+    _registered[driver.kind, driver.name] = driver
+
+
+def available_drivers(kind: Kind) -> tuple[DriverInfo, ...]:
+    """Every driver of a kind, by name; those of plug-ins are imported, and left out where they cannot be."""
+    infos: dict[str, DriverInfo] = {}
+    for entry in entry_points(group=ENTRY_POINT_GROUP):
+        try:
+            driver = _plug_in(entry.name, entry.load)
+        except UnknownDriverError:
+            continue
+        if driver.kind is kind:
+            infos[entry.name] = DriverInfo(entry.name, driver.description, driver.facts)
+    for name, (description, _, facts) in _BUILT_IN[kind].items():
+        infos[name] = DriverInfo(name, description, facts)
+    for (of, name), driver in _registered.items():
+        if of is kind:
+            infos[name] = DriverInfo(name, driver.description, driver.facts)
+    return tuple(infos[name] for name in sorted(infos))
+
+
+def facts_of(name: str) -> Facts | None:
+    """What a drive base has; None: its driver does not say, or there is none of that name, which is told elsewhere."""
+    if (Kind.DRIVE_BASE, name) not in _registered and name in _BUILT_IN[Kind.DRIVE_BASE]:
+        return _BUILT_IN[Kind.DRIVE_BASE][name][2]
+    try:
+        return find_driver(Kind.DRIVE_BASE, name).facts
+    except UnknownDriverError:
+        return None
+
+
+def find_driver(kind: Kind, name: str) -> Driver:
+    """The driver itself; imports it.
+
+    Raises:
+        UnknownDriverError: There is none of that name; the message says what there is.
+    """
+    if (kind, name) in _registered:
+        return _registered[kind, name]
+    if name in _BUILT_IN[kind]:
+        description, place, facts = _BUILT_IN[kind][name]
+        module, _, attribute = place.partition(":")
+        return Driver(kind, name, description, getattr(importlib.import_module(module), attribute), facts)
+    for entry in entry_points(group=ENTRY_POINT_GROUP, name=name):
+        driver = _plug_in(name, entry.load)
+        if driver.kind is kind:
+            return driver
+    names = [info.name for info in available_drivers(kind)]
+    close = get_close_matches(name, names, n=1)
+    hint = f"; did you mean '{close[0]}'?" if close else f"; there is {', '.join(names) or 'none'}"
+    raise UnknownDriverError(f"unknown {kind} '{name}'{hint}")
+
+
+def _plug_in(name: str, load: Callable[[], object]) -> Driver:
+    try:
+        loaded = load()
+    except Exception as error:
+        raise UnknownDriverError(f"the plug-in of driver '{name}' cannot be imported: {error}") from error
+    if not isinstance(loaded, Driver):
+        raise UnknownDriverError(f"the plug-in of driver '{name}' is not a robosc_bridge.drivers.Driver")
+    return loaded

@@ -1,0 +1,136 @@
+"""`robosc key` and `robosc sign`: key pairs, and signatures of supervisor files."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from robosc.cli.output import ExitCode, UsageError, print_json, write_bytes
+
+if TYPE_CHECKING:
+    from robosc.signatures import PublicKey
+
+_KEY = """\
+Make a key pair for signing supervisor files: NAME.key, the private key, which only its owner may read and which has no
+password, and NAME.pub, the public key, one line of text for those who are to trust it. No file is overwritten.
+"""
+
+_SIGN = """\
+Sign a supervisor file: FILE.rsup.sig is written beside it. Whoever trusts the key, such as a bridge that has the public
+key in its configuration, executes that supervisor without verifying it anew. Verify it before you sign it.
+"""
+
+
+def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add both commands."""
+    parser = commands.add_parser("key", help="make a key pair for signing supervisor files", description=_KEY)
+    parser.add_argument("name", type=Path, metavar="NAME", help="what NAME.key and NAME.pub are called")
+    parser.add_argument("--comment", default="", metavar="TEXT", help="whose key it is; stands in NAME.pub")
+    parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
+    parser.set_defaults(run=run_key)
+
+    parser = commands.add_parser("sign", help="sign a supervisor file", description=_SIGN)
+    parser.add_argument("supervisor", type=Path, metavar="FILE.rsup", help="the supervisor to vouch for")
+    parser.add_argument("--key", type=Path, required=True, metavar="FILE.key", help="the private key to sign with")
+    parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
+    parser.set_defaults(run=run_sign)
+
+
+def run_key(arguments: argparse.Namespace) -> int:
+    """Make a pair.
+
+    Raises:
+        UsageError: A file is there already or cannot be written, or the comment is no line.
+        SigningUnavailableError: The package for it is not installed.
+    """
+    from robosc.signatures import make_key_pair
+
+    private, public = (arguments.name.with_name(arguments.name.name + end) for end in (".key", ".pub"))
+    try:
+        key = make_key_pair(private, public, arguments.comment)
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+    except OSError as error:
+        raise UsageError(f"cannot write {error.filename or private}: {error.strerror or error}") from error
+    if arguments.json:
+        print_json({"private": str(private), "public": str(public), "fingerprint": key.fingerprint})
+    else:
+        sys.stdout.write(f"{private}: private key: keep it to yourself\n{public}: public key {key}\n")
+    return ExitCode.OK
+
+
+def run_sign(arguments: argparse.Namespace) -> int:
+    """Sign a file that is a supervisor.
+
+    Raises:
+        UsageError: A file cannot be read or written.
+        InvalidSupervisorError: It is no supervisor.
+        SignatureError: The key cannot be used.
+        SigningUnavailableError: The package for it is not installed.
+    """
+    from robosc.signatures import read_private_key, sign, signature_file
+    from robosc.supervisor.codec import decode
+
+    content = read_supervisor(arguments.supervisor)
+    supervisor = decode(content)
+    try:
+        key = read_private_key(arguments.key)
+    except OSError as error:
+        raise UsageError(f"cannot read {arguments.key}: {error.strerror or error}") from error
+    file = signature_file(arguments.supervisor)
+    write_bytes(file, sign(content, key))
+    if arguments.json:
+        print_json({"file": str(file), "model": supervisor.model.name, "deployment": str(supervisor.deployment)})
+    else:
+        sys.stdout.write(f"{file}: signature of a {supervisor.deployment} for {supervisor.model.name}\n")
+    return ExitCode.OK
+
+
+def read_supervisor(file: Path) -> bytes:
+    """The bytes of a supervisor file.
+
+    Raises:
+        UsageError: It cannot be read.
+    """
+    from robosc.supervisor.codec import MAXIMUM_BYTES
+
+    return _read(file, MAXIMUM_BYTES)
+
+
+def signer_of(file: Path, content: bytes, trusted: Sequence[Path]) -> "PublicKey":
+    """Which key of some files has signed a supervisor file.
+
+    Args:
+        file: The supervisor's.
+        content: Its bytes.
+        trusted: Files with public keys.
+
+    Raises:
+        UsageError: A file cannot be read.
+        SignatureError: None of them has, or a file holds no key.
+        SigningUnavailableError: The package for it is not installed.
+    """
+    from robosc.signatures import (
+        MAXIMUM_KEY_BYTES,
+        MAXIMUM_SIGNATURE_BYTES,
+        read_public_keys,
+        signature_file,
+        signer,
+    )
+
+    keys = [
+        key
+        for path in trusted
+        for key in read_public_keys(_read(path, MAXIMUM_KEY_BYTES).decode("utf-8", "replace"), str(path))
+    ]
+    return signer(content, _read(signature_file(file), MAXIMUM_SIGNATURE_BYTES), keys)
+
+
+def _read(file: Path, most: int) -> bytes:
+    try:
+        with file.open("rb") as stream:
+            # One byte more than is allowed tells that there are too many; a device could go on for ever.
+            return stream.read(most + 1)
+    except OSError as error:
+        raise UsageError(f"cannot read {file}: {error.strerror or error}") from error

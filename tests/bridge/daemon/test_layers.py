@@ -1,0 +1,424 @@
+"""A supervision layer in the daemon: what programs ask for is let through or held back, and ends with who asked."""
+
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robosc_bridge.daemon.programs import (
+    Answered,
+    Blocked,
+    Called,
+    CallMade,
+    CancelWanted,
+    Detached,
+    FeedbackPassed,
+    GoalOver,
+    GoalRejected,
+    GoalSent,
+    GoalTaken,
+    PassedOn,
+    Refused,
+    Replied,
+    Requested,
+    Told,
+)
+from robosc_bridge.daemon.reports import Device, DeviceDown
+from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.devices.interface import STANDSTILL, Velocity
+from support.daemons import Connected, Scene
+
+MODEL = """
+robot Driven {
+    interface twist use Twist from geometry_msgs
+    interface laser use LaserScan from sensor_msgs
+    interface turning use Turn from motion_msgs
+    interface trigger use Trigger from std_srvs
+    datatype object Vector { x: double z: double }
+    datatype object Twist { linear: Vector angular: Vector }
+    datatype object Scan { ranges: array(double) }
+    datatype object Angle { angle: double }
+    datatype enum Way from Scan to { value.ranges[0] > 0.5 -> free default -> blocked }
+    component Eyes {
+        outgoing message scan with identifier: "/scan", type: Way links laser
+        outgoing message stop with identifier: "/stop", type: none
+        outgoing message resume with identifier: "/resume", type: none
+        outgoing message mood with identifier: "/mood", type: string
+        behaviour {
+            variable way: Way = blocked
+            on response from scan do way := value
+            initial marked state calm { on response from stop goto stopped }
+            marked state stopped { on response from resume goto calm }
+        }
+    }
+    component Wheels {
+        incoming message walk with identifier: "/cmd_vel", type: Twist, when: value.linear.x != 0.0 links twist
+        incoming message halt with identifier: "/cmd_vel", type: Twist links twist
+        incoming message spin with identifier: "/spin", type: integer
+        service turn with identifier: "/turn", request: Angle, response: none links trigger
+        action face with identifier: "/face", request: Angle, response: none, feedback: double links turning
+        service think with identifier: "/think", request: string, response: string links trigger
+    }
+    requirement walk needs Eyes.way = free and Eyes.calm
+    requirement {spin, turn, face} needs Eyes.calm
+}
+"""
+CONFIGURATION = """
+robot: burger
+drive: {driver: opencr, port: /dev/base}
+scanner: {driver: lds01, port: /dev/scanner}
+execution: {period_s: 0.02, command_timeout_s: 0.4}
+remote: {grpc_address: "127.0.0.1:0"}
+channels:
+  /scan: {channel: scanner}
+  /stop: {channel: emergency_stop, event: stop}
+  /resume: {channel: emergency_stop, event: resume}
+  /mood: {channel: grpc}
+  /cmd_vel: {channel: drive}
+  /spin: {channel: rotate}
+  /turn: {channel: rotate}
+  /face: {channel: rotate}
+  /think: {channel: grpc}
+"""
+FORWARD = {"linear": {"x": 0.1}}
+ZERO = {"linear": {"x": 0.0}}
+
+
+def driven(model: str = MODEL) -> Scene:
+    scene = Scene(text=CONFIGURATION, model=model, is_layer=True, stays=True)
+    scene.up()
+    return scene
+
+
+@pytest.fixture
+def scene() -> Scene:
+    return driven()
+
+
+@pytest.fixture
+def program(scene: Scene) -> Connected:
+    return Connected(scene, "an operator")
+
+
+def without_sensors(told: list[Any]) -> list[Any]:
+    return [item for item in told if not isinstance(item, PassedOn)]
+
+
+def refused(told: list[Any]) -> list[str]:
+    return [item.why for item in told if isinstance(item, Refused)]
+
+
+def test_what_is_allowed_moves_the_wheels_and_what_is_not_is_told_to_who_asked(
+    scene: Scene, program: Connected
+) -> None:
+    other = Connected(scene, "another")
+    assert without_sensors(program.say(Requested, "/cmd_vel", FORWARD)) == []
+    scene.live(0.3, 2.0)
+    assert scene.out == Velocity(0.1, 0.0)
+    scene.live(0.1, 0.3)
+    # Let go by the supervisor: an obstacle.
+    assert scene.out == STANDSTILL
+    other.told.clear()
+    assert without_sensors(program.say(Requested, "/cmd_vel", FORWARD)) == [Blocked("/cmd_vel")]
+    assert without_sensors(other.told) == []
+    assert without_sensors(program.say(Requested, "/cmd_vel", ZERO)) == []
+
+
+def test_sensors_are_passed_on_after_the_supervisor_has_seen_them(scene: Scene, program: Connected) -> None:
+    silent = Connected(scene, "a viewer", may_request=False)
+    silent.turn()
+    program.say(Told, "/mood", "fine")
+    scene.scan(0.3)
+    program.turn()
+    assert program.of(PassedOn) == silent.of(PassedOn)[-1:]
+    assert program.of(PassedOn)[0].identifier == "/scan"
+    assert PassedOn("/mood", "fine") in silent.told
+    assert scene.component("Eyes")["variables"]["way"] == "blocked"
+
+
+def test_a_caller_that_falls_silent_is_released_though_the_loop_repeats_what_it_wanted(
+    scene: Scene, program: Connected
+) -> None:
+    program.say(Requested, "/cmd_vel", FORWARD)
+    scene.live(0.3, 2.0)
+    assert scene.out.linear_m_s == 0.1
+    scene.live(0.2, 2.0)
+    assert scene.out == STANDSTILL
+    # What is repeated goes on.
+    for _ in range(10):
+        program.say(Requested, "/cmd_vel", FORWARD)
+        scene.live(0.2, 2.0)
+        assert scene.out.linear_m_s == 0.1
+
+
+def test_a_caller_that_leaves_stands_still_at_once(scene: Scene, program: Connected) -> None:
+    other = Connected(scene, "another")
+    program.say(Requested, "/cmd_vel", FORWARD)
+    scene.live(0.3, 2.0)
+    other.leave()
+    scene.exchange()
+    assert scene.out.linear_m_s == 0.1
+    program.leave()
+    scene.exchange()
+    assert scene.out == STANDSTILL
+    assert scene.log.entries[-1]["kind"] == "release"
+    assert scene.daemon.state is State.RUNNING
+
+
+def test_a_turn_that_was_asked_for_ends_with_who_asked(scene: Scene, program: Connected) -> None:
+    for make, arguments in (
+        (Requested, ("/spin", 90)),
+        (Called, ("turn", "1", {"angle": 90.0})),
+        (GoalSent, ("face", "1", {"angle": 90.0})),
+    ):
+        caller = Connected(scene, "a caller")
+        caller.say(make, *arguments)
+        scene.live(0.3, 2.0)
+        assert scene.out.angular_rad_s > 0.0
+        caller.leave()
+        scene.exchange()
+        assert scene.out == STANDSTILL
+        scene.live(0.3, 2.0)
+        assert (scene.out, scene.daemon.state) == (STANDSTILL, State.RUNNING)
+
+
+def test_a_call_is_answered(scene: Scene, program: Connected) -> None:
+    program.say(Called, "turn", "a", {"angle": 20})
+    scene.live(3.0, 2.0)
+    assert program.of(Answered) == [Answered("a", {"success": True, "message": ""}, is_default=False)]
+    assert abs(math.degrees(scene.heading_rad) - 20) < 3
+
+
+def test_a_call_that_is_held_back_is_answered_by_default_at_once(scene: Scene, program: Connected) -> None:
+    scene.daemon.post(Command.STOP)
+    scene.live(0.1, 2.0)
+    assert without_sensors(program.say(Called, "turn", "a", {"angle": 20})) == [
+        Answered("a", None, is_default=True),
+        Blocked("/turn"),
+    ]
+
+
+def test_a_goal_is_taken_told_of_and_ends(scene: Scene, program: Connected) -> None:
+    assert without_sensors(program.say(GoalSent, "face", "g", {"angle": 20}))[0] == GoalTaken("g")
+    scene.live(3.0, 2.0)
+    assert program.of(FeedbackPassed)[0].goal_id == "g"
+    assert program.of(GoalOver) == [GoalOver("g", "succeeded", {"success": True, "message": ""})]
+
+
+def test_a_goal_is_cancelled_by_who_asked_and_nobody_else(scene: Scene, program: Connected) -> None:
+    other = Connected(scene, "another")
+    program.say(GoalSent, "face", "g", {"angle": 90})
+    scene.live(0.3, 2.0)
+    assert refused(other.say(CancelWanted, "face", "g")) == ["'g' is no goal of 'face' that is under way"]
+    # One id means another goal with another program: held back, as the first is under way.
+    assert without_sensors(other.say(GoalSent, "face", "g", {"angle": 5})) == [GoalRejected("g"), Blocked("/face")]
+    assert scene.out.angular_rad_s > 0.0
+    assert without_sensors(program.say(CancelWanted, "face", "g")) == [GoalOver("g", "cancelled", None)]
+    scene.exchange()
+    assert scene.out == STANDSTILL
+    assert refused(program.say(CancelWanted, "face", "g")) == ["'g' is no goal of 'face' that is under way"]
+
+
+def test_an_id_that_is_in_use_is_refused_and_free_again_afterwards(scene: Scene, program: Connected) -> None:
+    program.say(GoalSent, "face", "g", {"angle": 90})
+    assert refused(program.say(GoalSent, "face", "g", {"angle": 90})) == ["the id 'g' is in use"]
+    assert refused(program.say(Called, "turn", "g", {"angle": 90})) == ["the id 'g' is in use"]
+    program.say(CancelWanted, "face", "g")
+    assert without_sensors(program.say(GoalSent, "face", "g", {"angle": 90})) == [GoalTaken("g")]
+
+
+def test_an_operators_stop_ends_a_goal_and_holds_everything_back(scene: Scene, program: Connected) -> None:
+    program.say(GoalSent, "face", "g", {"angle": 90})
+    scene.live(0.3, 2.0)
+    scene.daemon.post(Command.STOP)
+    scene.live(0.1, 2.0)
+    assert scene.out == STANDSTILL
+    assert [item.outcome for item in program.of(GoalOver)] == ["aborted"]
+    assert without_sensors(program.say(Requested, "/cmd_vel", FORWARD)) == [Blocked("/cmd_vel")]
+
+
+def test_in_standby_everything_is_held_back_and_what_was_awaited_is_answered(scene: Scene, program: Connected) -> None:
+    server = Connected(scene, "a server", ("think",))
+    server.turn()
+    program.say(Called, "think", "t", "about it")
+    program.say(GoalSent, "face", "g", {"angle": 90})
+    scene.daemon.post(Command.STANDBY)
+    scene.live(0.3, 2.0)
+    assert scene.daemon.state is State.STANDBY
+    assert program.of(Answered) == [Answered("t", None, is_default=True)]
+    assert [item.outcome for item in program.of(GoalOver)] == ["aborted"]
+    assert program.say(Requested, "/cmd_vel", FORWARD) == [Blocked("/cmd_vel")]
+    assert program.say(Called, "turn", "a", None) == [Answered("a", None, is_default=True), Blocked("/turn")]
+    assert program.say(GoalSent, "face", "g", None) == [GoalRejected("g"), Blocked("/face")]
+    scene.daemon.post(Command.START)
+    scene.live(0.3, 2.0)
+    program.say(Requested, "/cmd_vel", FORWARD)
+    scene.live(0.3, 2.0)
+    assert scene.out.linear_m_s == 0.1
+
+
+def test_a_service_of_a_program_answers_another_programs_call(scene: Scene, program: Connected) -> None:
+    server = Connected(scene, "a server", ("think",))
+    server.turn()
+    server.told.clear()
+    program.say(Called, "think", "t", "about it")
+    (call,) = server.of(CallMade)
+    assert call.data == "about it"
+    server.say(Replied, call.number, "done")
+    assert program.of(Answered) == [Answered("t", "done", is_default=False)]
+
+
+def test_a_viewer_may_not_ask(scene: Scene) -> None:
+    viewer = Connected(scene, "a viewer", may_request=False)
+    assert refused(viewer.say(Requested, "/cmd_vel", FORWARD)) == ["this program may not ask for anything"]
+    scene.live(0.2, 2.0)
+    assert scene.out == STANDSTILL
+
+
+WRONG = [
+    (Requested, ("/cmd_vel", {"linear": {"x": "fast"}}), "'walk': 'linear.x' must be number"),
+    (Requested, ("/cmd_vel", {"linear": {"x": True}}), "'walk': 'linear.x' must be number"),
+    (Requested, ("/cmd_vel", {"linear": {"x": [1]}}), "'linear.x' must be number"),
+    (Requested, ("/cmd_vel", {"linear": 1}), "'linear' must be {x: number"),
+    (Requested, ("/cmd_vel", 1), "must be "),
+    (Requested, ("/cmd_vel", {"linear": {"w": 1}}), "there is no field 'linear.w'; there is x, y, z"),
+    (Requested, ("/cmd_vel", {"linear": {"y": 0.1}}), "'linear.y' must be 0: 'drive' does not go by it"),
+    (Requested, ("/cmd_vel", {"twist": FORWARD}), "there is no field 'twist'"),
+    (Requested, ("/cmd_vel", {"linear": {"x": 1 << 80}}), "a number of more than 64 bits"),
+    (Requested, ("/spin", 1.5), "'spin': the data must be a whole number"),
+    (Requested, ("/spin", {"data": 90}), "'spin': the data must be number"),
+    (Requested, ("/spin", 36_001), "beyond a hundred turns"),
+    (Requested, ("/spin", -36_001), "beyond a hundred turns"),
+    (Requested, ("/scan", {}), "no message to the robot on '/scan'"),
+    (Requested, ("/nowhere", {}), "no message to the robot on '/nowhere'"),
+    (Called, ("turn", "", {}), "an id has 1 to 255 characters"),
+    (Called, ("turn", "x" * 256, {}), "an id has 1 to 255 characters"),
+    (Called, ("face", "1", {}), "the model has no service 'face'"),
+    (Called, ("turn", "1", {"angle": "wide"}), "'angle' must be number"),
+    (Called, ("turn", "1", {"data": 90}), "there is no field 'data'; there is angle"),
+    (Called, ("think", "1", 5), "'think': the data must be a text"),
+    (GoalSent, ("turn", "1", {}), "the model has no action 'turn'"),
+    (GoalSent, ("face", "1", {"angle": 1e9}), "beyond a hundred turns"),
+    (CancelWanted, ("face", "1"), "'1' is no goal of 'face' that is under way"),
+]
+
+
+@pytest.mark.parametrize(("make", "arguments", "reason"), WRONG)
+def test_what_makes_no_sense_is_refused_and_changes_nothing(
+    make: Any, arguments: tuple[Any, ...], reason: str, scene: Scene, program: Connected
+) -> None:
+    (why,) = refused(program.say(make, *arguments))
+    assert reason in why
+    scene.live(0.3, 2.0)
+    assert (scene.out, scene.daemon.state) == (STANDSTILL, State.RUNNING)
+    assert without_sensors(program.told)[1:] == []
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize(
+    ("make", "arguments"),
+    [
+        (Requested, ("/cmd_vel", {"linear": {"x": "N"}})),
+        (Called, ("turn", "1", {"angle": "N"})),
+        (GoalSent, ("face", "1", {"angle": "N"})),
+    ],
+)
+def test_what_is_not_finite_is_held_back(
+    number: float, make: Any, arguments: tuple[Any, ...], scene: Scene, program: Connected
+) -> None:
+    *names, data = arguments
+    (name, inner), *_ = data.items()
+    wrong = {name: {"x": number} if isinstance(inner, dict) else number}
+    assert isinstance(without_sensors(program.say(make, *names, wrong))[-1], Blocked)
+    scene.live(0.2, 2.0)
+    assert (scene.out, scene.daemon.state) == (STANDSTILL, State.RUNNING)
+
+
+def test_what_is_left_out_is_zero_for_model_and_wheels_alike() -> None:
+    first, second = (line for line in MODEL.splitlines(keepends=True) if '"/cmd_vel"' in line)
+    halt = second.replace("type: Twist", "type: Twist, when: value.linear.x = 0.0")
+    walk = first.replace(", when: value.linear.x != 0.0", "")
+    scene = driven(model=MODEL.replace(first, halt).replace(second, walk))
+    program = Connected(scene, "an operator")
+    scene.live(0.1, 0.3)
+    # Not to walk, for which there is no way, but to halt.
+    nothing: list[Any] = [None, {}, {"linear": None}, {"linear": {}}, {"angular": {"z": 0}}]
+    for data in nothing:
+        assert without_sensors(program.say(Requested, "/cmd_vel", data)) == []
+    assert without_sensors(program.say(Requested, "/cmd_vel", {"linear": {"x": 0.001}})) == [Blocked("/cmd_vel")]
+
+
+def test_who_sends_too_much_is_stopped(scene: Scene, program: Connected) -> None:
+    program.say(Requested, "/cmd_vel", FORWARD)
+    for _ in range(300):
+        scene.daemon.post(Requested(program.program, "/cmd_vel", FORWARD))
+    for _ in range(10):
+        program.turn()
+        scene.exchange()
+    assert scene.out == STANDSTILL
+
+
+def test_a_lost_drive_base_ends_a_layers_run(scene: Scene, program: Connected) -> None:
+    program.say(GoalSent, "face", "g", {"angle": 90})
+    scene.daemon.post(DeviceDown(Device.DRIVE, "no answer", 0.25, True))
+    program.turn()
+    assert [item.outcome for item in program.of(GoalOver)] == ["aborted"]
+    assert scene.daemon.state is State.FAULT
+    scene.daemon.post(Detached(program.program))
+    scene.daemon.turn()
+
+
+EVERYTHING = [
+    (Requested, ("/cmd_vel", FORWARD)),
+    (Requested, ("/cmd_vel", ZERO)),
+    (Requested, ("/spin", 40)),
+    (Called, ("turn", "1", {"angle": 40})),
+    (Called, ("think", "2", "?")),
+    (GoalSent, ("face", "3", {"angle": 40})),
+    (CancelWanted, ("face", "3")),
+    (Told, ("/mood", "x")),
+]
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            st.integers(0, 2), st.none() | st.sampled_from(EVERYTHING), st.sampled_from([0.02, 0.1]), st.booleans()
+        ),
+        min_size=1,
+        max_size=15,
+    )
+)
+def test_programs_may_come_and_go_in_the_middle_of_everything(steps: list[tuple[int, Any, float, bool]]) -> None:
+    scene = driven()
+    names = iter(range(1000))
+
+    def come() -> Connected:
+        return Connected(scene, str(next(names)), ("think",))
+
+    programs = [come() for _ in range(3)]
+    for who, what, seconds, is_free in steps:
+        if what is None:
+            programs[who].leave()
+            programs[who] = come()
+        else:
+            make, arguments = what
+            programs[who].say(make, *arguments)
+        scene.live(seconds, 2.0 if is_free else 0.3)
+        assert scene.daemon.state is State.RUNNING
+    for program in programs:
+        program.leave()
+    scene.exchange()
+    # Nobody is there who wants anything to move.
+    assert scene.out == STANDSTILL
+    scene.live(1.0, 2.0)
+    assert (scene.out, scene.daemon.state) == (STANDSTILL, State.RUNNING)
+    # Whoever comes finds everything free.
+    late = come()
+    late.say(GoalSent, "face", "1", {"angle": 10})
+    assert GoalTaken("1") in late.told
+    scene.live(3.0, 2.0)
+    assert [item.outcome for item in late.of(GoalOver)] == ["succeeded"]

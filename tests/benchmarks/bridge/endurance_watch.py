@@ -62,7 +62,7 @@ class Watch:
         """What was done so far."""
         daemon = self._robot.machine.daemon
         periods = self._decisions - 1 + daemon.overruns
-        drift_s = self._last_due_s - self._first_due_s - periods * daemon._job.settings.period_s
+        drift_s = self._last_due_s - self._first_due_s - periods * self._robot.period_s
         return {
             "decisions": self._decisions,
             "exchanges": self._robot.exchanges,

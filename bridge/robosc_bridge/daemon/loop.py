@@ -31,7 +31,7 @@ from robosc_bridge.daemon.snapshots import Snapshots
 from robosc_bridge.daemon.states import Command, Order, State
 from robosc_bridge.daemon.stop_switch import StopSwitch
 from robosc_bridge.daemon.supervised import Listeners
-from robosc_bridge.devices.interface import DriveReading, Scan, Velocity
+from robosc_bridge.devices.interface import STANDSTILL, DriveReading, Scan, Velocity
 from robosc_bridge.safety import SafetyLayer
 from robosc_bridge.skills import EmergencyStop, Rotate
 
@@ -245,8 +245,11 @@ class Daemon:
 
     def _command(self, velocity: Velocity, now_s: float) -> None:
         self._safety.command(velocity, now_s)
-        if velocity != self._wish:
-            self._wish = velocity
+        if velocity == self._wish:
+            return
+        self._wish = velocity
+        # On its way, a turn has another speed after each exchange; the next one is soon enough for it.
+        if not self._motion.is_turning or velocity == STANDSTILL:
             self._hurry()
 
 

@@ -3,7 +3,6 @@
 import gc
 import math
 import os
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -36,12 +35,12 @@ class Watch:
             watch._decided()
             tick(self)
 
-        def counted_scan(self: SafetyLayer, now_s: float, ranges_m: Sequence[float] = ()) -> None:
+        def counted_scan(self: SafetyLayer, *arguments: Any) -> None:
             watch._scans += 1
-            saw_scan(self, now_s, ranges_m)
+            saw_scan(self, *arguments)
 
         Executor.tick = counted_tick  # type: ignore[method-assign]
-        SafetyLayer.saw_scan = counted_scan  # type: ignore[method-assign]
+        SafetyLayer.saw_scan = counted_scan  # type: ignore[method-assign,assignment]
 
     def _decided(self) -> None:
         # Only the loop knows its schedule.

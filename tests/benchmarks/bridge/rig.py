@@ -84,9 +84,10 @@ def simulated(*arguments: str) -> Iterator[Simulator]:
 
 def configuration(robot: Simulator, base: str, lidar: str, period_s: float, channels: str) -> str:
     """A configuration for a simulated Burger, whose time-outs bear with a machine that has other work, too."""
+    options = "answer_limit_s: 0.5" + (", watchdog_s: 2.5" if base == "dynamixel" else "")
     return f"""
 robot: burger
-drive: {{driver: {base}, port: {robot.base_path}, options: {{answer_limit_s: 0.2}}}}
+drive: {{driver: {base}, port: {robot.base_path}, options: {{{options}}}}}
 scanner: {{driver: {lidar}, port: {robot.scanner_path}}}
 execution: {{period_s: {period_s}, every: event}}
 safety: {{overrun_s: 1.0, motor_timeout_s: 1.0, scan_timeout_s: 2.0, command_timeout_s: 1.0}}

@@ -1,5 +1,6 @@
 """What is refused before anything is opened, and how the parts start and stop together."""
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -79,11 +80,13 @@ class RecordedFace:
         self.made = made
         self.problem = problem
         self.told: list[str] = []
+        self.switch_s = 0.0
 
     def start(self) -> None:
         if self.problem:
             raise BridgeError(self.problem)
         self.told.append(f"start {self.made.drive.is_alive}")
+        self.switch_s = sys.getswitchinterval()
         self.made.operations.order(Command.QUIT, "a test")
 
     def stop(self) -> None:
@@ -96,7 +99,10 @@ def test_faces_are_started_before_the_devices_and_stopped_after_them(supervisor:
         text = CONFIGURATION.replace("/dev/base", str(robot.base_path)).replace("/dev/scanner", str(robot.scanner_path))
         made = machine(supervisor, text)
         face = RecordedFace(made)
+        before_s = sys.getswitchinterval()
         assert made.run([face])
+    # While it runs, a busy face must not hold up the other threads; afterwards that is nobody's business.
+    assert face.switch_s < 0.001 < before_s == sys.getswitchinterval()
     assert face.told == ["start False", f"stop False {State.OVER}"]
 
 

@@ -65,6 +65,18 @@ def test_it_turns_by_the_angle_that_is_asked_for_and_tells_when_it_has(scene: Sc
     assert abs(quarter) < 0.05 or scene.daemon.state is State.RUNNING
 
 
+def test_a_turn_is_steered_at_the_period_of_the_exchanges(scene: Scene) -> None:
+    """If each new speed hurried the next exchange, they would follow one another without a pause."""
+    scene.up(0.3)
+    speeds_rad_s, hurries = [scene.out.angular_rad_s], scene.hurries
+    while scene.out != STANDSTILL:
+        scene.live(PERIOD_S, 0.3)
+        speeds_rad_s.append(scene.out.angular_rad_s)
+    assert len(set(speeds_rad_s)) > 10
+    # That it has arrived is worth one.
+    assert scene.hurries == hurries + 1
+
+
 def test_a_silent_scanner_stops_the_wheels_and_they_go_on_when_it_is_back(scene: Scene) -> None:
     scene.up()
     scene.live(1.0)

@@ -9,7 +9,6 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 # Another environment: colcon wants older packages than ours.
 COLCON := .venv-colcon
-PROTO := proto/robosc_api/v1/synthesis.proto
 
 .PHONY: demo test mutants fuzz lint format bindings lock benchmark environment colcon clean help
 
@@ -70,8 +69,7 @@ format: $(READY) ## format and mend what can be mended by itself
 	$(BIN)/ruff format .
 
 bindings: $(READY) ## regenerate the gRPC bindings
-	$(BIN)/python -m grpc_tools.protoc -Iproto --python_out=proto --pyi_out=proto --grpc_python_out=proto \
-	  robosc_api/v1/synthesis.proto
+	PYTHON=$(BIN)/python sh proto/generate.sh
 
 lock: $(READY) ## choose new versions and write the locks
 	$(BIN)/pip-compile --quiet --upgrade --strip-extras --allow-unsafe --generate-hashes --all-build-deps \

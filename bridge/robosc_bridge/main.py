@@ -21,7 +21,7 @@ from robosc.model.structure import Deployment, Model
 from robosc_bridge.configuration import init, load, schema, tie
 from robosc_bridge.configuration.structure import TURTLEBOTS
 from robosc_bridge.configuration.template import DriveDriver, ScannerDriver
-from robosc_bridge.daemon.assembly import assemble, check_settings
+from robosc_bridge.daemon.assembly import assemble, check_settings, safety_limits
 from robosc_bridge.daemon.faces import make_faces
 from robosc_bridge.daemon.keyboard import Keyboard
 from robosc_bridge.daemon.loop import Key
@@ -35,6 +35,7 @@ from robosc_bridge.daemon.supervisors import (
 )
 from robosc_bridge.drivers import Kind, available_drivers
 from robosc_bridge.errors import BridgeError
+from robosc_bridge.terminal.commands import add_commands
 
 OK, FAULT, WRONG_USE = 0, 1, 2
 
@@ -94,6 +95,7 @@ def _parser() -> argparse.ArgumentParser:
     drivers = commands.add_parser("drivers", help="list the drivers of drive bases and range scanners")
     drivers.add_argument("--json", action="store_true", help="for programs")
     drivers.set_defaults(run=_drivers)
+    add_commands(commands)
     return parser
 
 
@@ -187,7 +189,7 @@ def _run(arguments: argparse.Namespace) -> int:
         log = open_event_log(configuration.log.folder, supervisor.model.name, time.time())
     try:
         machine = assemble(configuration, ties, supervisor, log, deployment, starts_itself=not arguments.standby)
-        faces = make_faces(configuration, machine.operations)
+        faces = make_faces(configuration, machine.operations, safety_limits(configuration))
         for number in _SIGNALS:
             signal.signal(number, lambda *_: machine.quit())
         with Keyboard(lambda key: machine.daemon.post(Key(key))) as keyboard:

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from robosc_client.client import Client
     from robosc_client.errors import (
         ClientError,
+        CredentialsError,
         DeadlineError,
         RequestRefusedError,
         ServerUnavailableError,
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "Client": "client",
     "ClientError": "errors",
+    "CredentialsError": "errors",
     "DeadlineError": "errors",
     "Generation": "results",
     "Progress": "results",
@@ -35,6 +37,7 @@ _HOMES = {
 __all__ = [
     "Client",
     "ClientError",
+    "CredentialsError",
     "DeadlineError",
     "Generation",
     "Progress",

@@ -12,9 +12,11 @@ from robosc.errors import Diagnostic
 from robosc.model.structure import Deployment
 from robosc.source import Bundle
 from robosc.targets import GenerateOptions
+from robosc_api.security import Credentials, SecurityError, open_channel
 from robosc_client import convert
 from robosc_client.errors import (
     ClientError,
+    CredentialsError,
     DeadlineError,
     RequestRefusedError,
     ServerUnavailableError,
@@ -33,7 +35,14 @@ _OPTIONS = (
 # gRPC measures a deadline with a clock of its own.
 _CLOCK_TOLERANCE_S = 0.05
 
-_REFUSALS = frozenset({grpc.StatusCode.INVALID_ARGUMENT, grpc.StatusCode.RESOURCE_EXHAUSTED})
+_REFUSALS = frozenset(
+    {
+        grpc.StatusCode.INVALID_ARGUMENT,
+        grpc.StatusCode.PERMISSION_DENIED,
+        grpc.StatusCode.RESOURCE_EXHAUSTED,
+        grpc.StatusCode.UNAUTHENTICATED,
+    }
+)
 
 
 class Client:
@@ -43,10 +52,21 @@ class Client:
     that the caller is willing to wait; None leaves it to the server's own limit.
     """
 
-    def __init__(self, address: str) -> None:
-        """Prepare a connection to `HOST:PORT`; it is made with the first request."""
+    def __init__(self, address: str, credentials: Credentials | None = None) -> None:
+        """Prepare a connection to `HOST:PORT`; it is made with the first request.
+
+        Args:
+            address: `HOST:PORT`.
+            credentials: Certificates and token; None: neither.
+
+        Raises:
+            CredentialsError: A file with them cannot be used, or a token would be sent in the clear.
+        """
         self._address = address
-        self._channel = grpc.insecure_channel(address, options=_OPTIONS)
+        try:
+            self._channel = open_channel(address, credentials or Credentials(), _OPTIONS)
+        except SecurityError as error:
+            raise CredentialsError(str(error)) from error
         self._stub = convert.Stub(self._channel)  # type: ignore[no-untyped-call]  # generated
 
     def __enter__(self) -> Self:

@@ -2,8 +2,9 @@
 
 ClientError
 |-- ServerUnavailableError   nobody answers at the address     (also a ConnectionError)
+|-- CredentialsError         a certificate, key or token cannot be used
 |-- DeadlineError            no result in time                 (also a TimeoutError)
-|-- RequestRefusedError      the server refuses the request: malformed, too large, too busy
+|-- RequestRefusedError      the server refuses the request: malformed, too large, too busy, not allowed
 `-- ServiceError             the server failed, or answered what no RoboSC server answers
 """
 
@@ -14,6 +15,10 @@ class ClientError(Exception):
 
 class ServerUnavailableError(ClientError, ConnectionError):
     """Nobody answers at the address, or the connection was lost."""
+
+
+class CredentialsError(ClientError):
+    """A certificate, key or token cannot be used."""
 
 
 class DeadlineError(ClientError, TimeoutError):

@@ -27,6 +27,7 @@ from robosc.errors import InvalidSupervisorError, LanguageError, UnsupportedMode
 from robosc.model.structure import Deployment
 from robosc.source import Bundle
 from robosc.supervisor import Made, MadeStatus, decode
+from robosc_api.security import add_client_arguments, credentials_of
 from robosc_client import Client, ClientError, Generation, ServiceError, Synthesis, SynthesisStatus
 
 _EPILOG = """\
@@ -76,7 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     def run() -> int:
         try:
-            with Client(arguments.server) as client:
+            with Client(arguments.server, credentials_of(arguments)) as client:
                 return int(arguments.run(arguments, client))
         except ClientError as error:
             raise CommandError(str(error), ExitCode.SERVICE) from error
@@ -88,6 +89,7 @@ def _add_common_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog, parser.formatter_class = _EPILOG, argparse.RawDescriptionHelpFormatter
     add_model_arguments(parser)
     parser.add_argument("--server", type=_address, required=True, metavar="HOST:PORT", help="where the server listens")
+    add_client_arguments(parser)
     parser.add_argument(
         "--deadline",
         type=_seconds,

@@ -21,7 +21,9 @@ from robosc_server.work import (
     SynthesizeOutcome,
 )
 
-SERVICE_NAME = pb.DESCRIPTOR.services_by_name["SynthesisService"].full_name
+_SERVICE = pb.DESCRIPTOR.services_by_name["SynthesisService"]
+SERVICE_NAME = _SERVICE.full_name
+METHODS = tuple(method.name for method in _SERVICE.methods)
 
 type CheckRequest = pb.CheckRequest
 type CheckResponse = pb.CheckResponse

@@ -16,23 +16,30 @@ import grpc.aio
 from grpc_health.v1 import health, health_pb2, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection
 
+from robosc_api.malformed import MalformedRequests
+from robosc_api.security import Guard, Rule, Scope, SecurityError, TokenFile, add_port, joined
 from robosc_server import convert
-from robosc_server.malformed import MalformedRequests
 from robosc_server.pool import WORKER_COMMAND, StartError, WorkerPool
 from robosc_server.service import SynthesisService
-from robosc_server.settings import Settings, parse_settings
+from robosc_server.settings import Settings, new_token, parse_settings
 
 GRACE_S = 5.0
 """Seconds that requests under way are given when the server stops."""
 
 
+_RULE = Rule(frozenset({Scope.SYNTHESIZE}))
+
+
 class AddressError(Exception):
-    """The server cannot listen where it should."""
+    """The server cannot listen where it should, or not as securely as it should."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Serve until a signal; returns the exit status."""
-    settings = parse_settings(argv)
+    """Serve until a signal, or make a token; returns the exit status."""
+    words = sys.argv[1:] if argv is None else list(argv)
+    if words[:1] == ["token"]:
+        return new_token(words[1:])
+    settings = parse_settings(words)
     logging.basicConfig(format="%(asctime)s %(levelname)s %(name)s: %(message)s", stream=sys.stderr)
     try:
         asyncio.run(_serve_until_signal(settings))
@@ -58,11 +65,21 @@ async def running_server(settings: Settings, worker_command: Sequence[str] = WOR
     """A server that answers inside the context, with its workers; yields `HOST:PORT`.
 
     Raises:
-        AddressError: The address is not ours or in use.
+        AddressError: The address is not ours or in use, or a file with certificates or tokens cannot be used.
         StartError: No worker can be started.
     """
+    security = settings.security
+    try:
+        tokens = None if security.tokens is None else TokenFile(security.tokens)
+    except SecurityError as error:
+        raise AddressError(str(error)) from error
+    guard = Guard(
+        {f"/{convert.SERVICE_NAME}/{name}": _RULE for name in convert.METHODS},
+        tokens,
+        has_client_certificates=security.client_ca is not None,
+    )
     server = grpc.aio.server(
-        interceptors=[MalformedRequests(convert.SERVICE_NAME)],
+        interceptors=[guard, MalformedRequests(convert.SERVICE_NAME)],
         options=[
             # Without this two servers could share a port and each get some of the requests.
             ("grpc.so_reuseport", 0),
@@ -70,20 +87,17 @@ async def running_server(settings: Settings, worker_command: Sequence[str] = WOR
             ("grpc.max_receive_message_length", settings.max_bundle_bytes + 2**20),
         ],
     )
-    host = f"[{settings.host}]" if ":" in settings.host and not settings.host.startswith("[") else settings.host
     try:
-        port = server.add_insecure_port(f"{host}:{settings.port}")
-    except RuntimeError:
-        port = 0
-    if port == 0:
-        raise AddressError(f"cannot listen on {host}:{settings.port}: the address is in use or not this machine's")
+        address = add_port(server, joined(settings.host, settings.port), security)
+    except (SecurityError, ValueError) as error:
+        raise AddressError(str(error)) from error
     async with WorkerPool(settings.workers, worker_command) as pool:
         convert.add_service(SynthesisService(pool, settings), server)  # type: ignore[no-untyped-call]  # generated
         condition = _add_health_and_reflection(server)
         await _set_serving(condition)
         await server.start()
         try:
-            yield f"{host}:{port}"
+            yield address
         finally:
             await condition.enter_graceful_shutdown()
             await server.stop(GRACE_S)

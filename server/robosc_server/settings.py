@@ -2,18 +2,28 @@
 
 import argparse
 import os
+import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from robosc import __version__
+from robosc_api.security import (
+    Scope,
+    SecurityError,
+    ServerSecurity,
+    add_server_arguments,
+    add_token_arguments,
+    server_security_of,
+    written_token,
+)
 
 _EPILOG = """\
-The service trusts its network: it has no login and no encryption. Beyond one machine, put it behind a proxy
-that has both. SIGTERM and SIGINT end it gracefully.
+Where other machines reach it, it listens with TLS only. `robosc-server token NAME` prints a new token and its
+line for the file of tokens. SIGTERM and SIGINT end it gracefully.
 
 exit status:
   0  stopped by a signal
-  1  the address cannot be used, or no worker started
+  1  the address, a certificate or the tokens cannot be used, or no worker started
   2  wrong use
 """
 
@@ -28,6 +38,7 @@ class Settings:
         max_bundle_bytes: Largest bundle of one request, in bytes of its names and texts.
         max_synthesis_seconds: Longest time for one request, in seconds, whatever deadline its caller set.
         workers: Worker processes, which is how many requests are worked on at once.
+        security: Certificates and tokens.
     """
 
     host: str = "127.0.0.1"
@@ -35,6 +46,7 @@ class Settings:
     max_bundle_bytes: int = 2**20
     max_synthesis_seconds: float = 600.0
     workers: int = 2
+    security: ServerSecurity = field(default_factory=ServerSecurity)
 
 
 def parse_settings(argv: Sequence[str] | None = None) -> Settings:
@@ -70,7 +82,30 @@ def parse_settings(argv: Sequence[str] | None = None) -> Settings:
         metavar="N",
         help="requests worked on at once, each in its own process (default: the number of processors)",
     )
-    return Settings(**vars(parser.parse_args(argv)))
+    add_server_arguments(parser)
+    given = parser.parse_args(argv)
+    return Settings(
+        given.host,
+        given.port,
+        given.max_bundle_bytes,
+        given.max_synthesis_seconds,
+        given.workers,
+        server_security_of(given),
+    )
+
+
+def new_token(argv: Sequence[str]) -> int:
+    """Print a new token, and to standard error the line for the file of tokens; the exit status."""
+    parser = argparse.ArgumentParser(prog="robosc-server token", description="Make a token for a caller.")
+    add_token_arguments(parser, (Scope.SYNTHESIZE,))
+    try:
+        token, line = written_token(parser.parse_args(argv))
+    except SecurityError as error:
+        sys.stderr.write(f"robosc-server: {error}\n")
+        return 2
+    sys.stdout.write(token)
+    sys.stderr.write(line)
+    return 0
 
 
 def _port(text: str) -> int:

@@ -167,10 +167,36 @@ class Remote(_Section, frozen=True):
         _Address | None,
         Meta(description="HOST:PORT to listen on, such as 127.0.0.1:50061; null: none."),
     ] = None
+    tls_certificate: Annotated[
+        _Text | None, Meta(description="File with the bridge's certificate chain (PEM); null: no TLS, loopback alone.")
+    ] = None
+    tls_key: Annotated[_Text | None, Meta(description="File with its private key (PEM).")] = None
+    client_ca: Annotated[
+        _Text | None,
+        Meta(description="File with certificates (PEM) of those who sign callers' ones; null: callers need none."),
+    ] = None
+    tokens: Annotated[
+        _Text | None, Meta(description="File of tokens, made by `robosc-bridge token`; null: callers need none.")
+    ] = None
+    insecure_beyond_loopback: Annotated[
+        bool, Meta(description="Listen without TLS where other machines reach it, on a network that is trusted.")
+    ] = False
     mavlink_url: Annotated[
         _Text | None,
         Meta(description="Where the ground station is, such as udpout:192.168.1.2:14550; null: none."),
     ] = None
+    mavlink_system: Annotated[int, Meta(ge=1, le=255, description="Number of the vehicle.")] = 1
+    mavlink_key: Annotated[
+        _Text | None,
+        Meta(description="File with the key of signing: then only what is signed is obeyed; null: nothing is signed."),
+    ] = None
+    mavlink_link_id: Annotated[int, Meta(ge=0, le=255, description="Number of the signed stream.")] = 0
+    mavlink_unsigned_commands: Annotated[
+        bool, Meta(description="Whether unsigned commands of other computers do more than stopping.")
+    ] = False
+    mavlink_interval_s: Annotated[
+        float, Meta(ge=0.05, le=10, description="Seconds between two messages of pose, and of obstacles.")
+    ] = 0.1
 
 
 class SupervisorSource(_Section, frozen=True):

@@ -13,9 +13,8 @@ from robosc.execution.runner import DeploymentError
 from robosc.execution.settings import Settings, SettingsError, require_settings_of
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
-from robosc_bridge.configuration.channels import (
-    GrpcChannel,
-)
+from robosc_api.security import SecurityError, check_listening
+from robosc_bridge.configuration.channels import GrpcChannel
 from robosc_bridge.configuration.structure import Configuration, Scanner
 from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.device_thread import DeviceThread
@@ -27,11 +26,13 @@ from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.sight import camera_worker, needs_camera, sight_problems
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
-from robosc_bridge.devices.interface import DriveBase, RangeScanner
+from robosc_bridge.devices.interface import DriveBase, RangeScanner, Velocity
 from robosc_bridge.devices.registry import make_drive_base, make_range_scanner
 from robosc_bridge.devices.robots import ROBOTS, Body, Robot
 from robosc_bridge.drivers import facts_of
 from robosc_bridge.errors import BridgeError
+from robosc_bridge.ground import ground_settings
+from robosc_bridge.remote import settings_of
 from robosc_bridge.safety import SafetyLayer, SafetyLimits
 from robosc_bridge.skills import EmergencyStop, Rotate
 
@@ -46,7 +47,6 @@ LONGEST_PERIOD_S = 0.9
 
 # Longer than anything that a device's thread does at once, such as calibrating a gyroscope.
 _THREAD_LIMIT_S = 10.0
-_FACES_NOT_SERVED = ("grpc_address", "mavlink_url")
 
 
 class AssemblyError(BridgeError):
@@ -99,11 +99,13 @@ def check_settings(configuration: Configuration, ties: Ties, deployment: Deploym
 
     Raises:
         AssemblyError: Something does not fit; says what.
+        GroundSettingsError: The ground station cannot be reached as it is said.
     """
-    _require_served(configuration, ties)
+    _require_faces(configuration, ties)
     if deployment is Deployment.LAYER and not is_remote(configuration):
         raise AssemblyError("a supervision layer needs 'remote.grpc_address' or 'remote.mavlink_url' for who asks it")
-    safety_limits(configuration)
+    limits = safety_limits(configuration)
+    ground_settings(configuration, Velocity(limits.linear_m_s, limits.angular_rad_s))
     settings = ties.settings(configuration.execution)
     problems = sight_problems(configuration.skills.line, ties, settings)
     if problems:
@@ -192,16 +194,19 @@ class Machine:
         self.daemon.post(Command.QUIT)
 
 
-def _require_served(configuration: Configuration, ties: Ties) -> None:
-    """What is asked for must be there; all that is not is listed."""
-    missing = [f"'remote.{name}'" for name in _FACES_NOT_SERVED if getattr(configuration.remote, name) is not None]
-    if missing:
-        raise AssemblyError(f"not served by this version of the bridge: {'; '.join(missing)}")
+def _require_faces(configuration: Configuration, ties: Ties) -> None:
+    """What is reached from elsewhere needs a remote face that may listen where it is to."""
     needing = [f"'{item.name}' ('{item.identifier}')" for item, _ in ties.tied_to(GrpcChannel)]
     if needing and configuration.remote.grpc_address is None:
         raise AssemblyError(f"tied to 'grpc', which needs 'remote.grpc_address': {', '.join(needing)}")
     if configuration.safety.operator_link_timeout_s is not None and not is_remote(configuration):
         raise AssemblyError("'safety.operator_link_timeout_s' needs 'remote.grpc_address' or 'remote.mavlink_url'")
+    face = settings_of(configuration)
+    if face is not None:
+        try:
+            check_listening(face.address, face.security)
+        except (SecurityError, ValueError) as error:
+            raise AssemblyError(f"remote: {error}") from error
 
 
 def assemble(

@@ -64,8 +64,7 @@ class Conductor:
         self._stop_end_s = self._reset_end_s = 0.0
         self._after_stop = State.STANDBY
         self._is_drive_lost = False
-        self._failed_turn = ""
-        self._missing = ""
+        self._failed_turn = self._missing = ""
         self._hurry: Callable[[], None] = lambda: None
         self._reset_drive: Callable[[], None] = lambda: None
         self._are_alive: Callable[[], bool] = lambda: True
@@ -116,9 +115,10 @@ class Conductor:
 
     def heed(self, notice: SafetyNotice) -> None:
         """Tell a person why nothing moves; what only a person can end ends the run."""
-        self.notice = notice
+        known, self.notice = self.notice.warnings, notice
         for warning in notice.warnings:
-            _log.warning("%s", warning)
+            if warning not in known:
+                _log.warning("%s", warning)
         for reason in notice.reasons:
             # Before the start, nothing has told anything yet.
             is_news = self.state is State.RUNNING and reason not in _ORDINARY

@@ -107,3 +107,21 @@ def test_a_face_that_cannot_start_opens_no_device_and_stops_the_others(superviso
         made.run([first, second])
     assert first.told == ["start False", "stop False None"]
     assert not made.drive.is_alive
+
+
+@pytest.mark.parametrize(
+    ("remote", "why"),
+    [
+        ("{grpc_address: '0.0.0.0:50061'}", "remote: 0.0.0.0:50061 can be reached from other machines"),
+        ("{grpc_address: '127.0.0.1:70000'}", "remote: not HOST:PORT"),
+        ("{grpc_address: '127.0.0.1:1', tls_key: k}", "remote: a certificate and its key belong together"),
+        ("{grpc_address: '127.0.0.1:1', client_ca: c}", "remote: callers' certificates are checked with TLS only"),
+    ],
+)
+def test_a_face_that_may_not_listen_so_is_refused_before_anything_is_made(
+    remote: str, why: str, supervisor: Supervisor
+) -> None:
+    configuration = parse(f"{CONFIGURATION}\nremote: {remote}\n".encode(), "test.yaml").configuration
+    with pytest.raises(AssemblyError) as raised:
+        check_settings(configuration, tie(supervisor.model, configuration), supervisor.deployment)
+    assert why in str(raised.value)

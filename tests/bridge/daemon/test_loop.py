@@ -10,7 +10,7 @@ from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, SafetyNot
 from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.devices.interface import STANDSTILL, Velocity
 from robosc_bridge.safety import Caution, Reason
-from support.daemons import CONFIGURATION, PERIOD_S, Scene
+from support.daemons import CONFIGURATION, MODEL, PERIOD_S, Scene
 
 
 @pytest.fixture
@@ -257,3 +257,14 @@ def test_a_turn_that_fails_unheard_is_a_fault() -> None:
     scene.daemon.post(Command.STOP)
     scene.live(0.2, 0.3)
     assert scene.daemon.problem.startswith("a turn has failed, and no message of the model tells it so: ")
+
+
+def test_the_scan_from_before_the_start_is_decided_on_whatever_the_model_says_of_its_age() -> None:
+    scene = Scene(model=MODEL.replace(", max_age: 0.8", ""))
+    scene.daemon.post(DeviceUp(Device.DRIVE))
+    scene.daemon.post(DeviceUp(Device.SCANNER))
+    scene.scan(2.0)
+    scene.live(0.1)
+    assert scene.daemon.state is State.RUNNING
+    assert "drive.request" in scene.events()
+    assert "turn.request" not in scene.events()

@@ -313,6 +313,17 @@ def test_a_fault_is_left_by_a_reset_that_is_done_and_not_before() -> None:
     assert scene.out.linear_m_s == 0.1
 
 
+def test_a_reset_that_is_overtaken_by_a_stop_forgets_nothing() -> None:
+    scene = supervisor_fault()
+    scene.live(0.1)
+    answers = scene.order(Command.RESET)
+    scene.order(Command.STOP)
+    scene.live(0.1)
+    assert answers == [str(Reason.OPERATOR_STOP)]
+    reasons = scene.safety.output(scene.clock.monotonic()).reasons
+    assert {Reason.SUPERVISOR_FAULT, Reason.OPERATOR_STOP} <= set(reasons)
+
+
 @pytest.mark.parametrize("problem", ["the motor is hot", None])
 def test_a_reset_that_fails_or_never_ends_is_answered_and_the_fault_stays(problem: str | None) -> None:
     scene = supervisor_fault()

@@ -14,10 +14,10 @@ from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.assembly import AssemblyError, assemble, check_settings
 from robosc_bridge.daemon.jobs import Job
 from robosc_bridge.daemon.loop import Daemon
-from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, Sighting
+from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, SafetyNotice, Sighting
 from robosc_bridge.daemon.sight import needs_camera
 from robosc_bridge.daemon.states import State
-from robosc_bridge.safety import SafetyLayer, SafetyLimits
+from robosc_bridge.safety import Caution, SafetyLayer, SafetyLimits
 from robosc_bridge.skills import EmergencyStop, Rotate
 from support.models import bundle_of
 
@@ -65,6 +65,18 @@ def tied(more: str = "", **channels: str) -> tuple[Configuration, Ties]:
     return configuration, tie(MADE.supervisor.model, configuration)
 
 
+def test_a_warning_is_logged_when_it_begins(caplog: pytest.LogCaptureFixture) -> None:
+    scene = Scene()
+    blind, both = (Caution.SCAN_BLIND,), (Caution.BATTERY, Caution.SCAN_BLIND)
+    for warnings in (blind, both, blind, (), blind):
+        scene.told(SafetyNotice((), warnings))
+    assert [record.message for record in caplog.records] == [
+        Caution.SCAN_BLIND,
+        Caution.BATTERY,
+        Caution.SCAN_BLIND,
+    ]
+
+
 NONE = {"lost": "{channel: none}", "blind": "{channel: none}", "sees": "{channel: none}"}
 
 
@@ -94,7 +106,7 @@ class Scene:
 
 
 def test_it_waits_for_the_camera_and_says_so(caplog: pytest.LogCaptureFixture) -> None:
-    caplog.set_level(logging.INFO, "robosc_bridge.daemon.loop")
+    caplog.set_level(logging.INFO, "robosc_bridge.daemon")
     scene = Scene()
     scene.told()
     scene.told(DeviceUp(Device.DRIVE))
@@ -162,17 +174,19 @@ def test_a_camera_is_opened_only_for_whom_it_is_for(channels: dict[str, str], is
     assert (machine.camera is not None) is is_needed
 
 
+def check(configuration: Configuration, ties: Ties) -> None:
+    check_settings(configuration, ties, Deployment.CONTROLLER)
+
+
 def test_a_line_that_nobody_tells_is_lost_is_refused() -> None:
     with pytest.raises(AssemblyError, match=r"'correction' \('/line'\) is tied to 'line', and nothing tells when"):
-        check_settings(*tied(lost="{channel: none}"), Deployment.CONTROLLER)
-    check_settings(*tied("execution: {max_age_s: {/line: 0.5}}\n", lost="{channel: none}"), Deployment.CONTROLLER)
-    check_settings(*tied(), Deployment.CONTROLLER)
+        check(*tied(lost="{channel: none}"))
+    check(*tied("execution: {max_age_s: {/line: 0.5}}\n", lost="{channel: none}"))
+    check(*tied())
 
 
 def test_a_simulator_without_a_place_is_refused() -> None:
     with pytest.raises(AssemblyError, match="as simulated:PATH"):
-        check_settings(*tied("skills: {line: {camera: simulated}}\n"), Deployment.CONTROLLER)
-    check_settings(*tied("skills: {line: {camera: 'simulated:/tmp/x'}}\n"), Deployment.CONTROLLER)
-    check_settings(
-        *tied("skills: {line: {camera: simulated}}\n", line="{channel: none}", **NONE), Deployment.CONTROLLER
-    )
+        check(*tied("skills: {line: {camera: simulated}}\n"))
+    check(*tied("skills: {line: {camera: 'simulated:/tmp/x'}}\n"))
+    check(*tied("skills: {line: {camera: simulated}}\n", line="{channel: none}", **NONE))

@@ -1,0 +1,19 @@
+"""The installed command `robosc-bridge`: what only talks to a bridge loads nothing that runs one: a stop is quick."""
+
+import sys
+from typing import NoReturn
+
+
+def entry() -> NoReturn:
+    """Run the command and leave with its exit status."""
+    from robosc_bridge.terminal import commands
+
+    if sys.argv[1:2] and sys.argv[1] in commands.NAMES:
+        sys.exit(commands.main())
+    from robosc_bridge.main import main
+
+    sys.exit(main())
+
+
+if __name__ == "__main__":
+    entry()

@@ -1,0 +1,316 @@
+"""What the daemon shows and tells as protobuf messages, and back: the one module of the face with generated names."""
+
+import json
+import time
+from collections.abc import Callable
+from typing import Any
+
+from google.protobuf.struct_pb2 import Struct
+
+from robosc._version import __version__
+from robosc.execution.event_log import Entry, plain
+from robosc.expressions import ObjectType
+from robosc.model.structure import Communication, CommunicationKind, Model
+from robosc.targets.ros.state_topic import state_topic
+from robosc_api.v1 import bridge_pb2 as pb
+from robosc_api.v1 import bridge_pb2_grpc
+from robosc_bridge.configuration.channels import channel_name
+from robosc_bridge.daemon import programs
+from robosc_bridge.daemon.feed import Snapshot
+from robosc_bridge.daemon.operations import Operations
+from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.devices.interface import DriveReading, Scan
+from robosc_bridge.remote.data import DataError, plain_of, struct_of, text_of, value_of
+from robosc_bridge.safety import LATCHING, Caution, Reason
+
+_SERVICE = pb.DESCRIPTOR.services_by_name["BridgeService"]
+SERVICE_NAME = _SERVICE.full_name
+METHODS = tuple(method.name for method in _SERVICE.methods)
+
+type GetStatusRequest = pb.GetStatusRequest
+type GetDefinitionRequest = pb.GetDefinitionRequest
+type StopRequest = pb.StopRequest
+type CommandRequest = pb.CommandRequest
+type WatchRequest = pb.WatchRequest
+type Hello = pb.Hello
+type AttachRequest = pb.AttachRequest
+type AttachResponse = pb.AttachResponse
+GetDefinitionResponse = pb.GetDefinitionResponse
+GetStatusResponse = pb.GetStatusResponse
+StopResponse = pb.StopResponse
+WatchResponse = pb.WatchResponse
+CommandResponse = pb.CommandResponse
+BridgeServiceServicer = bridge_pb2_grpc.BridgeServiceServicer
+add_service = bridge_pb2_grpc.add_BridgeServiceServicer_to_server
+
+MAXIMUM_TEXT = 1000
+"""Characters of a name, identifier, id or reason in what a program tells."""
+
+_KINDS = {kind: f"COMMUNICATION_KIND_{kind.name}" for kind in CommunicationKind}
+_STATES = {state: f"BRIDGE_STATE_{state.name}" for state in State}
+_COMMANDS = {
+    pb.COMMAND_KIND_START: Command.START,
+    pb.COMMAND_KIND_STANDBY: Command.STANDBY,
+    pb.COMMAND_KIND_RESUME: Command.RESUME,
+    pb.COMMAND_KIND_RESET: Command.RESET,
+}
+_OUTCOMES = {
+    "succeeded": pb.GOAL_OUTCOME_SUCCEEDED,
+    "aborted": pb.GOAL_OUTCOME_ABORTED,
+    "cancelled": pb.GOAL_OUTCOME_CANCELLED,
+    "rejected": pb.GOAL_OUTCOME_REJECTED,
+}
+_OUTCOME_NAMES = {number: name for name, number in _OUTCOMES.items()}
+
+
+class RequestError(Exception):
+    """A malformed request; one sentence for its sender."""
+
+
+def definition(operations: Operations) -> pb.GetDefinitionResponse:
+    """What does not change while the bridge runs."""
+    model, topic = operations.model, state_topic(operations.model)
+    return pb.GetDefinitionResponse(
+        robot=model.name,
+        version=__version__,
+        is_layer=operations.is_layer,
+        communications=[
+            pb.Communication(
+                name=item.name,
+                component=item.component,
+                kind=_KINDS[item.kind],
+                identifier=text_of(item.identifier),
+                channel=channel_name(operations.ties.channels[item.name]),
+                fields=_fields(model, item),
+            )
+            for item in operations.ties.communications
+        ],
+        definition=json.dumps(topic.definition, separators=(",", ":")),
+        transitions=[
+            pb.EventTransition(event=event, component=component, state=state, id=number)
+            for event, parts in topic.transitions.items()
+            for component, numbers in parts
+            for state, number in numbers.items()
+        ],
+    )
+
+
+def _fields(model: Model, item: Communication) -> list[str]:
+    asked = item.response if item.kind is CommunicationKind.OUTGOING_MESSAGE else item.request
+    return [part.name for part in model.object(asked.name).properties] if isinstance(asked, ObjectType) else []
+
+
+def command_of(request: pb.CommandRequest) -> Command:
+    """What is wanted.
+
+    Raises:
+        RequestError: Nothing that there is.
+    """
+    command = _COMMANDS.get(request.command)
+    if command is None:
+        raise RequestError(f"there is no command of number {request.command}")
+    return command
+
+
+def rate_hz_of(request: pb.WatchRequest, default_hz: float, least_hz: float, most_hz: float) -> float:
+    """Most responses a second.
+
+    Raises:
+        RequestError: It is out of bounds.
+    """
+    rate_hz = request.maximum_rate_hz or default_hz
+    # Not-a-number is in no range.
+    if not least_hz <= rate_hz <= most_hz:
+        raise RequestError(f"maximum_rate_hz may be from {least_hz:g} to {most_hz:g}")
+    return rate_hz
+
+
+class Shown:
+    """Snapshots as messages; each is made once, whoever watches."""
+
+    def __init__(self) -> None:
+        self._number = -1
+        self._made = pb.Snapshot()
+
+    def put(self, target: pb.Snapshot, snapshot: Snapshot) -> None:
+        """Fill a message with a snapshot as it is seen now."""
+        if snapshot.number != self._number:
+            self._made = _snapshot(snapshot)
+            self._number = snapshot.number
+        target.CopyFrom(self._made)
+        target.age_s = max(time.time() - snapshot.time_s, 0.0)
+        if snapshot.reading is not None:
+            target.drive.age_s = max(time.monotonic() - snapshot.reading.time_s, 0.0)
+
+
+def _snapshot(snapshot: Snapshot) -> pb.Snapshot:
+    made = pb.Snapshot(
+        number=snapshot.number,
+        state=_STATES[snapshot.state],
+        problem=text_of(snapshot.problem),
+        reasons=[_notice(item) for item in snapshot.reasons],
+        warnings=[_notice(item) for item in snapshot.warnings],
+        stops=map(text_of, snapshot.stops),
+        devices=[pb.DeviceState(name=str(name), works=works) for name, works in snapshot.devices.items()],
+        components=[
+            pb.ComponentState(name=name, state=str(item["state"]), variables=struct_of(plain(dict(item["variables"]))))
+            for name, item in snapshot.components.items()
+        ],
+        enabled=snapshot.enabled,
+        has_scan=snapshot.scan is not None,
+        overruns=snapshot.overruns,
+    )
+    made.time.FromNanoseconds(round(snapshot.time_s * 1e9))
+    if snapshot.reading is not None:
+        made.drive.CopyFrom(_drive(snapshot.reading))
+    return made
+
+
+def _notice(item: Reason | Caution) -> pb.Notice:
+    return pb.Notice(code=item.name, text=str(item), holds_until_reset=item in LATCHING)
+
+
+def _drive(reading: DriveReading) -> pb.DriveState:
+    pose, velocity = reading.pose, reading.velocity
+    return pb.DriveState(
+        pose=pb.Pose(x_m=pose.x_m, y_m=pose.y_m, heading_rad=pose.heading_rad),
+        velocity=pb.Twist(linear_m_s=velocity.linear_m_s, angular_rad_s=velocity.angular_rad_s),
+        left_wheel_m_s=reading.wheels_m_s[0],
+        right_wheel_m_s=reading.wheels_m_s[1],
+        is_torque_on=reading.is_torque_on,
+        faults=sorted(map(str, reading.faults)),
+        battery_v=reading.battery_v,
+        battery_share=reading.battery_share,
+        temperature_c=reading.temperature_c,
+        buttons=dict(reading.buttons),
+    )
+
+
+def put_scan(target: pb.Scan, scan: Scan) -> None:
+    """Fill a message with a turn of the LiDAR."""
+    target.age_s = max(time.monotonic() - scan.time_s, 0.0)
+    target.turns_per_s = scan.turns_per_s
+    target.ranges_m.extend(scan.ranges_m)
+
+
+def event_of(entry: Entry) -> Struct:
+    """An entry of the event log as its file has it."""
+    return struct_of(plain(entry))
+
+
+def program_of(hello: pb.Hello, name: str, tell: Callable[[programs.ToProgram], None], operations: Operations) -> Any:
+    """A program that says who it is.
+
+    Args:
+        hello: What it says.
+        name: For the log.
+        tell: Tells it something.
+        operations: The daemon.
+
+    Raises:
+        RequestError: It calls itself by no name, or serves what is not to be served here.
+    """
+    if not 1 <= len(hello.name) <= 100 or not hello.name.isprintable():
+        raise RequestError("a program has a name of 1 to 100 printable characters")
+    served = {
+        item.name
+        for item in operations.ties.communications
+        if item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
+        and channel_name(operations.ties.channels[item.name]) == "grpc"
+    }
+    for wanted in hello.serves:
+        if wanted not in served:
+            shown = wanted[:40] if wanted.isprintable() else "?"
+            raise RequestError(f"'{shown}' is no service or action of the model that is tied to 'grpc'")
+    may_request = hello.is_operator and operations.is_layer
+    return programs.Program(name, tell, frozenset(hello.serves), may_request)
+
+
+def told(request: pb.AttachRequest, program: programs.Program) -> programs.FromProgram | None:
+    """What a program tells the loop; None: only that it is there.
+
+    Raises:
+        RequestError: It makes no sense.
+    """
+    kind = request.WhichOneof("message")
+    if kind == "keep_alive":
+        return None
+    if kind not in _READERS:
+        raise RequestError("'hello' is the first message alone" if kind == "hello" else "a message without a kind")
+    try:
+        return _READERS[kind](program, getattr(request, kind))
+    except DataError as error:
+        raise RequestError(str(error)) from error
+
+
+def _text(text: str) -> str:
+    if len(text) > MAXIMUM_TEXT:
+        raise RequestError(f"a name, identifier, id or reason has more than {MAXIMUM_TEXT} characters")
+    return text
+
+
+def _data(message: Any) -> Any:
+    return plain_of(message.data) if message.HasField("data") else None
+
+
+def _goal_end(program: programs.Program, end: pb.GoalEnd) -> programs.GoalEnded:
+    outcome = _OUTCOME_NAMES.get(end.outcome)
+    if outcome is None:
+        raise RequestError(f"there is no outcome of number {end.outcome}")
+    return programs.GoalEnded(program, end.number, outcome, _data(end))
+
+
+_READERS: dict[str, Callable[[programs.Program, Any], programs.FromProgram]] = {
+    "give": lambda program, it: programs.Told(program, _text(it.identifier), _data(it)),
+    "reply": lambda program, it: programs.Replied(program, it.number, _data(it)),
+    "call_failure": lambda program, it: programs.CallFailed(program, it.number, _text(it.reason)),
+    "goal_acceptance": lambda program, it: programs.GoalAccepted(program, it.number),
+    "feedback": lambda program, it: programs.FeedbackGiven(program, it.number, _data(it)),
+    "goal_end": _goal_end,
+    "request": lambda program, it: programs.Requested(program, _text(it.identifier), _data(it)),
+    "call": lambda program, it: programs.Called(program, _text(it.name), _text(it.id), _data(it)),
+    "goal": lambda program, it: programs.GoalSent(program, _text(it.name), _text(it.id), _data(it)),
+    "cancel": lambda program, it: programs.CancelWanted(program, _text(it.name), _text(it.id)),
+}
+
+
+def welcome(operator_timeout_s: float | None) -> pb.AttachResponse:
+    """The first thing a program is told."""
+    return pb.AttachResponse(welcome=pb.Welcome(operator_timeout_s=operator_timeout_s or 0.0))
+
+
+def refused(why: str) -> pb.AttachResponse:
+    """What it sent makes no sense."""
+    return pb.AttachResponse(refused=pb.Refusal(why=text_of(why)))
+
+
+def telling(item: programs.ToProgram) -> pb.AttachResponse:
+    """What the loop tells a program."""
+    match item:
+        case programs.MessageSent(name, identifier, data):
+            message = pb.ModelMessage(name=name, identifier=text_of(identifier), data=value_of(data))
+            return pb.AttachResponse(message_sent=message)
+        case programs.CallMade(name, number, data):
+            return pb.AttachResponse(call=pb.ModelRequest(name=name, number=number, data=value_of(data)))
+        case programs.GoalMade(name, number, data):
+            return pb.AttachResponse(goal=pb.ModelRequest(name=name, number=number, data=value_of(data)))
+        case programs.CancelMade(name, number):
+            return pb.AttachResponse(cancel=pb.ModelCancel(name=name, number=number))
+        case programs.PassedOn(identifier, data):
+            return pb.AttachResponse(passed_on=pb.Message(identifier=text_of(identifier), data=value_of(data)))
+        case programs.Blocked(identifier):
+            return pb.AttachResponse(blocked=pb.Blocked(identifier=text_of(identifier)))
+        case programs.Answered(call_id, data, is_default):
+            answer = pb.OwnAnswer(id=call_id, data=value_of(data), is_default=is_default)
+            return pb.AttachResponse(answer=answer)
+        case programs.GoalTaken(goal_id):
+            return pb.AttachResponse(goal_taken=pb.OwnGoal(id=goal_id))
+        case programs.GoalRejected(goal_id):
+            return pb.AttachResponse(goal_rejected=pb.OwnGoal(id=goal_id))
+        case programs.FeedbackPassed(goal_id, data):
+            return pb.AttachResponse(goal_feedback=pb.OwnFeedback(id=goal_id, data=value_of(data)))
+        case programs.GoalOver(goal_id, outcome, data):
+            end = pb.OwnGoalEnd(id=goal_id, outcome=_OUTCOMES[outcome], data=value_of(data))
+            return pb.AttachResponse(goal_over=end)
+        case programs.Refused(why):
+            return refused(why)

@@ -1,0 +1,195 @@
+"""The server of the remote face, in a thread of its own."""
+
+import asyncio
+import logging
+import os
+import threading
+from dataclasses import dataclass, field
+from pathlib import Path
+
+# gRPC's own log would tell once more, in its words, what we tell; it is read at its import.
+os.environ.setdefault("GRPC_VERBOSITY", "NONE")
+
+import grpc.aio
+from grpc_health.v1 import health, health_pb2, health_pb2_grpc
+from grpc_reflection.v1alpha import reflection
+
+from robosc_api.malformed import MalformedRequests
+from robosc_api.security import Guard, SecurityError, ServerSecurity, TokenFile, add_port
+from robosc_bridge.configuration.structure import Configuration
+from robosc_bridge.daemon.operations import Operations
+from robosc_bridge.errors import BridgeError
+from robosc_bridge.remote import convert
+from robosc_bridge.remote.service import RULES, BridgeService
+
+_log = logging.getLogger(__name__)
+
+MAXIMUM_REQUEST_BYTES = 256 * 1024
+MAXIMUM_METADATA_BYTES = 8 * 1024
+MAXIMUM_CONNECTIONS = 256
+"""More than watchers, programs and commands: one is left for a stop."""
+
+PING_S, PING_LIMIT_S = 5.0, 3.0
+"""After so long without a word a caller is asked whether it is there, and taken for gone if it does not answer."""
+
+_HANDSHAKE_LIMIT_S = 3.0
+_START_LIMIT_S, _STOP_LIMIT_S = 10.0, 5.0
+_GRACE_S = 0.5
+
+
+class RemoteError(BridgeError):
+    """The remote face cannot listen as it is told to."""
+
+
+@dataclass(frozen=True, slots=True)
+class RemoteSettings:
+    """Where and how the face listens.
+
+    Attributes:
+        address: `HOST:PORT`; port 0 picks a free one.
+        security: Certificates and tokens.
+        operator_timeout_s: After how long without the operator the robot stops; None: it needs none.
+    """
+
+    address: str
+    security: ServerSecurity = field(default_factory=ServerSecurity)
+    operator_timeout_s: float | None = None
+
+
+def settings_of(configuration: Configuration) -> RemoteSettings | None:
+    """What a configuration says; None: there is to be no such face."""
+    remote = configuration.remote
+    if remote.grpc_address is None:
+        return None
+    security = ServerSecurity(
+        certificate=_path(remote.tls_certificate),
+        key=_path(remote.tls_key),
+        client_ca=_path(remote.client_ca),
+        tokens=_path(remote.tokens),
+        insecure_beyond_loopback=remote.insecure_beyond_loopback,
+    )
+    return RemoteSettings(remote.grpc_address, security, configuration.safety.operator_link_timeout_s)
+
+
+def _path(text: str | None) -> Path | None:
+    return None if text is None else Path(text)
+
+
+class RemoteFace:
+    """A server in a thread of its own; `serve` makes one that listens.
+
+    Args:
+        operations: The daemon.
+        settings: Where and how it listens.
+
+    Attributes:
+        address: `HOST:PORT` that it listens on; empty: it does not yet.
+    """
+
+    def __init__(self, operations: Operations, settings: RemoteSettings) -> None:
+        self.address = ""
+        self._operations = operations
+        self._settings = settings
+        self._failure: BaseException | None = None
+        self._is_ready = threading.Event()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._end = asyncio.Event()
+        self._thread = threading.Thread(target=self._run, name="remote face", daemon=True)
+
+    def start(self) -> None:
+        """Listen.
+
+        Raises:
+            RemoteError: It cannot.
+        """
+        self._thread.start()
+        if not self._is_ready.wait(_START_LIMIT_S):
+            raise RemoteError(f"remote: the server has not begun within {_START_LIMIT_S:g} seconds")
+        if self._failure is not None:
+            self._thread.join(_STOP_LIMIT_S)
+            raise RemoteError(f"remote: {self._failure}") from self._failure
+        _log.info("the remote face listens on %s", self.address)
+
+    def stop(self) -> None:
+        """End every call and give the port back; may be called again."""
+        if self._loop is not None and self._thread.is_alive():
+            try:
+                self._loop.call_soon_threadsafe(self._end.set)
+            except RuntimeError:
+                return  # It has just ended by itself.
+            self._thread.join(_STOP_LIMIT_S)
+            if self._thread.is_alive():
+                _log.error("the remote face has not ended within %g seconds", _STOP_LIMIT_S)
+
+    def _run(self) -> None:
+        try:
+            asyncio.run(self._serve())
+        except (SecurityError, ValueError, OSError) as error:
+            self._failure = error
+        except Exception as error:
+            self._failure = error
+            _log.exception("the remote face has failed")
+        finally:
+            self._is_ready.set()
+
+    async def _serve(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        settings = self._settings
+        security = settings.security
+        guard = Guard(
+            RULES,
+            None if security.tokens is None else TokenFile(security.tokens),
+            has_client_certificates=security.client_ca is not None,
+        )
+        server = grpc.aio.server(interceptors=[guard, MalformedRequests(convert.SERVICE_NAME)], options=_options())
+        service = BridgeService(self._operations, settings.operator_timeout_s)
+        convert.add_service(service, server)  # type: ignore[no-untyped-call]  # generated
+        condition = health.aio.HealthServicer()
+        health_pb2_grpc.add_HealthServicer_to_server(condition, server)
+        names = (convert.SERVICE_NAME, health.SERVICE_NAME, reflection.SERVICE_NAME)
+        reflection.enable_server_reflection(names, server)
+        for name in ("", convert.SERVICE_NAME):
+            await condition.set(name, health_pb2.HealthCheckResponse.SERVING)
+        self.address = add_port(server, settings.address, security)
+        await server.start()
+        self._is_ready.set()
+        try:
+            await self._end.wait()
+        finally:
+            service.close()
+            await condition.enter_graceful_shutdown()
+            await server.stop(_GRACE_S)
+
+
+def _options() -> list[tuple[str, int]]:
+    return [
+        # Without this two bridges could share a port and each get some of the stops.
+        ("grpc.so_reuseport", 0),
+        ("grpc.max_receive_message_length", MAXIMUM_REQUEST_BYTES),
+        ("grpc.max_metadata_size", MAXIMUM_METADATA_BYTES),
+        ("grpc.absolute_max_metadata_size", MAXIMUM_METADATA_BYTES),
+        ("grpc.max_allowed_incoming_connections", MAXIMUM_CONNECTIONS),
+        ("grpc.server_handshake_timeout_ms", int(_HANDSHAKE_LIMIT_S * 1000)),
+        # A caller whose cable is pulled says no goodbye.
+        ("grpc.keepalive_time_ms", int(PING_S * 1000)),
+        ("grpc.keepalive_timeout_ms", int(PING_LIMIT_S * 1000)),
+        ("grpc.keepalive_permit_without_calls", 1),
+        ("grpc.http2.max_pings_without_data", 0),
+        # Callers may ask as often.
+        ("grpc.http2.min_ping_interval_without_data_ms", 1000),
+    ]
+
+
+def serve(operations: Operations, settings: RemoteSettings) -> RemoteFace:
+    """A face that listens.
+
+    Args:
+        operations: The daemon.
+        settings: Where and how.
+
+    Raises:
+        RemoteError: It cannot.
+    """
+    face = RemoteFace(operations, settings)
+    face.start()
+    return face

@@ -1,0 +1,146 @@
+"""One program's stream: what it tells the loop, at a pace that the loop can follow, and what the loop tells it."""
+
+import asyncio
+import contextlib
+import logging
+from collections import deque
+from collections.abc import AsyncIterator, Awaitable, Callable
+
+from robosc_bridge.daemon.operations import Operations
+from robosc_bridge.daemon.programs import Attached, Detached, Program, ToProgram
+from robosc_bridge.remote import convert
+
+_log = logging.getLogger(__name__)
+
+MAXIMUM_WAITING = 1000
+"""Messages that wait for a program to read them."""
+
+MESSAGES_A_TURN = 64
+"""That a program may tell the loop before that has shown its next snapshot; the rest waits at the program's end."""
+
+_LOOK_S = 0.005
+
+
+class TooSlowError(Exception):
+    """The program does not read what it is told."""
+
+
+class Session:
+    """A program that is attached.
+
+    Args:
+        operations: The daemon.
+        hello: Who the program says it is.
+        name: For the log.
+        operator_timeout_s: After how long without the operator the robot stops; None: it needs none.
+
+    Raises:
+        RequestError: What it says makes no sense.
+    """
+
+    def __init__(
+        self, operations: Operations, hello: convert.Hello, name: str, operator_timeout_s: float | None
+    ) -> None:
+        self._operations = operations
+        self._operator_timeout_s = operator_timeout_s
+        self._is_operator = hello.is_operator
+        self._loop = asyncio.get_running_loop()
+        self._news = asyncio.Event()
+        self._overflow = asyncio.Event()
+        self._waiting: deque[ToProgram | str] = deque()
+        self._is_called = False
+        self._is_full = False
+        self._is_over = False
+        self._told = 0
+        self._seen_number = -1
+        self._program: Program = convert.program_of(hello, name, self._tell, operations)
+
+    async def run(
+        self, requests: AsyncIterator[convert.AttachRequest], write: Callable[[convert.AttachResponse], Awaitable[None]]
+    ) -> None:
+        """Until the program has no more to say.
+
+        Raises:
+            TooSlowError: It does not read what it is told.
+        """
+        self._operations.tell(Attached(self._program))
+        _log.info("%s is attached", self._program.name)
+        work = (self._read(requests), self._write(write), self._fall_behind())
+        tasks = [asyncio.ensure_future(item) for item in work]
+        try:
+            self._see()
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                task.result()
+        finally:
+            self._is_over = True
+            # Told before anything is awaited: whatever becomes of this task, the loop knows.
+            self._operations.tell(Detached(self._program))
+            _log.info("%s is gone", self._program.name)
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+    def _see(self) -> None:
+        if self._is_operator:
+            self._operations.operator_seen()
+
+    async def _read(self, requests: AsyncIterator[convert.AttachRequest]) -> None:
+        async for request in requests:
+            # Before it waits for its turn: the operator is there in any case.
+            self._see()
+            await self._turn()
+            try:
+                item = convert.told(request, self._program)
+            except convert.RequestError as error:
+                self._put(str(error))
+                continue
+            if item is not None:
+                self._operations.tell(item)
+
+    async def _turn(self) -> None:
+        """Wait while the loop has not handled what came before; meanwhile gRPC holds the program back."""
+        while True:
+            snapshot = self._operations.feed.snapshot
+            number = -1 if snapshot is None else snapshot.number
+            if number != self._seen_number:
+                self._seen_number, self._told = number, 0
+            if self._told < MESSAGES_A_TURN:
+                self._told += 1
+                return
+            await asyncio.sleep(_LOOK_S)
+
+    async def _write(self, write: Callable[[convert.AttachResponse], Awaitable[None]]) -> None:
+        await write(convert.welcome(self._operator_timeout_s))
+        while True:
+            await self._news.wait()
+            self._news.clear()
+            while self._waiting:
+                item = self._waiting.popleft()
+                await write(convert.refused(item) if isinstance(item, str) else convert.telling(item))
+
+    async def _fall_behind(self) -> None:
+        await self._overflow.wait()
+        raise TooSlowError(f"more than {MAXIMUM_WAITING} messages wait for this program to read them")
+
+    def _tell(self, item: ToProgram) -> None:
+        """From the loop's thread."""
+        self._put(item)
+
+    def _put(self, item: ToProgram | str) -> None:
+        if self._is_over or self._is_full:
+            return
+        if len(self._waiting) >= MAXIMUM_WAITING:
+            self._is_full = True
+        else:
+            self._waiting.append(item)
+        if not self._is_called:
+            self._is_called = True
+            with contextlib.suppress(RuntimeError):  # The face is closed.
+                self._loop.call_soon_threadsafe(self._called)
+
+    def _called(self) -> None:
+        self._is_called = False
+        if self._is_full:
+            self._overflow.set()
+        self._news.set()

@@ -1,0 +1,124 @@
+"""Who watches: each with the latest snapshot and the events it has not seen, however slowly it reads.
+
+One subscription of the feed serves all of them, so that what a watcher costs the loop does not grow with their number.
+"""
+
+import asyncio
+import contextlib
+from collections import deque
+
+from google.protobuf.struct_pb2 import Struct
+
+from robosc_bridge.daemon.feed import Feed, Subscription
+from robosc_bridge.remote import convert
+
+MAXIMUM_EVENTS = 1000
+"""Events that wait for a watcher."""
+
+MAXIMUM_BYTES = 1024 * 1024
+"""Of the events that wait for a watcher."""
+
+
+class Watcher:
+    """What one of them has not seen.
+
+    Args:
+        with_events: Whether it wants events.
+    """
+
+    def __init__(self, *, with_events: bool) -> None:
+        self._with_events = with_events
+        self._events: deque[tuple[Struct, int]] = deque()
+        self._bytes = 0
+        self._lost = 0
+        self._news = asyncio.Event()
+
+    def put(self, event: Struct, size: int) -> None:
+        """There is an event."""
+        if not self._with_events:
+            return
+        self._events.append((event, size))
+        self._bytes += size
+        while len(self._events) > MAXIMUM_EVENTS or self._bytes > MAXIMUM_BYTES:
+            _, lost = self._events.popleft()
+            self._bytes -= lost
+            self._lost += 1
+
+    def lose(self, count: int) -> None:
+        """Events were lost before they came here."""
+        self._lost += count if self._with_events else 0
+
+    def wake(self) -> None:
+        """There is something new."""
+        self._news.set()
+
+    def take(self) -> tuple[list[Struct], int]:
+        """Events since the last look, and how many before them were lost."""
+        events, lost = [event for event, _ in self._events], self._lost
+        self._events.clear()
+        self._bytes = self._lost = 0
+        self._news.clear()
+        return events, lost
+
+    async def wait(self, limit_s: float) -> None:
+        """Until there is something new, or for so long."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(limit_s):
+                await self._news.wait()
+
+
+class Watchers:
+    """All of them; lives in the face's event loop.
+
+    Args:
+        feed: What the daemon shows.
+    """
+
+    def __init__(self, feed: Feed) -> None:
+        self._feed = feed
+        self._loop = asyncio.get_running_loop()
+        self._watchers: set[Watcher] = set()
+        self._subscription: Subscription | None = None
+        self._is_called = False
+
+    def join(self, *, with_events: bool) -> Watcher:
+        """One more."""
+        watcher = Watcher(with_events=with_events)
+        self._watchers.add(watcher)
+        if self._subscription is None:
+            self._subscription = self._feed.subscribe(self._call)
+        return watcher
+
+    def leave(self, watcher: Watcher) -> None:
+        """One less."""
+        self._watchers.discard(watcher)
+        if not self._watchers and self._subscription is not None:
+            self._subscription.close()
+            self._subscription = None
+
+    def wake(self) -> None:
+        """Let all of them look."""
+        for watcher in self._watchers:
+            watcher.wake()
+
+    def _call(self) -> None:
+        """From the control loop's thread: let `_hand_out` be called soon, once."""
+        if not self._is_called:
+            self._is_called = True
+            with contextlib.suppress(RuntimeError):  # The face is closed.
+                self._loop.call_soon_threadsafe(self._hand_out)
+
+    def _hand_out(self) -> None:
+        # First, so that whatever comes from here on calls again.
+        self._is_called = False
+        if self._subscription is None:
+            return
+        update = self._subscription.take()
+        for watcher in self._watchers:
+            watcher.lose(update.lost)
+        for entry in update.entries:
+            event = convert.event_of(entry)
+            size = event.ByteSize()
+            for watcher in self._watchers:
+                watcher.put(event, size)
+        self.wake()

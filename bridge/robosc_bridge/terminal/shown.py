@@ -1,0 +1,108 @@
+"""What the bridge tells, as lines for a person."""
+
+import math
+import time
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from robosc_bridge.terminal.client import DriveState, Snapshot, WatchResponse, events_of, state_name
+
+STALE_S = 2.0
+"""A snapshot that is older comes from a loop that hangs."""
+
+_MARKED = ("blocked", "fault")
+_SHOWN_APART = ("time", "kind", "state", "controllable", "decision_us")
+
+
+def status_lines(snapshot: Snapshot) -> Iterator[str]:
+    """What the bridge is doing: one fact a line."""
+    yield printable(state_name(snapshot) + (f": {snapshot.problem}" if snapshot.problem else ""))
+    if snapshot.age_s > STALE_S:
+        yield f"  this is {snapshot.age_s:.1f} s old: the bridge's loop hangs"
+    for reason in snapshot.reasons:
+        yield printable(f"  nothing moves: {reason.text}" + (" (until reset)" if reason.holds_until_reset else ""))
+    for warning in snapshot.warnings:
+        yield printable(f"  warning: {warning.text}")
+    for text in snapshot.stops:
+        yield printable(f"  nothing is requested: {text}")
+    for device in snapshot.devices:
+        yield printable(f"  {device.name}: {'works' if device.works else 'is not there'}")
+    if snapshot.HasField("drive"):
+        yield from map(printable, _drive_lines(snapshot.drive))
+    if snapshot.overruns:
+        yield f"  decisions left out: {snapshot.overruns}"
+    width = max((len(item.name) for item in snapshot.components), default=0)
+    for item in snapshot.components:
+        variables = " ".join(f"{name}={_word(value)}" for name, value in sorted(item.variables.items()))
+        yield printable(f"  {item.name:{width}}  {item.state} {variables}".rstrip())
+    if snapshot.enabled:
+        yield printable(f"  allowed now: {', '.join(snapshot.enabled)}")
+
+
+def _drive_lines(drive: DriveState) -> Iterator[str]:
+    known = []
+    if drive.HasField("battery_v"):
+        known.append(f"{drive.battery_v:.1f} V")
+    if drive.HasField("battery_share"):
+        known.append(f"{100.0 * drive.battery_share:.0f} %")
+    yield f"  battery: {', '.join(known) or 'not known'}"
+    yield f"  motors: {'hold' if drive.is_torque_on else 'do not hold'}"
+    for fault in drive.faults:
+        yield f"  motor fault: {fault}"
+    pose, velocity = drive.pose, drive.velocity
+    yield f"  at x {pose.x_m:.2f} m, y {pose.y_m:.2f} m, heading {math.degrees(pose.heading_rad):.0f} degrees"
+    yield f"  moves at {velocity.linear_m_s:.2f} m/s, {velocity.angular_rad_s:.2f} rad/s"
+
+
+class Lines:
+    """What a watcher is shown: a line for each event, and one where the bridge's own state changes."""
+
+    def __init__(self) -> None:
+        self._before: tuple[Any, ...] = ()
+
+    def of(self, response: WatchResponse) -> Iterator[str]:
+        """What is new in a response."""
+        if response.lost_events:
+            yield f"{_clock(time.time())} ! {response.lost_events} events were lost: they came too quickly"
+        for entry in events_of(response):
+            # What the bridge is doing stands in the snapshot, with why nothing moves.
+            if entry.get("kind") != "state":
+                yield event_line(entry)
+        if response.HasField("snapshot"):
+            yield from self._changes(response.snapshot)
+
+    def _changes(self, snapshot: Snapshot) -> Iterator[str]:
+        is_stale = snapshot.age_s > STALE_S
+        now = (snapshot.state, snapshot.problem, tuple(item.text for item in snapshot.reasons), is_stale)
+        if now == self._before:
+            return
+        self._before = now
+        at = _clock(time.time())
+        why = "; ".join([snapshot.problem] * bool(snapshot.problem) + [item.text for item in snapshot.reasons])
+        yield printable(f"{at} = {state_name(snapshot)}{': ' if why else ''}{why}")
+        if is_stale:
+            yield f"{at} ! the bridge's loop hangs"
+
+
+def event_line(entry: Mapping[str, Any]) -> str:
+    """An entry of the event log as a line: time, a mark for what was held back or failed, kind, what it is about."""
+    kind = str(entry.get("kind"))
+    told = [_word(entry[name]) for name in ("event", "identifier", "what") if name in entry]
+    rest = {name: value for name, value in entry.items() if name not in (*_SHOWN_APART, "event", "identifier", "what")}
+    told += [f"{name}={_word(value)}" for name, value in sorted(rest.items()) if value not in (None, {}, [])]
+    time_s = entry.get("time")
+    at = _clock(time_s if isinstance(time_s, float) else 0.0)
+    return printable(f"{at} {'!' if kind in _MARKED else ' '} {kind:10} {' '.join(told)}".rstrip())
+
+
+def _clock(time_s: float) -> str:
+    return f"{time.strftime('%H:%M:%S', time.localtime(time_s))}.{int(time_s % 1.0 * 1000.0):03d}"
+
+
+def _word(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def printable(text: str) -> str:
+    """A line without anything that a terminal would obey."""
+    return "".join(sign if sign.isprintable() else "?" for sign in text)

@@ -1,0 +1,45 @@
+"""Who may reach a service of RoboSC, the same for each: TLS, client certificates, bearer tokens with scopes.
+
+A service listens beyond this machine with TLS only, unless it is told otherwise. Tokens are random texts of 256 bits; a
+file holds their SHA-256 digests, so that who reads it learns none. Without tokens and client certificates, whatever
+changes something is for callers on this machine alone.
+"""
+
+from robosc_api.security.addresses import is_loopback_host, is_loopback_peer, joined
+from robosc_api.security.arguments import (
+    add_client_arguments,
+    add_server_arguments,
+    add_token_arguments,
+    credentials_of,
+    server_security_of,
+    written_token,
+)
+from robosc_api.security.client import Credentials, open_channel
+from robosc_api.security.errors import SecurityError
+from robosc_api.security.guard import CALLER, Guard, Rule
+from robosc_api.security.listening import ServerSecurity, add_port, check_listening
+from robosc_api.security.tokens import Scope, TokenFile, make_token
+
+__all__ = [
+    "CALLER",
+    "Credentials",
+    "Guard",
+    "Rule",
+    "Scope",
+    "SecurityError",
+    "ServerSecurity",
+    "TokenFile",
+    "add_client_arguments",
+    "add_port",
+    "add_server_arguments",
+    "add_token_arguments",
+    "check_listening",
+    "credentials_of",
+    "is_loopback_host",
+    "is_loopback_peer",
+    "joined",
+    "make_token",
+    "open_channel",
+    "server_security_of",
+    "written_token",
+]

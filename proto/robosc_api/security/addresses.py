@@ -1,0 +1,51 @@
+"""Which addresses are on this machine."""
+
+import ipaddress
+import re
+import socket
+from urllib.parse import unquote
+
+_ADDRESS = re.compile(r"(?:\[([0-9A-Fa-f:.%]+)\]|([A-Za-z0-9._-]+)):([0-9]{1,5})\Z")
+
+
+def split(address: str) -> tuple[str, int]:
+    """Host and port of `HOST:PORT`, an IPv6 address in brackets.
+
+    Raises:
+        ValueError: It is none.
+    """
+    match = _ADDRESS.match(address)
+    if not match or int(match[3]) > 65535:
+        raise ValueError(f"not HOST:PORT: '{address}'")
+    return match[1] or match[2], int(match[3])
+
+
+def joined(host: str, port: int) -> str:
+    """`HOST:PORT`, with brackets around an IPv6 address."""
+    return f"[{host.strip('[]')}]:{port}" if ":" in host else f"{host}:{port}"
+
+
+def is_loopback_host(host: str) -> bool:
+    """Whether all that a host's name stands for is on this machine; one that stands for nothing is not."""
+    try:
+        found = socket.getaddrinfo(host.strip("[]"), None, type=socket.SOCK_STREAM)
+    except (OSError, UnicodeError):
+        return False
+    return bool(found) and all(_is_loopback(str(item[4][0])) for item in found)
+
+
+def is_loopback_peer(peer: str) -> bool:
+    """Whether a caller, in gRPC's words (`ipv4:127.0.0.1:4711`, `ipv6:[::1]:4711`, `unix:...`), is on this machine."""
+    kind, _, rest = unquote(peer).partition(":")
+    if kind == "unix":
+        return True
+    return kind in ("ipv4", "ipv6") and _is_loopback(rest.rpartition(":")[0].strip("[]"))
+
+
+def _is_loopback(text: str) -> bool:
+    try:
+        address = ipaddress.ip_address(text.partition("%")[0])
+    except ValueError:
+        return False
+    mapped = getattr(address, "ipv4_mapped", None)
+    return (mapped or address).is_loopback

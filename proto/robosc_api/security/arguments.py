@@ -1,0 +1,101 @@
+"""The same options for the same thing in every command."""
+
+import argparse
+import os
+from pathlib import Path
+
+from robosc_api.security.client import Credentials
+from robosc_api.security.listening import ServerSecurity
+from robosc_api.security.tokens import Scope, make_token
+
+CA_VARIABLE = "ROBOSC_CA"
+TOKEN_VARIABLE = "ROBOSC_TOKEN_FILE"  # its name
+
+
+def add_server_arguments(parser: argparse.ArgumentParser) -> None:
+    """How a service is secured."""
+    group = parser.add_argument_group("security")
+    group.add_argument("--tls-certificate", type=Path, metavar="FILE", help="certificate chain (PEM): listen with TLS")
+    group.add_argument("--tls-key", type=Path, metavar="FILE", help="its private key (PEM)")
+    group.add_argument(
+        "--client-ca", type=Path, metavar="FILE", help="callers need a certificate that one of these (PEM) has signed"
+    )
+    group.add_argument("--tokens", type=Path, metavar="FILE", help="callers need a token of this file (see `token`)")
+    group.add_argument(
+        "--insecure-beyond-loopback",
+        action="store_true",
+        help="listen without TLS where other machines reach it, on a network that you trust",
+    )
+
+
+def server_security_of(arguments: argparse.Namespace) -> ServerSecurity:
+    """What those options say."""
+    return ServerSecurity(
+        certificate=arguments.tls_certificate,
+        key=arguments.tls_key,
+        client_ca=arguments.client_ca,
+        tokens=arguments.tokens,
+        insecure_beyond_loopback=arguments.insecure_beyond_loopback,
+    )
+
+
+def add_client_arguments(parser: argparse.ArgumentParser) -> None:
+    """How a service is reached."""
+    group = parser.add_argument_group("security")
+    group.add_argument("--tls", action="store_true", help="with TLS, believing the usual certificate authorities")
+    group.add_argument(
+        "--ca",
+        type=Path,
+        metavar="FILE",
+        default=_from_environment(CA_VARIABLE),
+        help=f"with TLS, believing these certificates alone (PEM; default: ${CA_VARIABLE})",
+    )
+    group.add_argument("--certificate", type=Path, metavar="FILE", help="own certificate chain (PEM)")
+    group.add_argument("--key", type=Path, metavar="FILE", help="its private key (PEM)")
+    group.add_argument(
+        "--token-file",
+        type=Path,
+        metavar="FILE",
+        default=_from_environment(TOKEN_VARIABLE),
+        help=f"file with a token (default: ${TOKEN_VARIABLE})",
+    )
+
+
+def credentials_of(arguments: argparse.Namespace) -> Credentials:
+    """What those options say."""
+    return Credentials(
+        is_secure=arguments.tls,
+        ca=arguments.ca,
+        certificate=arguments.certificate,
+        key=arguments.key,
+        token_file=arguments.token_file,
+    )
+
+
+def _from_environment(name: str) -> Path | None:
+    value = os.environ.get(name)
+    return Path(value) if value else None
+
+
+def add_token_arguments(parser: argparse.ArgumentParser, scopes: tuple[Scope, ...]) -> None:
+    """Whose token it is, and what it is for."""
+    parser.add_argument("name", metavar="NAME", help="whose token it is, for the log")
+    parser.add_argument(
+        "--scope",
+        action="append",
+        type=Scope,
+        choices=list(Scope),
+        metavar="SCOPE",
+        help=f"what it is for: {', '.join(Scope)}; may be given again (default: {', '.join(scopes)})",
+    )
+    parser.set_defaults(default_scopes=scopes)
+
+
+def written_token(arguments: argparse.Namespace) -> tuple[str, str]:
+    """A new token for standard output, and for people the line that lets it in.
+
+    Raises:
+        SecurityError: The name cannot stand in a file of tokens.
+    """
+    token, line = make_token(arguments.name, tuple(arguments.scope or arguments.default_scopes))
+    return f"{token}\n", f"Keep the token secret; it is not shown again. The line for the file of tokens:\n{line}\n"

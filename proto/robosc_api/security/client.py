@@ -1,0 +1,113 @@
+"""The caller's side: which services it believes, and what it shows to them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import grpc
+
+from robosc_api.security.addresses import is_loopback_host, split
+from robosc_api.security.errors import SecurityError
+from robosc_api.security.listening import check_certificates, read
+from robosc_api.security.tokens import MAXIMUM_TOKEN
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Credentials:
+    """How a service is reached.
+
+    Attributes:
+        is_secure: With TLS, believing the usual certificate authorities; a CA or certificate implies TLS.
+        ca: Certificates (PEM) that are believed instead; None: the usual ones.
+        certificate: The caller's own chain of certificates (PEM); None: none is shown.
+        key: Its private key.
+        token_file: Holds the caller's token, and nothing else; None: none is sent.
+    """
+
+    is_secure: bool = False
+    ca: Path | None = None
+    certificate: Path | None = None
+    key: Path | None = None
+    token_file: Path | None = None
+
+
+def open_channel(
+    address: str,
+    credentials: Credentials = Credentials(),
+    options: tuple[tuple[str, Any], ...] = (),
+) -> grpc.Channel:
+    """A channel to a service; the connection is made with the first call.
+
+    Raises:
+        SecurityError: A file cannot be used, or a token would be sent in the clear to another machine.
+    """
+    is_secure = credentials.is_secure or credentials.ca is not None or credentials.certificate is not None
+    token = None if credentials.token_file is None else _token(credentials.token_file)
+    if not is_secure:
+        if token is not None and not is_loopback_host(_host(address)):
+            raise SecurityError(f"a token is sent to another machine with TLS only, and {address} is one")
+        channel = grpc.insecure_channel(address, options=options)
+    else:
+        channel = grpc.secure_channel(address, _channel_credentials(credentials), options=options)
+    return channel if token is None else grpc.intercept_channel(channel, _Bearer(token))
+
+
+def _host(address: str) -> str:
+    try:
+        return split(address)[0]
+    except ValueError:
+        return ""
+
+
+def _channel_credentials(credentials: Credentials) -> grpc.ChannelCredentials:
+    if (credentials.certificate is None) != (credentials.key is None):
+        raise SecurityError("a certificate and its key belong together: one of them is missing")
+    return grpc.ssl_channel_credentials(
+        None if credentials.ca is None else check_certificates(credentials.ca),
+        None if credentials.key is None else read(credentials.key),
+        None if credentials.certificate is None else read(credentials.certificate),
+    )
+
+
+def _token(path: Path) -> str:
+    try:
+        token = read(path).decode("ascii").strip()
+    except UnicodeDecodeError:
+        token = ""
+    if not token.isprintable() or not 0 < len(token) <= MAXIMUM_TOKEN or any(map(str.isspace, token)):
+        raise SecurityError(f"{path}: not a single token")
+    return token
+
+
+class _Bearer(grpc.UnaryUnaryClientInterceptor, grpc.UnaryStreamClientInterceptor, grpc.StreamStreamClientInterceptor):
+    """Shows a token with each call."""
+
+    def __init__(self, token: str) -> None:
+        self._entry = ("authorization", f"Bearer {token}")
+
+    def intercept_unary_unary(self, continuation: Any, client_call_details: Any, request: Any) -> Any:
+        """With the token."""
+        return continuation(self._with_token(client_call_details), request)
+
+    def intercept_unary_stream(self, continuation: Any, client_call_details: Any, request: Any) -> Any:
+        """With the token."""
+        return continuation(self._with_token(client_call_details), request)
+
+    def intercept_stream_stream(self, continuation: Any, client_call_details: Any, request_iterator: Any) -> Any:
+        """With the token."""
+        return continuation(self._with_token(client_call_details), request_iterator)
+
+    def _with_token(self, meant: Any) -> "_Details":
+        return _Details(meant, (*(meant.metadata or ()), self._entry))
+
+
+class _Details(grpc.ClientCallDetails):
+    """A call as it was meant, with other metadata."""
+
+    def __init__(self, meant: Any, metadata: Any) -> None:
+        self.method = meant.method
+        self.timeout = meant.timeout
+        self.metadata = metadata
+        self.credentials = meant.credentials
+        self.wait_for_ready = meant.wait_for_ready
+        self.compression = meant.compression

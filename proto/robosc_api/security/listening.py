@@ -1,0 +1,169 @@
+"""Where a service listens, and behind which certificate."""
+
+import ssl
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import grpc
+
+from robosc_api.security.addresses import is_loopback_host, joined, split
+from robosc_api.security.errors import SecurityError
+
+_MAXIMUM_BYTES = 1024 * 1024
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServerSecurity:
+    """How a service is secured.
+
+    Attributes:
+        certificate: Chain of certificates (PEM), the service's own first; None: no TLS.
+        key: Its private key (PEM, not encrypted).
+        client_ca: Certificates (PEM) of those who sign callers' certificates; None: callers need none.
+        tokens: File of tokens; None: callers need none.
+        insecure_beyond_loopback: Listen beyond this machine without TLS all the same.
+    """
+
+    certificate: Path | None = None
+    key: Path | None = None
+    client_ca: Path | None = None
+    tokens: Path | None = None
+    insecure_beyond_loopback: bool = False
+
+
+def add_port(server: Any, address: str, security: ServerSecurity) -> str:
+    """Let a gRPC server listen; returns `HOST:PORT` with the port that it got.
+
+    A certificate that is replaced is taken for the next connections: the files are looked at for each.
+
+    Args:
+        server: A `grpc.Server` or `grpc.aio.Server`.
+        address: `HOST:PORT`; port 0 picks a free one.
+        security: How it is secured.
+
+    Raises:
+        SecurityError: It may not listen there like this, a file is wrong, or the address is in use or not ours.
+    """
+    check_listening(address, security)
+    host, port = split(address)
+    # gRPC's parser of addresses wants IPv6 in brackets, and takes a name that is a number for something else.
+    name = joined(host, port)
+    try:
+        is_secure = security.certificate is not None
+        got = server.add_secure_port(name, _credentials(security)) if is_secure else server.add_insecure_port(name)
+    except RuntimeError:
+        got = 0
+    if got == 0:
+        raise SecurityError(f"cannot listen on {name}: the address is in use or not this machine's")
+    return joined(host, got)
+
+
+def check_listening(address: str, security: ServerSecurity) -> None:
+    """What can be known before it listens, without a look at the files.
+
+    Raises:
+        SecurityError: It may not listen there like this.
+        ValueError: The address is none.
+    """
+    host, _ = split(address)
+    is_secure = security.certificate is not None
+    if is_secure != (security.key is not None):
+        raise SecurityError("a certificate and its key belong together: one of them is missing")
+    if security.client_ca is not None and not is_secure:
+        raise SecurityError("callers' certificates are checked with TLS only: certificate and key are missing")
+    if not is_secure and not security.insecure_beyond_loopback and not is_loopback_host(host):
+        raise SecurityError(
+            f"{address} can be reached from other machines, and without TLS whoever is between reads and changes "
+            "everything: give a certificate and key, or say that it is to be insecure"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Files:
+    """What gRPC is given, as it stands in the files."""
+
+    certificate: bytes
+    key: bytes
+    client_ca: bytes | None
+
+
+def _credentials(security: ServerSecurity) -> grpc.ServerCredentials:
+    latest = _checked(security)
+
+    def configuration(files: _Files) -> Any:
+        return grpc.ssl_server_certificate_configuration([(files.key, files.certificate)], files.client_ca)
+
+    def changed() -> Any:
+        """What is to be used from now on; None: what is used now. Called for each connection."""
+        nonlocal latest
+        try:
+            if _read(security) == latest:
+                return None
+            latest = _checked(security)
+        except SecurityError:
+            return None  # Half written: what is used now stays.
+        return configuration(latest)
+
+    return grpc.dynamic_ssl_server_credentials(
+        configuration(latest), changed, require_client_authentication=security.client_ca is not None
+    )
+
+
+def _checked(security: ServerSecurity) -> _Files:
+    """The files, after OpenSSL found that they fit each other: gRPC would only fail in every handshake.
+
+    Raises:
+        SecurityError: They do not.
+    """
+    files = _read(security)
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    try:
+        context.load_cert_chain(str(security.certificate), str(security.key), password=_no_password)
+    except (ssl.SSLError, ValueError) as error:
+        text = getattr(error, "reason", None) or error
+        raise SecurityError(f"{security.certificate} and {security.key} cannot be used: {text}") from error
+    if security.client_ca is not None:
+        check_certificates(security.client_ca)
+    return files
+
+
+def _no_password() -> bytes:
+    raise ValueError("the key is encrypted, and nobody is there to type a password")
+
+
+def check_certificates(path: Path) -> bytes:
+    """The bytes of a file of trusted certificates.
+
+    Raises:
+        SecurityError: It cannot be read, or holds no certificate.
+    """
+    data = read(path)
+    try:
+        ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT).load_verify_locations(cadata=data.decode("ascii"))
+    except (ssl.SSLError, ValueError) as error:
+        raise SecurityError(f"{path}: no certificates in PEM") from error
+    return data
+
+
+def _read(security: ServerSecurity) -> _Files:
+    if security.certificate is None or security.key is None:
+        raise SecurityError("a certificate and its key belong together: one of them is missing")
+    client_ca = None if security.client_ca is None else read(security.client_ca)
+    return _Files(read(security.certificate), read(security.key), client_ca)
+
+
+def read(path: Path) -> bytes:
+    """The bytes of a file with certificates, a key or a token.
+
+    Raises:
+        SecurityError: It cannot be read, or is far too large for one.
+    """
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(_MAXIMUM_BYTES + 1)
+    except OSError as error:
+        raise SecurityError(f"{path}: {error.strerror}") from error
+    if len(data) > _MAXIMUM_BYTES:
+        raise SecurityError(f"{path}: larger than {_MAXIMUM_BYTES} bytes")
+    return data

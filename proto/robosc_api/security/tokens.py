@@ -1,0 +1,163 @@
+"""Bearer tokens (RFC 6750): random, kept as SHA-256 digests, each with a name and scopes.
+
+A token has 256 random bits, so its digest needs neither salt nor many rounds: there is nothing to guess (NIST SP
+800-63B, 5.1.2.2 on look-up secrets with at least 112 bits).
+"""
+
+import hashlib
+import hmac
+import logging
+import os
+import re
+import secrets
+import stat
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from robosc_api.security.errors import SecurityError
+
+_log = logging.getLogger(__name__)
+
+MAXIMUM_BYTES = 64 * 1024
+"""Of a file of tokens."""
+
+MAXIMUM_TOKEN = 512
+"""Characters of a token that is looked at."""
+
+_LOOK_S = 1.0
+_PREFIX = "robosc_"
+_LINE = re.compile(r"(?P<name>[A-Za-z0-9._-]{1,64})\s+(?P<scopes>[a-z,]+)\s+sha256:(?P<digest>[0-9a-f]{64})\Z")
+
+
+class Scope(StrEnum):
+    """What a token is for."""
+
+    WATCH = "watch"
+    OPERATE = "operate"
+    SYNTHESIZE = "synthesize"
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One token of a file.
+
+    Attributes:
+        name: Whose it is, for the log.
+        scopes: What it is for.
+        digest: SHA-256 of the token, in hexadecimal digits.
+    """
+
+    name: str
+    scopes: frozenset[Scope]
+    digest: str
+
+
+def make_token(name: str, scopes: tuple[Scope, ...]) -> tuple[str, str]:
+    """A new token, and the line for the file of tokens.
+
+    Raises:
+        SecurityError: The name cannot stand in the file, or there is no scope.
+    """
+    token = _PREFIX + secrets.token_urlsafe(32)
+    line = f"{name} {','.join(dict.fromkeys(scopes))} sha256:{_digest(token)}"
+    if not _LINE.match(line):
+        raise SecurityError(
+            "a token's name has 1 to 64 letters, digits, dots, dashes and underscores, and it has a scope"
+        )
+    return token, line
+
+
+def _digest(token: str) -> str:
+    return hashlib.sha256(token.encode("utf-8", "backslashreplace")).hexdigest()
+
+
+def parse_tokens(text: str, place: str) -> tuple[Entry, ...]:
+    """The entries of a file: a line each, `NAME SCOPE,SCOPE sha256:DIGEST`; `#` begins a comment.
+
+    Raises:
+        SecurityError: A line is none, or a name stands twice.
+    """
+    found: dict[str, Entry] = {}
+    for number, line in enumerate(text.splitlines(), 1):
+        bare = line.partition("#")[0].strip()
+        if not bare:
+            continue
+        match = _LINE.match(bare)
+        if not match:
+            # Not the line itself: somebody may have written the token there.
+            raise SecurityError(f"{place}:{number}: not NAME SCOPE,SCOPE sha256:DIGEST")
+        unknown = [word for word in match["scopes"].split(",") if word not in set(Scope)]
+        if unknown:
+            raise SecurityError(f"{place}:{number}: there is no scope '{unknown[0]}', only {', '.join(Scope)}")
+        if match["name"] in found:
+            raise SecurityError(f"{place}:{number}: '{match['name']}' stands there twice")
+        scopes = frozenset(Scope(word) for word in match["scopes"].split(","))
+        found[match["name"]] = Entry(match["name"], scopes, match["digest"])
+    return tuple(found.values())
+
+
+class TokenFile:
+    """The tokens of a file; one that is changed is read again within a second, so that a token can be withdrawn.
+
+    A file that cannot be read any more, or has become wrong, changes nothing; the log says so.
+
+    Args:
+        path: Of the file.
+        clock: Seconds of a monotonic clock.
+
+    Raises:
+        SecurityError: The file cannot be read, is wrong, or others than its owner may write it.
+    """
+
+    def __init__(self, path: Path, clock: Callable[[], float] = time.monotonic) -> None:
+        self._path = path
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._entries, self._stamp = _read(path)
+        self._looked_s = clock()
+
+    def find(self, token: str) -> Entry | None:
+        """Whose token it is; None: nobody's. Takes as long whichever it is."""
+        digest = _digest(token[:MAXIMUM_TOKEN])
+        found = None
+        for entry in self._current():
+            if hmac.compare_digest(entry.digest, digest):
+                found = entry
+        return found if len(token) <= MAXIMUM_TOKEN else None
+
+    def _current(self) -> tuple[Entry, ...]:
+        with self._lock:
+            if self._clock() - self._looked_s >= _LOOK_S:
+                self._looked_s = self._clock()
+                try:
+                    if _stamp(self._path.stat()) != self._stamp:
+                        self._entries, self._stamp = _read(self._path)
+                        _log.info("%s: read again", self._path)
+                except (OSError, SecurityError) as error:
+                    _log.error("the tokens stay as they were: %s", error)
+            return self._entries
+
+
+def _stamp(status: os.stat_result) -> tuple[int, int, int]:
+    return status.st_mtime_ns, status.st_size, status.st_ino
+
+
+def _read(path: Path) -> tuple[tuple[Entry, ...], tuple[int, int, int]]:
+    try:
+        with path.open("rb") as stream:
+            status = os.fstat(stream.fileno())
+            data = stream.read(MAXIMUM_BYTES + 1)
+    except OSError as error:
+        raise SecurityError(f"{path}: {error.strerror}") from error
+    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        raise SecurityError(f"{path}: others than its owner may write it: chmod go-w it")
+    if len(data) > MAXIMUM_BYTES:
+        raise SecurityError(f"{path}: larger than {MAXIMUM_BYTES} bytes")
+    try:
+        return parse_tokens(data.decode(), str(path)), _stamp(status)
+    except UnicodeDecodeError as error:
+        raise SecurityError(f"{path}: not UTF-8") from error

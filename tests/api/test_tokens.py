@@ -1,0 +1,126 @@
+from pathlib import Path
+
+import pytest
+
+from robosc_api.security import Scope, SecurityError, TokenFile, make_token
+from robosc_api.security.tokens import MAXIMUM_BYTES, MAXIMUM_TOKEN, parse_tokens
+
+
+class Clock:
+    now_s = 0.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+def written(folder: Path, *lines: str) -> Path:
+    file = folder / "tokens"
+    file.write_text("# who may do what\n\n" + "\n".join(lines) + "\n")
+    file.chmod(0o600)
+    return file
+
+
+def test_a_token_is_found_by_itself_and_stands_nowhere(tmp_path: Path) -> None:
+    token, line = make_token("laptop", (Scope.WATCH, Scope.OPERATE))
+    other, other_line = make_token("screen", (Scope.WATCH,))
+    file = written(tmp_path, line + "  # of the lab", other_line)
+    tokens = TokenFile(file)
+    assert token not in file.read_text()
+    found = tokens.find(token)
+    assert found is not None
+    assert found.name == "laptop"
+    assert found.scopes == frozenset({Scope.WATCH, Scope.OPERATE})
+    second = tokens.find(other)
+    assert second is not None
+    assert second.name == "screen"
+    assert second.scopes == frozenset({Scope.WATCH})
+
+
+@pytest.mark.parametrize("wrong", ["", "robosc_", "x" * MAXIMUM_TOKEN, "é", "\ud800"])
+def test_what_is_no_token_is_nobodys(wrong: str, tmp_path: Path) -> None:
+    assert TokenFile(written(tmp_path, make_token("a", (Scope.WATCH,))[1])).find(wrong) is None
+
+
+def test_a_token_with_something_behind_is_nobodys(tmp_path: Path) -> None:
+    token, line = make_token("a", (Scope.WATCH,))
+    tokens = TokenFile(written(tmp_path, line))
+    assert tokens.find(token + "x") is None
+    assert tokens.find(token[:-1]) is None
+    assert tokens.find(token + "x" * MAXIMUM_TOKEN) is None
+
+
+def test_tokens_differ() -> None:
+    assert len({make_token("a", (Scope.WATCH,))[0] for _ in range(50)}) == 50
+
+
+@pytest.mark.parametrize("name", ["", "a b", "x" * 65, "a#", "a\nb"])
+def test_a_name_must_fit_into_the_file(name: str) -> None:
+    with pytest.raises(SecurityError):
+        make_token(name, (Scope.WATCH,))
+
+
+def test_a_token_has_a_scope() -> None:
+    with pytest.raises(SecurityError):
+        make_token("a", ())
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("robosc_secret", "tokens:1: not NAME SCOPE,SCOPE sha256:DIGEST"),
+        ("a watch sha256:1234", "tokens:1: not NAME"),
+        (f"a fly sha256:{'0' * 64}", "there is no scope 'fly', only watch, operate, synthesize"),
+        (f"a watch sha256:{'0' * 64}\na watch sha256:{'1' * 64}", "tokens:2: 'a' stands there twice"),
+    ],
+)
+def test_a_wrong_line_is_told_without_what_stands_there(text: str, problem: str) -> None:
+    with pytest.raises(SecurityError) as caught:
+        parse_tokens(text, "tokens")
+    assert problem in str(caught.value)
+    assert "secret" not in str(caught.value)
+
+
+def test_a_token_is_withdrawn_while_the_service_runs(tmp_path: Path) -> None:
+    clock = Clock()
+    token, line = make_token("a", (Scope.WATCH,))
+    file = written(tmp_path, line)
+    tokens = TokenFile(file, clock)
+    written(tmp_path)
+    assert tokens.find(token) is not None, "the file is not looked at for each call"
+    clock.now_s = 1.0
+    assert tokens.find(token) is None
+
+
+def test_a_file_that_becomes_wrong_changes_nothing(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    clock = Clock()
+    token, line = make_token("a", (Scope.WATCH,))
+    file = written(tmp_path, line)
+    tokens = TokenFile(file, clock)
+    file.write_text("nonsense")
+    clock.now_s = 1.0
+    assert tokens.find(token) is not None
+    file.unlink()
+    clock.now_s = 2.0
+    assert tokens.find(token) is not None
+    assert caplog.text.count("the tokens stay as they were") == 2
+
+
+@pytest.mark.parametrize("mode", [0o620, 0o602])
+def test_a_file_that_others_may_write_is_refused(mode: int, tmp_path: Path) -> None:
+    file = written(tmp_path)
+    file.chmod(mode)
+    with pytest.raises(SecurityError, match="others than its owner may write it"):
+        TokenFile(file)
+
+
+def test_what_cannot_be_a_file_of_tokens_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SecurityError, match="No such file"):
+        TokenFile(tmp_path / "none")
+    file = tmp_path / "tokens"
+    file.write_bytes(b"\xff\xfe")
+    file.chmod(0o600)
+    with pytest.raises(SecurityError, match="not UTF-8"):
+        TokenFile(file)
+    file.write_bytes(b"#" * (MAXIMUM_BYTES + 1))
+    with pytest.raises(SecurityError, match="larger than"):
+        TokenFile(file)

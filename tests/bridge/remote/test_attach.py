@@ -1,0 +1,319 @@
+"""Programs of the model and operators of a layer, over real sockets."""
+
+import math
+import time
+from typing import Any
+
+import grpc
+import pytest
+
+from robosc_api.v1 import bridge_pb2 as pb
+from robosc_bridge.daemon import programs
+from robosc_bridge.remote import RemoteFace, RemoteSettings, service, session
+from robosc_bridge.remote.data import MAXIMUM_DEPTH, value_of
+from support.remote import PATIENCE_S, Attachment, FakeDaemon, connected, eventually, served
+
+
+@pytest.fixture
+def daemon() -> Any:
+    with FakeDaemon(is_layer=True) as made:
+        yield made
+
+
+@pytest.fixture
+def face(daemon: FakeDaemon) -> Any:
+    with served(daemon, RemoteSettings("127.0.0.1:0", operator_timeout_s=2.5)) as made:
+        yield made
+
+
+@pytest.fixture
+def stub(face: RemoteFace) -> Any:
+    with connected(face.address) as made:
+        yield made
+
+
+def attached(stub: Any, **hello: Any) -> Attachment:
+    """A program that has been welcomed."""
+    made = Attachment(stub, **{"name": "arm", **hello})
+    assert made.receive().HasField("welcome")
+    return made
+
+
+class TestHello:
+    def test_a_program_is_there_as_long_as_its_stream(self, daemon: FakeDaemon, stub: Any) -> None:
+        program = Attachment(stub, name="arm", serves=["open", "carry"])
+        assert program.receive().welcome.operator_timeout_s == 2.5
+        known = daemon.program()
+        assert known.name.startswith("arm (ipv4:127.0.0.1:")
+        assert known.serves == {"open", "carry"}
+        assert not known.may_request
+        program.end()
+        assert list(program.call) == []
+        assert eventually(lambda: daemon.of(programs.Detached))[0].program is known
+
+    @pytest.mark.parametrize(("is_layer", "is_operator"), [(True, True), (True, False), (False, True)])
+    def test_only_an_operator_before_a_layer_may_request(self, is_layer: bool, is_operator: bool) -> None:
+        with FakeDaemon(is_layer=is_layer) as daemon, served(daemon) as face, connected(face.address) as stub:
+            program = attached(stub, is_operator=is_operator)
+            assert daemon.program().may_request is (is_layer and is_operator)
+            program.end()
+
+    @pytest.mark.parametrize(
+        ("hello", "words"),
+        [
+            ({"name": ""}, "a name of 1 to 100 printable characters"),
+            ({"name": "x" * 101}, "a name of 1 to 100 printable characters"),
+            ({"name": "a\nb"}, "a name of 1 to 100 printable characters"),
+            ({"name": "\x1b[31m"}, "a name of 1 to 100 printable characters"),
+            ({"name": "arm", "serves": ["nothing"]}, "'nothing' is no service or action"),
+            ({"name": "arm", "serves": ["order"]}, "'order' is no service or action"),
+            ({"name": "arm", "serves": ["x" * 100_000]}, "is no service or action"),
+            ({"name": "arm", "serves": ["\n"]}, "'?' is no service or action"),
+        ],
+    )
+    def test_a_hello_that_makes_no_sense(self, hello: Any, words: str, daemon: FakeDaemon, stub: Any) -> None:
+        code, details = Attachment(stub, **hello).failure()
+        assert code is grpc.StatusCode.INVALID_ARGUMENT
+        assert words in details
+        assert len(details) < 200
+        assert daemon.told == []
+
+    def test_it_is_the_first_message(self, daemon: FakeDaemon, stub: Any) -> None:
+        program = Attachment(stub)
+        program.send(keep_alive=pb.KeepAlive())
+        assert program.failure() == (
+            grpc.StatusCode.INVALID_ARGUMENT,
+            "the first message is 'hello', within 5 seconds",
+        )
+        program = attached(stub)
+        program.send(hello=pb.Hello(name="other"))
+        assert program.receive().refused.why == "'hello' is the first message alone"
+        program.end()
+
+    def test_it_comes_soon_or_the_place_is_given_to_another(self, stub: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(service, "HELLO_LIMIT_S", 0.05)
+        program = Attachment(stub)
+        assert program.failure()[0] is grpc.StatusCode.INVALID_ARGUMENT
+        program.end()
+
+    def test_programs_are_bounded(self, stub: Any) -> None:
+        there = [attached(stub) for _ in range(service.MAXIMUM_PROGRAMS)]
+        one_more = Attachment(stub, name="one more")
+        assert one_more.failure() == (grpc.StatusCode.RESOURCE_EXHAUSTED, "there are 16 programs already")
+        there[0].end()
+        assert list(there[0].call) == []
+        there[0] = attached(stub)
+        for program in [*there, one_more]:
+            program.end()
+
+
+DATA = value_of({"x": 3})
+SAID = [
+    ({"give": pb.Message(identifier="/order", data=DATA)}, programs.Told, ("/order", {"x": 3})),
+    ({"give": pb.Message(identifier="/order")}, programs.Told, ("/order", None)),
+    ({"reply": pb.NumberedData(number=7, data=DATA)}, programs.Replied, (7, {"x": 3})),
+    ({"call_failure": pb.CallFailure(number=7, reason="no")}, programs.CallFailed, (7, "no")),
+    ({"goal_acceptance": pb.GoalNumber(number=2**64 - 1)}, programs.GoalAccepted, (2**64 - 1,)),
+    ({"feedback": pb.NumberedData(number=7, data=value_of(0.5))}, programs.FeedbackGiven, (7, 0.5)),
+    (
+        {"goal_end": pb.GoalEnd(number=7, outcome=pb.GOAL_OUTCOME_SUCCEEDED, data=value_of(1.0))},
+        programs.GoalEnded,
+        (7, "succeeded", 1),
+    ),
+    (
+        {"goal_end": pb.GoalEnd(number=7, outcome=pb.GOAL_OUTCOME_REJECTED)},
+        programs.GoalEnded,
+        (7, "rejected", None),
+    ),
+    ({"request": pb.Message(identifier="/cmd_vel", data=DATA)}, programs.Requested, ("/cmd_vel", {"x": 3})),
+    ({"call": pb.OwnRequest(name="open", id="a", data=DATA)}, programs.Called, ("open", "a", {"x": 3})),
+    ({"goal": pb.OwnRequest(name="carry", id="b")}, programs.GoalSent, ("carry", "b", None)),
+    ({"cancel": pb.OwnCancel(name="carry", id="b")}, programs.CancelWanted, ("carry", "b")),
+]
+
+HEARD = [
+    (programs.MessageSent("show", "/show", "hi"), "message_sent", {"name": "show", "identifier": "/show"}, "hi"),
+    (programs.CallMade("open", 3, 4), "call", {"name": "open", "number": 3}, 4),
+    (programs.GoalMade("carry", 5, None), "goal", {"name": "carry", "number": 5}, None),
+    (programs.CancelMade("carry", 5), "cancel", {"name": "carry", "number": 5}, None),
+    (programs.PassedOn("/scan", {"a": [1]}), "passed_on", {"identifier": "/scan"}, {"a": [1]}),
+    (programs.Blocked("/cmd_vel"), "blocked", {"identifier": "/cmd_vel"}, None),
+    (programs.Answered("a", True, is_default=False), "answer", {"id": "a", "is_default": False}, True),
+    (programs.Answered("a", None, is_default=True), "answer", {"id": "a", "is_default": True}, None),
+    (programs.GoalTaken("b"), "goal_taken", {"id": "b"}, None),
+    (programs.GoalRejected("b"), "goal_rejected", {"id": "b"}, None),
+    (programs.FeedbackPassed("b", 0.5), "goal_feedback", {"id": "b"}, 0.5),
+    (programs.GoalOver("b", "aborted", 2), "goal_over", {"id": "b", "outcome": pb.GOAL_OUTCOME_ABORTED}, 2),
+    (programs.Refused("who are you?"), "refused", {"why": "who are you?"}, None),
+]
+
+
+class TestTalk:
+    @pytest.mark.parametrize(("message", "kind", "parts"), SAID)
+    def test_what_a_program_says(self, message: Any, kind: Any, parts: Any, daemon: FakeDaemon, stub: Any) -> None:
+        program = attached(stub)
+        program.send(**message)
+        assert eventually(lambda: daemon.of(kind)) == [kind(daemon.program(), *parts)]
+        program.end()
+
+    @pytest.mark.parametrize(("item", "kind", "fields", "data"), HEARD)
+    def test_what_a_program_hears(
+        self, item: Any, kind: str, fields: Any, data: Any, daemon: FakeDaemon, stub: Any
+    ) -> None:
+        program = attached(stub)
+        daemon.program().tell(item)
+        response = program.receive()
+        assert response.WhichOneof("message") == kind
+        part = getattr(response, kind)
+        assert {name: getattr(part, name) for name in fields} == fields
+        if hasattr(part, "data"):
+            assert part.data == value_of(data)
+        program.end()
+
+    def test_not_a_number_goes_through_both_ways(self, daemon: FakeDaemon, stub: Any) -> None:
+        program = attached(stub, is_operator=True)
+        program.send(request=pb.Message(identifier="/cmd_vel", data=value_of([math.nan, math.inf])))
+        data = eventually(lambda: daemon.of(programs.Requested))[0].data
+        assert math.isnan(data[0])
+        assert data[1] == math.inf
+        daemon.program().tell(programs.PassedOn("/scan", [math.nan]))
+        assert math.isnan(program.receive().passed_on.data.list_value.values[0].number_value)
+        program.end()
+
+    def test_the_order_stays(self, daemon: FakeDaemon, stub: Any) -> None:
+        program = attached(stub)
+        for number in range(500):
+            program.send(give=pb.Message(identifier="/order", data=value_of(number)))
+        eventually(lambda: len(daemon.of(programs.Told)) == 500)
+        assert [item.data for item in daemon.of(programs.Told)] == list(range(500))
+        for number in range(500):
+            daemon.program().tell(programs.MessageSent("show", "/show", number))
+        heard = [program.receive().message_sent.data.number_value for _ in range(500)]
+        assert heard == list(range(500))
+        program.end()
+
+
+class TestOperator:
+    def test_each_message_is_a_sign_of_life(self, daemon: FakeDaemon, stub: Any) -> None:
+        program = attached(stub, is_operator=True)
+        eventually(lambda: daemon.seen == 1)
+        program.send(keep_alive=pb.KeepAlive())
+        eventually(lambda: daemon.seen == 2)
+        program.send(request=pb.Message(identifier="/cmd_vel"))
+        eventually(lambda: daemon.seen == 3)
+        assert eventually(lambda: daemon.of(programs.Requested))
+        program.end()
+
+    def test_other_programs_give_none(self, daemon: FakeDaemon, stub: Any) -> None:
+        program = attached(stub)
+        program.send(keep_alive=pb.KeepAlive())
+        program.send(give=pb.Message(identifier="/order"))
+        eventually(lambda: daemon.of(programs.Told))
+        assert daemon.seen == 0
+        program.end()
+
+
+def nested(levels: int) -> Any:
+    value = value_of(1)
+    for _ in range(levels):
+        outer = value_of([])
+        outer.list_value.values.append(value)
+        value = outer
+    return value
+
+
+def part(number: int, content: bytes) -> bytes:
+    """A field of a protobuf message, by hand."""
+    length, size = bytearray(), len(content)
+    while size > 127:
+        length.append(size & 127 | 128)
+        size >>= 7
+    return bytes([number << 3 | 2, *length, size]) + content
+
+
+class TestHostilePrograms:
+    @pytest.mark.parametrize(
+        ("message", "why"),
+        [
+            ({}, "a message without a kind"),
+            ({"give": pb.Message(identifier="/order", data=nested(MAXIMUM_DEPTH + 1))}, "nested deeper than"),
+            ({"give": pb.Message(identifier="/order", data=value_of([None] * 30_000))}, "more than 20000 values"),
+            ({"give": pb.Message(identifier="/order", data=value_of({"x" * 300: 1}))}, "a name of more than"),
+            ({"give": pb.Message(identifier="x" * 2000)}, "more than 1000 characters"),
+            ({"call": pb.OwnRequest(name="open", id="x" * 2000)}, "more than 1000 characters"),
+            ({"call_failure": pb.CallFailure(number=1, reason="x" * 2000)}, "more than 1000 characters"),
+            ({"goal_end": pb.GoalEnd(number=1)}, "there is no outcome of number 0"),
+            ({"goal_end": pb.GoalEnd(number=1, outcome=99)}, "there is no outcome of number 99"),  # type: ignore[arg-type]
+        ],
+    )
+    def test_what_makes_no_sense_is_refused_and_changes_nothing(
+        self, message: Any, why: str, daemon: FakeDaemon, stub: Any
+    ) -> None:
+        program = attached(stub)
+        program.send(**message)
+        assert why in program.receive().refused.why
+        program.send(give=pb.Message(identifier="/order"))
+        assert len(eventually(lambda: daemon.of(programs.Told))) == 1
+        program.end()
+
+    def test_nesting_beyond_what_protobuf_reads_ends_the_stream(self, daemon: FakeDaemon, face: RemoteFace) -> None:
+        hello = pb.AttachRequest(hello=pb.Hello(name="arm")).SerializeToString()
+        data = b""
+        for _ in range(500):
+            # A Value with a ListValue with one Value.
+            data = part(6, part(1, data))
+        messages = [hello, part(3, part(2, data))]
+        channel: Any
+        with grpc.insecure_channel(face.address) as channel:
+            call = channel.stream_stream("/robosc_api.v1.BridgeService/Attach")(iter(messages), timeout=PATIENCE_S)
+            with pytest.raises(grpc.RpcError) as caught:
+                list(call)
+        assert caught.value.code() is grpc.StatusCode.INVALID_ARGUMENT
+        assert eventually(lambda: daemon.of(programs.Detached))
+        assert not daemon.of(programs.Told)
+
+    def test_a_program_that_vanishes_is_gone_for_the_loop(self, daemon: FakeDaemon, face: RemoteFace) -> None:
+        with connected(face.address) as stub:
+            attached(stub, serves=["open"])
+            daemon.program()
+        # Its connection is closed, without a word.
+        assert eventually(lambda: daemon.of(programs.Detached))[0].program is daemon.program()
+        # What the loop still tells it goes nowhere.
+        daemon.program().tell(programs.CallMade("open", 1, None))
+
+    def test_a_program_that_floods_is_held_back_at_its_end(self, daemon: FakeDaemon, stub: Any) -> None:
+        program = attached(stub)
+        daemon.program()
+        daemon.turns = False
+        for number in range(5000):
+            program.send(give=pb.Message(identifier="/order", data=value_of(number)))
+        eventually(lambda: daemon.waiting >= session.MESSAGES_A_TURN - 1)
+        time.sleep(0.2)
+        # The loop's thread has taken one more, and shown nothing since.
+        assert daemon.waiting <= session.MESSAGES_A_TURN + 1
+        stub.Stop(pb.StopRequest(), timeout=PATIENCE_S)
+        assert daemon.orders
+        daemon.turns = True
+        eventually(lambda: len(daemon.of(programs.Told)) == 5000)
+        program.end()
+
+    def test_a_program_that_does_not_read_is_ended_with_a_clear_status(self, daemon: FakeDaemon, stub: Any) -> None:
+        program = attached(stub, serves=["open"])
+        known = daemon.program()
+        data = "x" * 20_000
+        end_s = time.monotonic() + PATIENCE_S
+        while not daemon.of(programs.Detached):
+            known.tell(programs.PassedOn("/scan", data))
+            assert time.monotonic() < end_s
+        code, details = program.failure()
+        assert code is grpc.StatusCode.RESOURCE_EXHAUSTED
+        assert details == "more than 1000 messages wait for this program to read them"
+        program.end()
+
+    def test_the_end_of_the_bridge_is_told(self, daemon: FakeDaemon) -> None:
+        with served(daemon) as face, connected(face.address) as stub:
+            program = attached(stub)
+            face.stop()
+            assert program.failure() == (grpc.StatusCode.UNAVAILABLE, "the bridge ends")
+            assert eventually(lambda: daemon.of(programs.Detached))
+            program.end()

@@ -1,0 +1,44 @@
+"""The page of the documentation tells the limits that hold, and every call."""
+
+import re
+from pathlib import Path
+
+from robosc_api.v1 import bridge_pb2
+from robosc_bridge.remote import data, face, service, session, watchers
+from robosc_bridge.remote.convert import MAXIMUM_TEXT
+from robosc_bridge.terminal import teleop
+from robosc_bridge.terminal.commands import ADDRESS, NAMES
+
+DOCS = Path(__file__).parents[3] / "docs"
+PAGE = (DOCS / "bridge-remote.md").read_text(encoding="utf-8")
+
+
+def test_the_limits() -> None:
+    streams = f"| {service.MAXIMUM_WATCHERS}; {service.MAXIMUM_PROGRAMS}; {service.MAXIMUM_COMMANDS} |"
+    connections = f"| {face.MAXIMUM_CONNECTIONS}; {face._HANDSHAKE_LIMIT_S:g} s |"
+    message = f"| {face.MAXIMUM_REQUEST_BYTES // 1024} KiB; {face.MAXIMUM_METADATA_BYTES // 1024} KiB |"
+    values = f"| {data.MAXIMUM_DEPTH} and {data.MAXIMUM_VALUES:,}; {data.MAXIMUM_NAME} |"
+    events = f"| {watchers.MAXIMUM_EVENTS}, or {watchers.MAXIMUM_BYTES // 2**20} MiB |"
+    waiting = f"wait for a program | {session.MAXIMUM_WAITING} |"
+    turn = f"next snapshot | {session.MESSAGES_A_TURN} |"
+    silence = f"| {face.PING_S + face.PING_LIMIT_S:g} s with a ping"
+    for text in (streams, connections, message, values, events, waiting, turn, silence, f"| {MAXIMUM_TEXT} characters"):
+        assert text in PAGE, text
+
+
+def test_the_calls() -> None:
+    methods = [method.name for method in bridge_pb2.DESCRIPTOR.services_by_name["BridgeService"].methods]
+    assert sorted(re.findall(r"^\| `(\w+)` \| (?:`\w+`|any) \|", PAGE, re.MULTILINE)) == sorted(methods)
+
+
+def test_the_commands() -> None:
+    assert all(name in PAGE for name in NAMES)
+    assert ADDRESS in PAGE
+    assert f"{teleop.STEP_M_S:g} m/s" in PAGE
+    assert f"{teleop.STEP_RAD_S:g} rad/s" in PAGE
+
+
+def test_the_page_is_listed() -> None:
+    listed = (DOCS / "README.md").read_text(encoding="utf-8")
+    assert "(bridge-remote.md)" in listed
+    assert "(security.md)" in listed

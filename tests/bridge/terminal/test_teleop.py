@@ -1,0 +1,206 @@
+"""Driving by keys: the command as a program on a real pseudo-terminal."""
+
+import os
+import pty
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from robosc_bridge.daemon import programs
+from robosc_bridge.daemon.states import Command
+from robosc_bridge.terminal.teleop import ANGULAR_RAD_S, LINEAR_M_S, Wished, keys_of
+from support.remote import PATIENCE_S, FakeDaemon, eventually, served
+
+
+class TestKeys:
+    def test_steps_add_up_and_end_at_exactly_zero(self) -> None:
+        wished = Wished()
+        for _ in range(3):
+            wished.press("w")
+        assert wished.linear_m_s == 0.06
+        for _ in range(3):
+            wished.press("s")
+        assert wished.linear_m_s == 0.0
+        assert not wished.is_motion
+
+    def test_left_is_counter_clockwise(self) -> None:
+        wished = Wished()
+        wished.press("a")
+        assert wished.angular_rad_s == 0.2
+        wished.press("d")
+        wished.press("d")
+        assert wished.angular_rad_s == -0.2
+
+    @pytest.mark.parametrize(
+        ("key", "linear_m_s", "angular_rad_s"),
+        [("w", LINEAR_M_S, 0.0), ("s", -LINEAR_M_S, 0.0), ("a", 0.0, ANGULAR_RAD_S), ("d", 0.0, -ANGULAR_RAD_S)],
+    )
+    def test_wishes_are_bounded(self, key: str, linear_m_s: float, angular_rad_s: float) -> None:
+        wished = Wished()
+        for _ in range(100):
+            wished.press(key)
+        assert (wished.linear_m_s, wished.angular_rad_s) == (linear_m_s, angular_rad_s)
+
+    @pytest.mark.parametrize("key", ["x", " "])
+    def test_halting(self, key: str) -> None:
+        wished = Wished()
+        wished.press("w")
+        wished.press("a")
+        wished.press(key)
+        assert not wished.is_motion
+
+    def test_other_keys_change_nothing(self) -> None:
+        wished = Wished()
+        wished.press("w")
+        for key in "qrWé\x1b[":
+            wished.press(key)
+        assert wished.linear_m_s == 0.02
+
+    def test_arrows_are_letters(self) -> None:
+        assert keys_of("\x1b[Aa\x1b[B\x1b[C\x1b[Dx\x1b") == ["w", "a", "s", "d", "a", "x", "\x1b"]
+
+
+class Terminal:
+    """The command on a pseudo-terminal."""
+
+    def __init__(self, address: str) -> None:
+        self._number, inner = pty.openpty()
+        command = [sys.executable, "-m", "robosc_bridge.command", "teleop", "--address", address]
+        self.process = subprocess.Popen(command, stdin=inner, stdout=inner, stderr=inner)
+        os.close(inner)
+        self._seen = b""
+        self._thread = threading.Thread(target=self._read)
+        self._thread.start()
+
+    def _read(self) -> None:
+        while True:
+            try:
+                self._seen += os.read(self._number, 4096)
+            except OSError:
+                return
+
+    @property
+    def seen(self) -> str:
+        return self._seen.decode()
+
+    def type(self, keys: str) -> None:
+        os.write(self._number, keys.encode())
+
+    def close(self) -> None:
+        self.process.kill()
+        self.process.wait()
+        self._thread.join(PATIENCE_S)
+        os.close(self._number)
+
+
+@pytest.fixture
+def daemon() -> Any:
+    with FakeDaemon(is_layer=True) as made:
+        yield made
+
+
+@contextmanager
+def driving(daemon: FakeDaemon) -> Iterator[Terminal]:
+    with served(daemon) as face:
+        terminal = Terminal(face.address)
+        try:
+            eventually(lambda: "w/s or up/down" in terminal.seen)
+            yield terminal
+        finally:
+            terminal.close()
+
+
+def wishes(daemon: FakeDaemon) -> list[tuple[str, float, float]]:
+    found = daemon.of(programs.Requested)
+    return [(item.identifier, item.data["linear"]["x"], item.data["angular"]["z"]) for item in found]
+
+
+def test_keys_drive_and_it_is_said_again_while_wished(daemon: FakeDaemon) -> None:
+    with driving(daemon) as terminal:
+        assert daemon.program().may_request
+        terminal.type("w")
+        eventually(lambda: ("/cmd_vel", 0.02, 0) in wishes(daemon))
+        terminal.type("\x1b[D")
+        eventually(lambda: ("/cmd_vel", 0.02, 0.2) in wishes(daemon))
+        begin_s, count = time.monotonic(), len(wishes(daemon))
+        eventually(lambda: len(wishes(daemon)) >= count + 5)
+        assert time.monotonic() - begin_s > 0.3
+        assert set(wishes(daemon)[count:]) == {("/cmd_vel", 0.02, 0.2)}
+
+
+def test_q_ends_with_a_stop_of_the_motion(daemon: FakeDaemon) -> None:
+    with driving(daemon) as terminal:
+        terminal.type("www")
+        eventually(lambda: ("/cmd_vel", 0.06, 0) in wishes(daemon))
+        terminal.type("q")
+        assert terminal.process.wait(PATIENCE_S) == 0
+        eventually(lambda: daemon.of(programs.Detached))
+        assert wishes(daemon)[-1] == ("/cmd_vel", 0, 0)
+
+
+def test_what_was_wished_ends_with_zeros_and_the_link_stays(daemon: FakeDaemon) -> None:
+    with driving(daemon) as terminal:
+        terminal.type("wx")
+        eventually(lambda: wishes(daemon)[-1:] == [("/cmd_vel", 0, 0)])
+        seen, count = daemon.seen, len(wishes(daemon))
+        eventually(lambda: daemon.seen >= seen + 5)
+        assert len(wishes(daemon)) <= count + 3
+        assert not daemon.of(programs.Detached)
+
+
+def test_the_space_bar_stops_the_robot_and_r_lets_it_go_on(daemon: FakeDaemon) -> None:
+    with driving(daemon) as terminal:
+        terminal.type("w ")
+        eventually(lambda: daemon.commands() == [Command.STOP])
+        eventually(lambda: "stopped: r lets it go on" in terminal.seen)
+        eventually(lambda: wishes(daemon)[-1:] == [("/cmd_vel", 0, 0)])
+        daemon.refusal = "a button that stops is pressed"
+        terminal.type("r")
+        eventually(lambda: "a button that stops is pressed" in terminal.seen)
+        assert daemon.commands() == [Command.STOP, Command.RESUME]
+
+
+def test_what_is_blocked_and_refused_is_shown(daemon: FakeDaemon) -> None:
+    with driving(daemon) as terminal:
+        terminal.type("w")
+        daemon.program().tell(programs.Blocked("/cmd_vel"))
+        eventually(lambda: "BLOCKED /cmd_vel" in terminal.seen)
+        daemon.program().tell(programs.Refused("who are you?\x1b[2J"))
+        eventually(lambda: "who are you?" in terminal.seen)
+        assert "\x1b[2J" not in terminal.seen
+
+
+def test_the_end_of_the_bridge_is_told(daemon: FakeDaemon) -> None:
+    with served(daemon) as face:
+        terminal = Terminal(face.address)
+        try:
+            eventually(lambda: "w/s or up/down" in terminal.seen)
+            face.stop()
+            assert terminal.process.wait(PATIENCE_S) == 2
+            eventually(lambda: "the bridge ends" in terminal.seen)
+        finally:
+            terminal.close()
+
+
+def test_a_controller_is_not_driven() -> None:
+    with FakeDaemon() as daemon, served(daemon) as face:
+        terminal = Terminal(face.address)
+        try:
+            assert terminal.process.wait(PATIENCE_S) == 1
+            eventually(lambda: "the supervisor of Porter is a controller and drives by itself" in terminal.seen)
+        finally:
+            terminal.close()
+
+
+def test_without_a_terminal_it_is_wrong_use(daemon: FakeDaemon) -> None:
+    with served(daemon) as face:
+        command = [sys.executable, "-m", "robosc_bridge.command", "teleop", "--address", face.address]
+        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stderr) == (2, "robosc-bridge: keys are typed in a terminal, and there is none\n")
+    assert not daemon.told

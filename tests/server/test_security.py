@@ -1,0 +1,237 @@
+"""The synthesis server and its client over real sockets with TLS, client certificates and tokens."""
+
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import grpc
+import pytest
+from grpc_health.v1 import health_pb2, health_pb2_grpc
+from grpc_reflection.v1alpha import reflection_pb2, reflection_pb2_grpc
+
+from robosc_api.security import Credentials, Scope, ServerSecurity, make_token
+from robosc_client import Client, CredentialsError, RequestRefusedError, ServerUnavailableError
+from robosc_client.main import main as robosc_client
+from robosc_server.main import AddressError, main
+from robosc_server.settings import Settings
+from support.certificates import Authority
+from support.service import FAKE_WORKER, PATIENCE_S, bundle_of, served, server_process
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("certificates")
+
+
+@pytest.fixture(scope="module")
+def authority(folder: Path) -> Authority:
+    return Authority(folder)
+
+
+@pytest.fixture(scope="module")
+def secure(authority: Authority) -> ServerSecurity:
+    certificate, key = authority.sign("server")
+    return ServerSecurity(certificate=certificate, key=key)
+
+
+@contextmanager
+def serving(security: ServerSecurity) -> Iterator[str]:
+    with served(Settings(port=0, workers=1, security=security), FAKE_WORKER) as address:
+        yield address
+
+
+def check(address: str, **credentials: Path | bool) -> None:
+    with Client(address, Credentials(**credentials)) as client:  # type: ignore[arg-type]
+        assert client.check(bundle_of("")) == ()
+
+
+def token_in(folder: Path, *scopes: Scope) -> tuple[Path, Path]:
+    """A file with a token, and one that lets it in."""
+    token, line = make_token("caller", scopes)
+    files = folder / "token", folder / "tokens"
+    files[0].write_text(token + "\n")
+    files[1].write_text(line + "\n")
+    for file in files:
+        file.chmod(0o600)
+    return files
+
+
+class TestTls:
+    def test_a_caller_that_believes_the_authority_is_answered(
+        self, authority: Authority, secure: ServerSecurity
+    ) -> None:
+        with serving(secure) as address:
+            check(address, ca=authority.file)
+            # By its name as well.
+            check(address.replace("127.0.0.1", "localhost"), ca=authority.file)
+
+    def test_without_tls_and_with_another_authority_nobody_is_there(self, folder: Path, secure: ServerSecurity) -> None:
+        other = Authority(folder, "other")
+        with serving(secure) as address:
+            for credentials in (Credentials(), Credentials(ca=other.file), Credentials(is_secure=True)):
+                with Client(address, credentials) as client, pytest.raises(ServerUnavailableError):
+                    client.check(bundle_of(""), deadline_s=PATIENCE_S)
+
+    def test_a_client_with_tls_does_not_talk_to_a_server_without(self, authority: Authority) -> None:
+        with serving(ServerSecurity()) as address, pytest.raises(ServerUnavailableError):
+            check(address, ca=authority.file)
+
+    def test_callers_show_certificates_where_they_are_asked_for(
+        self, folder: Path, authority: Authority, secure: ServerSecurity
+    ) -> None:
+        assert secure.certificate is not None
+        security = ServerSecurity(certificate=secure.certificate, key=secure.key, client_ca=authority.file)
+        certificate, key = authority.sign("caller")
+        strange, strange_key = Authority(folder, "stranger").sign("strange")
+        with serving(security) as address:
+            check(address, ca=authority.file, certificate=certificate, key=key)
+            with pytest.raises(ServerUnavailableError):
+                check(address, ca=authority.file)
+            with pytest.raises(ServerUnavailableError):
+                check(address, ca=authority.file, certificate=strange, key=strange_key)
+
+    def test_a_new_certificate_is_taken_without_a_restart(self, tmp_path: Path) -> None:
+        first, second = Authority(tmp_path, "first"), Authority(tmp_path, "second")
+        certificate, key = first.sign("server")
+        with serving(ServerSecurity(certificate=certificate, key=key)) as address:
+            check(address, ca=first.file)
+            # Half of it: what was read before stays.
+            other, other_key = second.sign("new")
+            shutil.copy(other, certificate)
+            check(address, ca=first.file)
+            shutil.copy(other_key, key)
+            check(address, ca=second.file)
+
+
+class TestTokens:
+    def test_only_with_a_token_that_is_for_it(
+        self, tmp_path: Path, authority: Authority, secure: ServerSecurity
+    ) -> None:
+        token, tokens = token_in(tmp_path, Scope.SYNTHESIZE)
+        wrong = tmp_path / "wrong"
+        wrong.write_text("robosc_guessed")
+        security = ServerSecurity(certificate=secure.certificate, key=secure.key, tokens=tokens)
+        with serving(security) as address:
+            check(address, ca=authority.file, token_file=token)
+            with pytest.raises(RequestRefusedError, match="a valid token is needed"):
+                check(address, ca=authority.file)
+            with pytest.raises(RequestRefusedError, match="a valid token is needed"):
+                check(address, ca=authority.file, token_file=wrong)
+
+    def test_a_token_for_something_else_is_not_enough(self, tmp_path: Path) -> None:
+        token, tokens = token_in(tmp_path, Scope.WATCH, Scope.OPERATE)
+        with (
+            serving(ServerSecurity(tokens=tokens)) as address,
+            pytest.raises(RequestRefusedError, match="scope does not include 'synthesize'"),
+        ):
+            check(address, token_file=token)
+
+    def test_health_needs_no_token_and_reflection_does(self, tmp_path: Path) -> None:
+        _, tokens = token_in(tmp_path, Scope.SYNTHESIZE)
+        with serving(ServerSecurity(tokens=tokens)) as address, grpc.insecure_channel(address) as channel:
+            answer = health_pb2_grpc.HealthStub(channel).Check(health_pb2.HealthCheckRequest(), timeout=PATIENCE_S)
+            assert answer.status == health_pb2.HealthCheckResponse.SERVING
+            stub = reflection_pb2_grpc.ServerReflectionStub(channel)
+            request = reflection_pb2.ServerReflectionRequest(list_services="")
+            with pytest.raises(grpc.RpcError) as caught:
+                list(stub.ServerReflectionInfo(iter([request]), timeout=PATIENCE_S))
+            assert caught.value.code() is grpc.StatusCode.UNAUTHENTICATED
+
+    def test_two_tokens_are_none(self, tmp_path: Path) -> None:
+        token, tokens = token_in(tmp_path, Scope.SYNTHESIZE)
+        entry = ("authorization", f"Bearer {token.read_text().strip()}")
+        with serving(ServerSecurity(tokens=tokens)) as address, grpc.insecure_channel(address) as channel:
+            stub = reflection_pb2_grpc.ServerReflectionStub(channel)
+            for metadata, is_admitted in (([entry], True), ([entry, entry], False), ([(entry[0], "Basic x")], False)):
+                request = reflection_pb2.ServerReflectionRequest(list_services="")
+                call = stub.ServerReflectionInfo(iter([request]), timeout=PATIENCE_S, metadata=metadata)
+                if is_admitted:
+                    assert len(list(call)) == 1
+                else:
+                    with pytest.raises(grpc.RpcError):
+                        list(call)
+
+    def test_a_token_is_not_sent_in_the_clear_to_another_machine(self, tmp_path: Path) -> None:
+        token, _ = token_in(tmp_path, Scope.SYNTHESIZE)
+        with pytest.raises(CredentialsError, match="with TLS only"):
+            Client("192.0.2.1:50051", Credentials(token_file=token))
+
+    def test_a_token_is_never_logged(
+        self, tmp_path: Path, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
+    ) -> None:
+        token, tokens = token_in(tmp_path, Scope.WATCH)
+        with serving(ServerSecurity(tokens=tokens)) as address, pytest.raises(RequestRefusedError):
+            check(address, token_file=token)
+        secret = token.read_text().strip()
+        assert "the token 'caller' is not for" in caplog.text
+        assert secret not in caplog.text + "".join(capfd.readouterr())
+
+
+class TestWhereItListens:
+    @pytest.mark.parametrize("host", ["0.0.0.0", "::"])
+    def test_beyond_this_machine_only_with_tls(self, host: str) -> None:
+        settings = Settings(host=host, port=0, workers=1)
+        with pytest.raises(AddressError, match="can be reached from other machines"), served(settings, FAKE_WORKER):
+            pass
+
+    def test_unless_it_is_told_otherwise(self, secure: ServerSecurity, authority: Authority) -> None:
+        settings = Settings(host="0.0.0.0", port=0, workers=1, security=ServerSecurity(insecure_beyond_loopback=True))
+        with served(settings, FAKE_WORKER) as address:
+            check(address.replace("0.0.0.0", "127.0.0.1"))
+        with served(Settings(host="0.0.0.0", port=0, workers=1, security=secure), FAKE_WORKER) as address:
+            check(address.replace("0.0.0.0", "127.0.0.1"), ca=authority.file)
+
+    def test_files_that_do_not_fit_are_told_at_the_start(
+        self, tmp_path: Path, authority: Authority, secure: ServerSecurity
+    ) -> None:
+        assert secure.certificate is not None
+        assert secure.key is not None
+        _, other_key = authority.sign("another")
+        empty = tmp_path / "empty"
+        empty.touch()
+        cases = [
+            (ServerSecurity(certificate=secure.certificate), "belong together"),
+            (ServerSecurity(client_ca=authority.file), "with TLS only"),
+            (ServerSecurity(certificate=secure.certificate, key=other_key), "cannot be used"),
+            (ServerSecurity(certificate=tmp_path / "none", key=secure.key), "No such file"),
+            (ServerSecurity(certificate=empty, key=secure.key), "cannot be used"),
+            (
+                ServerSecurity(certificate=secure.certificate, key=secure.key, client_ca=empty),
+                "no certificates in PEM",
+            ),
+            (ServerSecurity(tokens=tmp_path / "none"), "No such file"),
+        ]
+        for security, words in cases:
+            with pytest.raises(AddressError, match=words), serving(security):
+                pass
+
+
+class TestCommands:
+    def test_as_programs(self, tmp_path: Path, authority: Authority, secure: ServerSecurity) -> None:
+        command = [sys.executable, "-m", "robosc_server.main", "token", "laptop"]
+        made = subprocess.run(command, capture_output=True, text=True, check=True)
+        token, tokens = tmp_path / "token", tmp_path / "tokens"
+        token.write_text(made.stdout)
+        tokens.write_text(made.stderr.splitlines()[-1] + "\n")
+        tokens.chmod(0o600)
+        model = tmp_path / "robot.rscd"
+        model.write_text("robot R { component C { incoming message go with type: none } }")
+        options = ["--tls-certificate", str(secure.certificate), "--tls-key", str(secure.key), "--tokens", str(tokens)]
+        with server_process(*options) as (_, address):
+            given = ["check", str(model), "--server", address, "--ca", str(authority.file)]
+            assert robosc_client([*given, "--token-file", str(token)]) == 0
+            assert robosc_client(given) == 3
+
+    def test_wrong_use(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        assert main(["token", "not a name"]) == 2
+        assert main(["--port", "0", "--tls-key", str(tmp_path / "none")]) == 1
+        assert "belong together" in capsys.readouterr().err
+        assert main(["--host", "0.0.0.0", "--port", "0"]) == 1
+        model = tmp_path / "robot.rscd"
+        model.write_text("robot R { }")
+        given = ["check", str(model), "--server", "127.0.0.1:1", "--ca", str(tmp_path / "none")]
+        assert robosc_client(given) == 3
+        assert "No such file" in capsys.readouterr().err

@@ -1,0 +1,251 @@
+"""A daemon as remote faces see it, in the hands of a test, and callers of a face."""
+
+import queue
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import grpc
+
+from robosc.model import check
+from robosc.model.structure import Model
+from robosc_api.security import Credentials, open_channel
+from robosc_api.v1 import bridge_pb2 as pb
+from robosc_api.v1 import bridge_pb2_grpc
+from robosc_bridge.configuration import parse, tie
+from robosc_bridge.daemon.feed import Feed, Snapshot
+from robosc_bridge.daemon.operations import Operations
+from robosc_bridge.daemon.programs import FromProgram, Program
+from robosc_bridge.daemon.reports import Device
+from robosc_bridge.daemon.states import Command, Order, State
+from robosc_bridge.devices.interface import BINS, DriveReading, MotorFault, Pose, RawScan, Scan, Velocity
+from robosc_bridge.remote import RemoteFace, RemoteSettings, serve
+from robosc_bridge.safety import Caution, Reason
+from support.models import bundle_of
+
+PATIENCE_S = 30.0
+
+MODEL = """
+robot Porter {
+    interface twist use Twist from geometry_msgs
+    interface opening use Open from desk_msgs
+    interface carrying use Carry from desk_msgs
+    datatype object Vector { x: double z: double }
+    datatype object Twist { linear: Vector angular: Vector }
+    component Wheels {
+        incoming message drive with identifier: "/cmd_vel", type: Twist links twist
+        behaviour { initial marked state ready { on request to drive } }
+    }
+    component Desk {
+        outgoing message order with identifier: "/order", type: integer
+        incoming message show with identifier: "/show", type: string
+        service open with identifier: "/open", request: integer, response: boolean links opening
+        action carry with identifier: "/carry", request: integer, response: integer, feedback: double links carrying
+        behaviour {
+            variable count: integer = 0
+            initial marked state idle {
+                on response from order do count := value goto busy
+                on request to open
+                on response from open
+                on error from open
+            }
+            marked state busy { on response from order goto idle }
+        }
+    }
+}
+"""
+
+CONFIGURATION = b"""
+robot: burger
+drive: {driver: opencr, port: /dev/none}
+channels:
+  /cmd_vel: {channel: drive}
+  /order: {channel: grpc}
+  /show: {channel: grpc}
+  /open: {channel: grpc}
+  /carry: {channel: grpc}
+"""
+
+
+def model() -> Model:
+    checked = check(bundle_of(MODEL))
+    assert checked.model is not None, checked.diagnostics
+    return checked.model
+
+
+READING = DriveReading(
+    time_s=0.0,
+    pose=Pose(1.0, 2.0, 0.5),
+    velocity=Velocity(0.1, -0.2),
+    wheels_m_s=(0.1, 0.2),
+    is_torque_on=True,
+    faults=frozenset({MotorFault.VOLTAGE}),
+    battery_v=11.8,
+    battery_share=None,
+    buttons={"button_1": True},
+)
+
+SNAPSHOT = Snapshot(
+    number=1,
+    time_s=0.0,
+    state=State.RUNNING,
+    problem="",
+    reasons=(Reason.SCAN_STALE, Reason.OPERATOR_STOP),
+    warnings=(Caution.BATTERY,),
+    stops=("'/order' is stale",),
+    devices={Device.DRIVE: True, Device.SCANNER: False},
+    components={"Desk": {"state": "idle", "variables": {"count": 3}}},
+    enabled=("drive",),
+    reading=None,
+    scan=None,
+    overruns=4,
+)
+
+
+def scan(first_m: float) -> Scan:
+    now_s = time.monotonic()
+    raw = RawScan((0.0,), (first_m,), (1.0,))
+    return Scan(now_s, (first_m, *[float("nan")] * (BINS - 1)), raw, 5.0)
+
+
+class FakeDaemon:
+    """What a face talks to; a thread takes what is posted and shows a new snapshot, as the loop does in each turn.
+
+    Attributes:
+        seen: How often the operator was seen.
+        refusal: What orders are answered with; None: they are not answered.
+        handle: Called in the loop's thread with each thing that programs tell.
+    """
+
+    def __init__(self, *, is_layer: bool = False) -> None:
+        checked = model()
+        loaded = parse(CONFIGURATION, "test.yaml")
+        self.feed = Feed()
+        ties = tie(checked, loaded.configuration, loaded.document)
+        self.operations = Operations(checked, ties, self.feed, self._post, self._see, is_layer=is_layer)
+        self.seen = 0
+        self.refusal: str | None = ""
+        self.orders: list[Order] = []
+        self.told: list[FromProgram] = []
+        self.handle: Callable[[FromProgram], None] = lambda item: None
+        self.turns = True
+        self._number = 0
+        self._inbox: queue.SimpleQueue[Order | FromProgram | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._run)
+
+    def __enter__(self) -> "FakeDaemon":
+        self.show()
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._inbox.put(None)
+        self._thread.join(PATIENCE_S)
+
+    def show(self, **changes: Any) -> Snapshot:
+        """Another snapshot."""
+        self._number += 1
+        snapshot = replace(SNAPSHOT, **{"number": self._number, "time_s": time.time(), **changes})
+        self.feed.show(snapshot)
+        return snapshot
+
+    @property
+    def waiting(self) -> int:
+        """How much is posted and not handled."""
+        return self._inbox.qsize()
+
+    def commands(self) -> list[Command]:
+        """What was ordered."""
+        return [order.command for order in self.orders]
+
+    def program(self) -> Program:
+        """The first that was attached."""
+        return eventually(lambda: self.told[0].program if self.told else None)
+
+    def of(self, kind: type[Any]) -> list[Any]:
+        """What was told of a kind."""
+        return [item for item in self.told if isinstance(item, kind)]
+
+    def _post(self, item: Order | FromProgram) -> None:
+        if isinstance(item, Order) and item.command is Command.STOP:
+            # It does not wait for the loop's turn.
+            self.orders.append(item)
+            return
+        self._inbox.put(item)
+
+    def _see(self) -> None:
+        self.seen += 1
+
+    def _run(self) -> None:
+        while (item := self._inbox.get()) is not None:
+            while not self.turns:
+                time.sleep(0.001)
+            if isinstance(item, Order):
+                self.orders.append(item)
+                if self.refusal is not None:
+                    item.answer(self.refusal)
+            else:
+                self.told.append(item)
+                self.handle(item)
+            self.show()
+
+
+def eventually[Found](look: Callable[[], Found | None], limit_s: float = PATIENCE_S) -> Found:
+    """What a look finds, as soon as it is true."""
+    end_s = time.monotonic() + limit_s
+    while not (found := look()):
+        assert time.monotonic() < end_s, "waited in vain"
+        time.sleep(0.002)
+    return found
+
+
+@contextmanager
+def served(daemon: FakeDaemon, settings: RemoteSettings | None = None) -> Iterator[RemoteFace]:
+    """A face of a daemon, on a port of its own choice."""
+    face = serve(daemon.operations, settings or RemoteSettings("127.0.0.1:0"))
+    try:
+        yield face
+    finally:
+        face.stop()
+
+
+@contextmanager
+def connected(address: str, credentials: Credentials | None = None) -> Iterator[Any]:
+    """A stub of the service over a connection of its own."""
+    options = (("grpc.use_local_subchannel_pool", 1),)
+    with open_channel(address, credentials or Credentials(), options) as channel:
+        yield bridge_pb2_grpc.BridgeServiceStub(channel)  # type: ignore[no-untyped-call]
+
+
+class Attachment:
+    """A program's stream, in the hands of a test."""
+
+    def __init__(self, stub: Any, **hello: Any) -> None:
+        self._requests: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        if hello:
+            self.send(hello=pb.Hello(**hello))
+        self.call = stub.Attach(iter(self._requests.get, None))
+
+    def send(self, **message: Any) -> None:
+        """Tell the bridge something."""
+        self._requests.put(pb.AttachRequest(**message))
+
+    def end(self) -> None:
+        """No more is told."""
+        self._requests.put(None)
+
+    def receive(self) -> Any:
+        """The next thing that the bridge tells."""
+        return next(self.call)
+
+    def failure(self) -> tuple[grpc.StatusCode, str]:
+        """How the stream was ended."""
+        try:
+            for _ in self.call:
+                pass
+        except grpc.RpcError as error:
+            return error.code(), error.details() or ""
+        raise AssertionError("it ended well")

@@ -26,6 +26,9 @@ from support.real_time import Lateness
 LIMIT_S = 15.0
 """Longer than anything takes that works."""
 
+HANDOVERS = 4
+"""So many threads, each of which may be late, take part in a stop: test or loop, the drive's, the line's, and back."""
+
 PATIENT = "{answer_limit_s: 0.3}"
 """Options of a drive whose answers come for certain, on a machine that may be busy."""
 
@@ -179,9 +182,10 @@ class Driven:
 
     def steady(self) -> None:
         """Wait until it moves with the velocity that is wanted: nothing changes any more."""
-        self.moves()
-        self.until(lambda: time.monotonic() - self.trace.told[-1][0] > 0.3, "a steady motion")
-        assert self.wheels_m_s != (0.0, 0.0)
+        self.until(
+            lambda: self.wheels_m_s != (0.0, 0.0) and time.monotonic() - self.trace.told[-1][0] > 0.3,
+            "a steady motion",
+        )
 
     def stopped_after(self, cause: Callable[[], object], limit_s: float) -> float:
         """Let something happen to a robot that moves; how long until both wheels' commanded speed is zero, for good.
@@ -199,7 +203,8 @@ class Driven:
         told = self.trace.told
         assert told[-1][1:] == (0.0, 0.0)
         took_s = told[-1][0] - begin_s
-        assert took_s <= limit_s + lateness.worst_s, f"{took_s:.3f} s instead of {limit_s:.3f} s"
+        most_s = limit_s + HANDOVERS * lateness.worst_s
+        assert took_s <= most_s, f"{took_s:.3f} s instead of {limit_s:.3f} s, on this machine {most_s:.3f} s"
         return took_s
 
     def _is_still(self, begin_s: float) -> bool:

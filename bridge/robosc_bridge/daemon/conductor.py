@@ -146,9 +146,8 @@ class Conductor:
             case Command.START:
                 self._order_start(order)
             case Command.STOP:
-                if self.state is State.STOPPING:
-                    # A reset that waits for the standstill would forget this stop, which came after it.
-                    self._orders.settle(Until.RESET, str(Reason.OPERATOR_STOP))
+                # A reset that is under way would forget this stop, which came after it.
+                self._orders.settle(Until.RESET, str(Reason.OPERATOR_STOP))
                 self._switch.stop(self._execution.executor)
                 self._settle()
                 answer(order, "")
@@ -229,22 +228,25 @@ class Conductor:
             self._reset()
 
     def _reset(self) -> None:
-        """Forget what has latched, and let the drive base reset its motors."""
+        """Let the drive base reset its motors: the fault of one that has switched itself off ends with that alone."""
         why = "" if self._readiness.is_drive_there else "the drive base is not there"
-        why = why or (STOP_HELD if self._switch.is_held else "") or self._latches.release()
+        why = why or (STOP_HELD if self._switch.is_held else "")
         if why:
             _log.error("reset: %s", why)
             self._orders.settle(Until.RESET, why)
             return
-        self._switch.reset()
         self._reset_end_s = self._clock.monotonic() + RESET_LIMIT_S
         self._reset_drive()
 
     def reset_done(self, problem: str) -> None:
-        """The drive base has reset its motors; empty: without a problem."""
+        """The drive base has reset its motors, and told how they are; forget what has latched if nothing is wrong."""
+        if self._orders.is_waiting(Until.RESET):
+            problem = problem or self._latches.release()
+            if not problem:
+                self._switch.reset()
+            if not problem and self.state is State.FAULT:
+                self.state, self.problem = State.STANDBY, ""
         _log.log(logging.ERROR if problem else logging.INFO, "reset: %s", problem or "done")
-        if self.state is State.FAULT and not problem and self._orders.is_waiting(Until.RESET):
-            self.state, self.problem = State.STANDBY, ""
         self._orders.settle(Until.RESET, problem)
 
     # Runs.
@@ -333,6 +335,7 @@ class Conductor:
 
     def operator_stop(self) -> None:
         """The operator stops the robot."""
+        self._orders.settle(Until.RESET, str(Reason.OPERATOR_STOP))
         self._safety.operator_stop()
         self._hurry()
         # What was wanted before does not move the robot afterwards.

@@ -27,6 +27,7 @@ hypothesis.settings.load_profile("busy")
 
 # They measure how quickly a robot reacts, and would disturb each other.
 _IN_REAL_TIME = (
+    "tests/bridge/daemon/test_assembly.py",
     "tests/bridge/daemon/test_faults.py",
     "tests/bridge/daemon/test_follow_line.py",
     "tests/bridge/daemon/test_run.py",

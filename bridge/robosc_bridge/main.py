@@ -29,6 +29,7 @@ from robosc_bridge.daemon.supervisors import (
     MODEL_SUFFIX,
     NoSupervisorError,
     Source,
+    credentials_of,
     deployment_of,
     obtain,
     trusted_keys,
@@ -182,7 +183,8 @@ def _run(arguments: argparse.Namespace) -> int:
     server = arguments.server or configuration.supervisor.server
     deployment = arguments.deployment or deployment_of(arguments.model)
     trusted = trusted_keys(configuration.supervisor.trusted_keys)
-    supervisor = obtain(Source(arguments.model, deployment, server, arguments.keep, trusted), tell)
+    credentials = credentials_of(configuration.supervisor)
+    supervisor = obtain(Source(arguments.model, deployment, server, arguments.keep, trusted, credentials), tell)
     ties = tie(supervisor.model, configuration, loaded.document)
     log: EventLog = NullLog()
     if configuration.log.folder is not None:

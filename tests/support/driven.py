@@ -5,7 +5,6 @@ to do, at the time at which they hear it: neither the daemon's own word for it n
 """
 
 import logging
-import os
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -22,6 +21,7 @@ from robosc_bridge.safety import SafetyLimits
 from robosc_bridge.simulated import SimulatedTurtleBot3
 from robosc_bridge.simulated.line import Device, Sending
 from support.models import bundle_of
+from support.real_time import Lateness
 
 LIMIT_S = 15.0
 """Longer than anything takes that works."""
@@ -103,30 +103,6 @@ class Recorded:
     def _watched(self, sendings: list[Sending]) -> list[Sending]:
         self.look()
         return sendings
-
-
-class Lateness:
-    """How late a thread of this process is at its worst: a busy machine's share in what a test measures."""
-
-    def __init__(self) -> None:
-        self.worst_s = 0.0
-        self._is_over = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="lateness", daemon=True)
-
-    def _run(self) -> None:
-        while True:
-            begin_s = time.monotonic()
-            if self._is_over.wait(0.005):
-                return
-            self.worst_s = max(self.worst_s, time.monotonic() - begin_s - 0.005)
-
-    def __enter__(self) -> "Lateness":
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._is_over.set()
-        self._thread.join()
 
 
 class HangingLog(MemoryLog):
@@ -257,25 +233,6 @@ class Driven:
         return self.machine.daemon.problem
 
 
-@contextmanager
-def preferred() -> Iterator[None]:
-    """This thread, and those that it starts, go before other programs where that is permitted.
-
-    A bridge and its devices live by the computer's clock: where neither gets any time for a fifth of a second, the
-    bridge rightly takes its motors for silent.
-    """
-    before = os.getpriority(os.PRIO_PROCESS, 0)
-    try:
-        os.setpriority(os.PRIO_PROCESS, 0, -15)
-    except PermissionError:
-        yield
-        return
-    try:
-        yield
-    finally:
-        os.setpriority(os.PRIO_PROCESS, 0, before)
-
-
 class _Messages(logging.Handler):
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
@@ -319,7 +276,7 @@ def driven(
     handler = _Messages()
     logger = logging.getLogger("robosc_bridge")
     logger.addHandler(handler)
-    with preferred(), SimulatedTurtleBot3("burger", base, lidar) as robot:
+    with SimulatedTurtleBot3("burger", base, lidar) as robot:
         trace = Recorded(robot.base_line.device, robot)
         robot.base_line.device = trace
         before(robot)

@@ -206,6 +206,12 @@ class SupervisorSource(_Section, frozen=True):
         _Address | None,
         Meta(description="HOST:PORT of the synthesis server; null: none is asked."),
     ] = None
+    ca: Annotated[
+        _Text | None, Meta(description="File with certificates (PEM) that are believed there; null: without TLS.")
+    ] = None
+    certificate: Annotated[_Text | None, Meta(description="File with the bridge's own certificate chain (PEM).")] = None
+    key: Annotated[_Text | None, Meta(description="File with its private key (PEM).")] = None
+    token_file: Annotated[_Text | None, Meta(description="File with the bridge's token for the server.")] = None
     trusted_keys: Annotated[
         tuple[_Text, ...],
         Meta(description="Whose signatures are believed: public keys (`ssh-ed25519 AAAA...`), or files with them."),

@@ -31,6 +31,8 @@ from robosc.supervisor import Supervisor, decode, make_supervisor
 from robosc.supervisor.codec import MAXIMUM_BYTES
 from robosc.supervisor.recheck import recheck
 from robosc.verification import DEFAULT_STATES, Limits
+from robosc_api.security import Credentials
+from robosc_bridge.configuration.structure import SupervisorSource
 from robosc_bridge.errors import BridgeError
 from robosc_client import Client, ClientError, ServerUnavailableError, SynthesisStatus
 
@@ -52,6 +54,7 @@ class Source:
         server: HOST:PORT of a synthesis server that makes it of the model; None: it is made here.
         kept: Folder for what a server made last.
         trusted: Keys whose signatures of supervisor files are believed.
+        credentials: How the server is reached; None: without TLS, certificate and token.
     """
 
     file: Path
@@ -59,6 +62,7 @@ class Source:
     server: str | None = None
     kept: Path | None = None
     trusted: tuple[PublicKey, ...] = ()
+    credentials: Credentials | None = None
 
 
 def trusted_keys(entries: Iterable[str]) -> tuple[PublicKey, ...]:
@@ -80,6 +84,20 @@ def trusted_keys(entries: Iterable[str]) -> tuple[PublicKey, ...]:
         except RoboscError as error:
             raise NoSupervisorError(str(error)) from error
     return tuple(found)
+
+
+def credentials_of(chosen: SupervisorSource) -> Credentials:
+    """How the synthesis server is reached, as a configuration says."""
+    return Credentials(
+        ca=_path(chosen.ca),
+        certificate=_path(chosen.certificate),
+        key=_path(chosen.key),
+        token_file=_path(chosen.token_file),
+    )
+
+
+def _path(text: str | None) -> Path | None:
+    return None if text is None else Path(text)
 
 
 def obtain(source: Source, tell: Callable[[str], None] = lambda text: None) -> Supervisor:
@@ -223,7 +241,7 @@ def _served(bundle: Bundle, server: str, source: Source, tell: Callable[[str], N
     kept = source.kept / f"{bundle.digest}-{source.deployment}{SUPERVISOR_SUFFIX}" if source.kept else None
     tell(f"{bundle.main.name}: synthesis at {server}")
     try:
-        with Client(server) as client:
+        with Client(server, source.credentials) as client:
             answer = client.synthesize(bundle, deployment=source.deployment, deadline_s=_SERVER_LIMIT_S)
     except (ServerUnavailableError, TimeoutError) as error:
         if kept is None or not kept.is_file():

@@ -27,9 +27,10 @@ _OPTIONS = (
     ("grpc.max_receive_message_length", 16 * 2**20),
     # A proxy for web pages, set in the environment, is none for a robot in the next room.
     ("grpc.enable_http_proxy", 0),
-    # A cable that is pulled is noticed while a stream waits.
+    # A cable that is pulled and a bridge that hangs are noticed while a stream waits.
     ("grpc.keepalive_time_ms", 5000),
     ("grpc.keepalive_timeout_ms", 3000),
+    ("grpc.http2.ping_timeout_ms", 3000),
     ("grpc.http2.max_pings_without_data", 0),
 )
 _REFUSALS = frozenset(

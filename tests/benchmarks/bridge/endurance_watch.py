@@ -3,6 +3,7 @@
 import gc
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,9 +36,9 @@ class Watch:
             watch._decided()
             tick(self)
 
-        def counted_scan(self: SafetyLayer, now_s: float) -> None:
+        def counted_scan(self: SafetyLayer, now_s: float, ranges_m: Sequence[float] = ()) -> None:
             watch._scans += 1
-            saw_scan(self, now_s)
+            saw_scan(self, now_s, ranges_m)
 
         Executor.tick = counted_tick  # type: ignore[method-assign]
         SafetyLayer.saw_scan = counted_scan  # type: ignore[method-assign]
@@ -62,7 +63,7 @@ class Watch:
         """What was done so far."""
         daemon = self._robot.machine.daemon
         periods = self._decisions - 1 + daemon.overruns
-        drift_s = self._last_due_s - self._first_due_s - periods * daemon._job.settings.period_s
+        drift_s = self._last_due_s - self._first_due_s - periods * self._robot.period_s
         return {
             "decisions": self._decisions,
             "exchanges": self._robot.exchanges,

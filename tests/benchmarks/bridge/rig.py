@@ -86,7 +86,7 @@ def configuration(robot: Simulator, base: str, lidar: str, period_s: float, chan
     """A configuration for a simulated Burger, whose time-outs bear with a machine that has other work, too."""
     return f"""
 robot: burger
-drive: {{driver: {base}, port: {robot.base_path}}}
+drive: {{driver: {base}, port: {robot.base_path}, options: {{answer_limit_s: 0.2}}}}
 scanner: {{driver: {lidar}, port: {robot.scanner_path}}}
 execution: {{period_s: {period_s}, every: event}}
 safety: {{overrun_s: 1.0, motor_timeout_s: 1.0, scan_timeout_s: 2.0, command_timeout_s: 1.0}}
@@ -119,7 +119,8 @@ class Machine:
     def watched(self) -> Iterator[None]:
         """Watch it during the block."""
         command = [sys.executable, str(Path(__file__).with_name("wakeups.py"))]
-        process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        with preferred():
+            process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         stolen, total = _ticks()
         try:
             yield

@@ -52,9 +52,10 @@ time.sleep = CLOCK.sleep  # type: ignore[assignment]
 from robosc.execution.event_log import NullLog  # noqa: E402  # found through the path above
 from robosc.model.structure import Deployment  # noqa: E402
 from robosc_bridge.configuration import parse, tie  # noqa: E402
-from robosc_bridge.daemon.assembly import assemble  # noqa: E402
+from robosc_bridge.daemon import assembly  # noqa: E402
 from robosc_bridge.daemon.states import State  # noqa: E402
 from robosc_bridge.daemon.supervisors import Source, obtain  # noqa: E402
+from robosc_bridge.daemon.workers import Worker  # noqa: E402
 from robosc_bridge.devices import dynamixel, lidar, opencr  # noqa: E402
 from robosc_bridge.simulated.lidar import LIDARS  # noqa: E402
 from robosc_bridge.simulated.line import Device, Sending  # noqa: E402
@@ -121,8 +122,28 @@ class VirtualLine:
         """Nothing is held."""
 
 
+class VirtualThread:
+    """What the assembly takes for a device's thread: its steps are taken by whoever lets time pass."""
+
+    is_alive = True
+
+    def __init__(self, worker: Worker, clock: Callable[[], float]) -> None:
+        self.worker = worker
+        self.is_hurried = False
+
+    def hurry(self) -> None:
+        """The next step is due."""
+        self.is_hurried = True
+
+
 for module in (dynamixel, opencr, lidar):
     module.SerialLine = VirtualLine  # type: ignore[attr-defined]
+assembly.DeviceThread = VirtualThread  # type: ignore[assignment,attr-defined]
+
+
+def _virtual(thread: object) -> VirtualThread:
+    assert isinstance(thread, VirtualThread)
+    return thread
 
 
 class VirtualRobot:
@@ -138,6 +159,7 @@ class VirtualRobot:
     Attributes:
         world: Walls, pose, collisions.
         machine: The bridge.
+        period_s: Of its decisions.
         exchanges: Steps with the drive base.
     """
 
@@ -153,20 +175,16 @@ class VirtualRobot:
         loaded = parse(configuration.encode(), "virtual.yaml")
         supervisor = obtain(Source(model, Deployment.CONTROLLER, None, None), lambda text: None)
         ties = tie(supervisor.model, loaded.configuration, loaded.document)
-        self.machine = assemble(loaded.configuration, ties, supervisor, NullLog(), starts_itself=True)
-        assert self.machine.scanner is not None
-        # Their steps are taken here, one after the other, instead of in threads.
-        self._drive, self._drive_worker = self.machine.drive, self.machine.drive._worker
-        self._scanner_worker = self.machine.scanner._worker
+        self.machine = assembly.assemble(loaded.configuration, ties, supervisor, NullLog(), starts_itself=True)
+        self.period_s = loaded.configuration.execution.period_s
+        self._drive, self._scanner = _virtual(self.machine.drive), _virtual(self.machine.scanner)
         self._drive_due_s = CLOCK.now_s
         self.exchanges = 0
         # The servos by themselves do nothing while there are exchanges, the board has its cycle.
         self._base_due_s = device.due_s() if base == "opencr" else math.inf
         self._scanner_due_s = CLOCK.now_s
         # It is opened.
-        self._scanner_worker.step(CLOCK.now_s)
-        daemon = self.machine.daemon
-        daemon.connect(daemon._hurry, daemon._reset_drive, lambda: True)
+        self._scanner.worker.step(CLOCK.now_s)
 
     def live(self, until_s: float, each: Callable[[], None] = lambda: None) -> None:
         """Let time pass, and do what is due when it is.
@@ -178,9 +196,9 @@ class VirtualRobot:
         CLOCK.meanwhile = self._live_without_drive
         while until_s > CLOCK.now_s and self.machine.daemon.state is not State.OVER:
             self._pass(min(self._due_s(), self._drive_due_s, until_s))
-            if self._drive._is_hurried or CLOCK.now_s >= self._drive_due_s:
-                self._drive._is_hurried = False
-                self._drive_due_s = self._drive_worker.step(CLOCK.now_s)
+            if self._drive.is_hurried or CLOCK.now_s >= self._drive_due_s:
+                self._drive.is_hurried = False
+                self._drive_due_s = self._drive.worker.step(CLOCK.now_s)
                 self.exchanges += 1
             self._step()
             each()
@@ -203,8 +221,8 @@ class VirtualRobot:
         daemon = self.machine.daemon
         if CLOCK.now_s >= self._scanner_due_s:
             # It reads once, and does not wait for what the others must do first.
-            self._scanner_worker.wake()
-            self._scanner_worker.step(CLOCK.now_s)
+            self._scanner.worker.wake()
+            self._scanner.worker.step(CLOCK.now_s)
             self._scanner_due_s += SCANNER_S
         if CLOCK.now_s >= daemon._execution.due_s or not daemon._inbox.empty():
             daemon.turn()

@@ -13,7 +13,11 @@ from robosc.language import load_bundle
 from robosc.model.structure import Deployment
 from robosc.signatures import PublicKey, make_key_pair, read_private_key, sign, signature_file
 from robosc.supervisor import Supervisor, encode, make_supervisor
-from robosc_bridge.daemon.supervisors import NoSupervisorError, Source, obtain, trusted_keys
+from robosc_api.security import Scope, ServerSecurity, make_token
+from robosc_bridge.configuration import parse
+from robosc_bridge.daemon.supervisors import NoSupervisorError, Source, credentials_of, obtain, trusted_keys
+from robosc_server.settings import Settings
+from support.certificates import Authority
 from support.service import served
 
 GATE = """robot Carrier {
@@ -280,3 +284,26 @@ def test_a_disk_that_takes_nothing_does_not_prevent_the_start(tmp_path: Path, mo
 def test_what_a_server_refuses_is_told(tmp_path: Path) -> None:
     with served() as address:
         assert "x.rscd:1:7: error" in refusal(Source(written(tmp_path, "robot {", "x"), CONTROLLER, address))
+
+
+def test_a_server_with_tls_and_tokens_is_asked_as_the_configuration_says(tmp_path: Path) -> None:
+    authority = Authority(tmp_path)
+    certificate, key = authority.sign("server")
+    token, line = make_token("robot", (Scope.SYNTHESIZE,))
+    (tmp_path / "token").write_text(token)
+    (tmp_path / "tokens").write_text(line)
+    (tmp_path / "tokens").chmod(0o600)
+    security = ServerSecurity(certificate=certificate, key=key, tokens=tmp_path / "tokens")
+    text = f"""
+    robot: burger
+    drive: {{driver: opencr, port: /dev/none}}
+    supervisor: {{ca: {authority.file}, token_file: {tmp_path / "token"}}}
+    """
+    credentials = credentials_of(parse(text.encode(), "test.yaml").configuration.supervisor)
+    model = written(tmp_path)
+    with served(Settings(port=0, workers=1, security=security)) as address:
+        assert obtain(Source(model, CONTROLLER, address, credentials=credentials)) == supervisor_of(model)
+        without = Source(model, CONTROLLER, address, credentials=replace(credentials, token_file=None))
+        assert "a valid token is needed" in refusal(without)
+        missing = Source(model, CONTROLLER, address, credentials=replace(credentials, token_file=tmp_path / "none"))
+        assert "No such file" in refusal(missing)

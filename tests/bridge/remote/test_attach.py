@@ -1,6 +1,9 @@
 """Programs of the model and operators of a layer, over real sockets."""
 
 import math
+import signal
+import subprocess
+import sys
 import time
 from typing import Any
 
@@ -10,6 +13,7 @@ import pytest
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_bridge.daemon import programs
 from robosc_bridge.remote import RemoteFace, RemoteSettings, service, session
+from robosc_bridge.remote import face as face_module
 from robosc_bridge.remote.data import MAXIMUM_DEPTH, value_of
 from support.remote import PATIENCE_S, Attachment, FakeDaemon, connected, eventually, served
 
@@ -280,6 +284,27 @@ class TestHostilePrograms:
         assert eventually(lambda: daemon.of(programs.Detached))[0].program is daemon.program()
         # What the loop still tells it goes nowhere.
         daemon.program().tell(programs.CallMade("open", 1, None))
+
+    def test_a_program_that_hangs_with_its_whole_machine_is_taken_for_gone(
+        self, daemon: FakeDaemon, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(face_module, "PING_S", 1.0)
+        monkeypatch.setattr(face_module, "PING_LIMIT_S", 1.0)
+        text = (
+            "import sys; from support.remote import *\n"
+            "with connected(sys.argv[1]) as stub:\n"
+            "    program = Attachment(stub, name='far away')\n"
+            "    program.receive(); program.receive()\n"
+        )
+        with served(daemon) as face:
+            process = subprocess.Popen([sys.executable, "-c", text, face.address])
+            try:
+                daemon.program()
+                process.send_signal(signal.SIGSTOP)
+                assert eventually(lambda: daemon.of(programs.Detached))
+            finally:
+                process.kill()
+                process.wait()
 
     def test_a_program_that_floods_is_held_back_at_its_end(self, daemon: FakeDaemon, stub: Any) -> None:
         program = attached(stub)

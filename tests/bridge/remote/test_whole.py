@@ -156,6 +156,19 @@ def test_a_stop_reaches_the_motors_at_once(
             record_property("stop over gRPC, answered (ms)", round(1000.0 * answered_s, 1))
             record_property("stop over gRPC, motors told (ms)", round(1000.0 * (time.monotonic() - begin_s), 1))
 
+        line = [sys.executable, "-m", "robosc_bridge.command", "watch", "--address", address]
+        with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as watcher:
+            assert watcher.stdout is not None
+            assert watcher.stderr is not None
+            watcher.stdout.readline()
+            # A bridge that hangs is told to whoever relies on it.
+            bridge.process.send_signal(signal.SIGSTOP)
+            stopped = command("stop", "--address", address)
+            assert stopped.returncode == 2
+            assert stopped.stderr.startswith("robosc-bridge: ")
+            assert watcher.wait(LIMIT_S) == 2
+            assert "no bridge answers at" in watcher.stderr.read()
+
 
 def test_an_address_that_cannot_be_used_is_one_line(robot: SimulatedTurtleBot3, tmp_path: Path) -> None:
     file = configured(tmp_path, robot)

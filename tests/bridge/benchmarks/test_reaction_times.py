@@ -1,5 +1,6 @@
 """What the benchmark of reactions reads out of a record of both lines."""
 
+import math
 import sys
 from pathlib import Path
 
@@ -49,13 +50,11 @@ def test_a_command_counts_from_its_first_byte() -> None:
     assert list(commands(records)) == [(1.0, False), (2.0, True)]
 
 
-def test_a_robot_that_does_not_stop_is_no_trial() -> None:
+def test_a_robot_that_does_not_stop_has_no_reaction_time() -> None:
     records = in_order(turn(1.0, 3000), sent(1.2, SERVOS_MOVE), turn(2.0, 300), turn(3.0, 3000), sent(3.1, SERVOS_STOP))
-    with pytest.raises(RuntimeError, match="did not stop"):
-        trials(records, "lds01")
+    assert trials(records, "lds01") == [Trial(2.0, math.inf)]
 
 
 def test_a_robot_that_was_not_driving_is_no_trial() -> None:
     records = in_order(turn(1.0, 3000), sent(1.2, SERVOS_STOP), turn(2.0, 300), sent(2.1, SERVOS_STOP))
-    with pytest.raises(RuntimeError, match="was not driving"):
-        trials(records, "lds01")
+    assert trials(records, "lds01") == []

@@ -15,12 +15,10 @@ import pytest
 
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_bridge.simulated import SimulatedTurtleBot3
-from support.models import EXAMPLES
 from support.real_time import preferred
 from support.remote import Attachment, connected, eventually
 from support.terminals import Terminal
 
-MODEL = EXAMPLES / "maze_solver" / "maze_solver.rscd"
 START_LIMIT_S, LIMIT_S = 90.0, 30.0
 
 
@@ -29,25 +27,57 @@ def command(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(line, capture_output=True, text=True, check=False, timeout=LIMIT_S)
 
 
-def configured(folder: Path, robot: SimulatedTurtleBot3) -> Path:
-    made = command("init", "--model", str(MODEL), "--drive", "opencr", "--scanner", "lds01")
-    assert made.returncode == 0, made.stderr
-    ports = iter((robot.base_path, robot.scanner_path))
-    text = re.sub(r"^  port: .*$", lambda _: f"  port: {next(ports)}", made.stdout, flags=re.MULTILINE)
-    # A machine on which tests run is not one for robots.
-    text = re.sub(r"^  (overrun_s|motor_timeout_s|scan_timeout_s): .*$", r"  \1: 3.0", text, flags=re.MULTILINE)
-    text = re.sub(r"^  grpc_address: .*$", "  grpc_address: 127.0.0.1:0", text, flags=re.MULTILINE)
-    file = folder / "bridge.yaml"
-    file.write_text(text)
+RUNNER = """robot Runner {
+    interface twist use Twist from geometry_msgs
+    datatype object Vector { x: double z: double }
+    datatype object Twist { linear: Vector angular: Vector }
+    component Wheels {
+        incoming message drive with identifier: "/cmd_vel", type: Twist links twist
+        behaviour { initial marked state ready { on request to drive } }
+    }
+    provide drive with { linear: { x: 0.1 } }
+}
+"""
+CART = """robot Cart {
+    interface twist use Twist from geometry_msgs
+    datatype object Vector { x: double z: double }
+    datatype object Twist { linear: Vector angular: Vector }
+    component Gate {
+        outgoing message open with identifier: "/gate/open", type: none
+        outgoing message shut with identifier: "/gate/shut", type: none
+        behaviour {
+            initial marked state closed { on response from open goto opened }
+            marked state opened { on response from shut goto closed }
+        }
+    }
+    component Wheels {
+        incoming message drive with identifier: "/cmd_vel", type: Twist links twist
+    }
+    requirement drive needs Gate.opened
+}
+"""
+
+
+def configured(folder: Path, robot: SimulatedTurtleBot3, model: str, *grpc: str, operator: str = "null") -> Path:
+    """A configuration with its model beside it; the wheels are on `/cmd_vel`."""
+    (folder / "robot.rscd").write_text(model)
+    file = folder / "robot.yaml"
+    file.write_text(
+        f"robot: burger\ndrive: {{driver: opencr, port: {robot.base_path}}}\n"
+        # A machine on which tests run is not one for robots.
+        f"safety: {{overrun_s: 1.0, motor_timeout_s: 1.0, operator_link_timeout_s: {operator}}}\n"
+        "remote: {grpc_address: '127.0.0.1:0'}\n"
+        "channels:\n  /cmd_vel: {channel: drive}\n" + "".join(f"  {name}: {{channel: grpc}}\n" for name in grpc)
+    )
     return file
 
 
 class Running:
     """The program, and what it has written."""
 
-    def __init__(self, configuration: Path, model: Path = MODEL, *options: str) -> None:
+    def __init__(self, configuration: Path, *options: str) -> None:
         line = [sys.executable, "-m", "robosc_bridge.main", "run", "--standby", *options]
-        line += ["--model", str(model), "--config", str(configuration)]
+        line += ["--model", str(configuration.with_suffix(".rscd")), "--config", str(configuration)]
         self.process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True)
         self.written = ""
         self._thread = threading.Thread(target=self._read)
@@ -60,8 +90,12 @@ class Running:
 
     def address(self) -> str:
         """Where its face listens."""
-        found = eventually(lambda: re.search(r"the remote face listens on (\S+)\n", self.written), START_LIMIT_S)
-        return found[1]
+
+        def look() -> re.Match[str] | None:
+            assert self.process.poll() is None, self.written
+            return re.search(r"the remote face listens on (\S+)\n", self.written)
+
+        return eventually(look, START_LIMIT_S)[1]
 
     def end(self) -> None:
         self.process.kill()
@@ -73,7 +107,7 @@ class Running:
 
 @contextmanager
 def running(folder: Path, robot: SimulatedTurtleBot3) -> Iterator[Running]:
-    bridge = Running(configured(folder, robot))
+    bridge = Running(configured(folder, robot, RUNNER))
     try:
         yield bridge
     finally:
@@ -181,7 +215,7 @@ def test_a_stop_reaches_the_motors_at_once(
 
 
 def test_an_address_that_cannot_be_used_is_one_line(robot: SimulatedTurtleBot3, tmp_path: Path) -> None:
-    file = configured(tmp_path, robot)
+    file = configured(tmp_path, robot, RUNNER)
     file.write_text(file.read_text().replace("127.0.0.1:0", "0.0.0.0:0"))
     bridge = Running(file)
     try:
@@ -192,37 +226,10 @@ def test_an_address_that_cannot_be_used_is_one_line(robot: SimulatedTurtleBot3, 
         bridge.end()
 
 
-CART = """robot Cart {
-    interface twist use Twist from geometry_msgs
-    datatype object Vector { x: double z: double }
-    datatype object Twist { linear: Vector angular: Vector }
-    component Gate {
-        outgoing message open with identifier: "/gate/open", type: none
-        outgoing message shut with identifier: "/gate/shut", type: none
-        behaviour {
-            initial marked state closed { on response from open goto opened }
-            marked state opened { on response from shut goto closed }
-        }
-    }
-    component Wheels {
-        incoming message drive with identifier: "/cmd_vel", type: Twist links twist
-    }
-    requirement drive needs Gate.opened
-}
-"""
-
-
 def test_a_robot_is_driven_by_keys_as_far_as_the_layer_lets_it(tmp_path: Path) -> None:
-    model, configuration = tmp_path / "cart.rscd", tmp_path / "cart.yaml"
-    model.write_text(CART)
     with preferred(), SimulatedTurtleBot3("burger", "opencr", "lds01") as robot:
-        configuration.write_text(
-            f"robot: burger\ndrive: {{driver: opencr, port: {robot.base_path}}}\n"
-            "safety: {overrun_s: 3.0, motor_timeout_s: 3.0, operator_link_timeout_s: 2.0}\n"
-            "remote: {grpc_address: '127.0.0.1:0'}\n"
-            "channels:\n  /cmd_vel: {channel: drive}\n  /gate/open: {channel: grpc}\n  /gate/shut: {channel: grpc}\n"
-        )
-        bridge = Running(configuration, model, "--deployment", "layer")
+        configuration = configured(tmp_path, robot, CART, "/gate/open", "/gate/shut", operator="2.0")
+        bridge = Running(configuration, "--deployment", "layer")
         try:
             address = bridge.address()
             eventually(lambda: state(address) == "BRIDGE_STATE_STANDBY", START_LIMIT_S)

@@ -10,7 +10,7 @@ READY := $(VENV)/.ready
 # Another environment: colcon wants older packages than ours.
 COLCON := .venv-colcon
 
-.PHONY: demo test mutants lint format bindings lock benchmark environment colcon clean help
+.PHONY: demo test mutants fuzz lint format bindings lock benchmark environment colcon clean help
 
 help:
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -46,6 +46,17 @@ mutants: $(READY) ## mutation tests of the bridge's safety layer
 	cp -r tests/support out/mutation/tests
 	cp -r tests/bridge/safety out/mutation/tests/bridge
 	cd out/mutation && $(MUTMUT) run && $(MUTMUT) results
+
+# atheris exists for some systems only: it is no part of the environment.
+DECODERS := lds01 lds02 lds03 mavlink dynamixel registers
+SECONDS := 60
+
+fuzz: $(READY) ## fuzz the bridge's decoders; DECODERS=... chooses, SECONDS=... says how long each
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade --target out/atheris atheris==3.1.0
+	cd out && for decoder in $(DECODERS); do \
+	  PYTHONPATH=$(CURDIR)/out/atheris $(CURDIR)/$(BIN)/python ../tests/fuzz/fuzz_decoders.py $$decoder \
+	    -max_total_time=$(SECONDS) -max_len=2000 -rss_limit_mb=256 || exit 1; \
+	done
 
 lint: $(READY) ## formatter, linter, types, import contracts, bindings
 	$(BIN)/ruff format --check .

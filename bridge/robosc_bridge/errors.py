@@ -1,7 +1,7 @@
 """What can go wrong between the bridge and the world.
 
     BridgeError
-    |-- LineError               a serial line cannot be used
+    |-- LineError               a serial line or a camera cannot be used
     |   |-- LineMissingError    there is no such port (any more)
     |   |-- LineBusyError       another program has it
     |   |-- LineDeniedError     this user may not open it
@@ -21,7 +21,7 @@ class BridgeError(Exception):
 
 
 class LineError(BridgeError):
-    """A serial line cannot be used.
+    """A serial line or a camera cannot be used.
 
     Args:
         path: Of the port.

@@ -21,7 +21,7 @@ from robosc.model.structure import Deployment, Model
 from robosc_bridge.configuration import init, load, schema, tie
 from robosc_bridge.configuration.structure import TURTLEBOTS
 from robosc_bridge.configuration.template import DriveDriver, ScannerDriver
-from robosc_bridge.daemon.assembly import assemble, check_settings
+from robosc_bridge.daemon.assembly import assemble, check_settings, safety_limits
 from robosc_bridge.daemon.faces import make_faces
 from robosc_bridge.daemon.keyboard import Keyboard
 from robosc_bridge.daemon.loop import Key
@@ -191,7 +191,7 @@ def _run(arguments: argparse.Namespace) -> int:
         log = open_event_log(configuration.log.folder, supervisor.model.name, time.time())
     try:
         machine = assemble(configuration, ties, supervisor, log, deployment, starts_itself=not arguments.standby)
-        faces = make_faces(configuration, machine.operations)
+        faces = make_faces(configuration, machine.operations, safety_limits(configuration))
         for number in _SIGNALS:
             signal.signal(number, lambda *_: machine.quit())
         with Keyboard(lambda key: machine.daemon.post(Key(key))) as keyboard:

@@ -1,6 +1,9 @@
 """Prints every benchmark table of the project, measured side by side in one run.
 
-Usage: run.py [cold-start] [conditions] [execution] [language] [synthesis]      (all of them without an argument)
+Usage: run.py [NAME...]      (all of them without an argument)
+
+Names: cold-start, conditions, execution, language, synthesis; of the bridge: decoders, drive-bases, loop-period,
+reaction, endurance.
 """
 
 import sys
@@ -8,6 +11,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parent / "bridge"))
+
+import decoders
+import drive_bases
+import endurance
+import loop_period
+import reaction
 
 import cold_start
 import conditions
@@ -18,8 +28,13 @@ import synthesis
 TABLES: dict[str, Callable[[], str]] = {
     "cold-start": cold_start.table,
     "conditions": conditions.table,
+    "decoders": decoders.table,
+    "drive-bases": drive_bases.table,
+    "endurance": endurance.table,
     "execution": execution.table,
     "language": language.table,
+    "loop-period": loop_period.table,
+    "reaction": reaction.table,
     "synthesis": synthesis.table,
 }
 

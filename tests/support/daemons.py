@@ -102,6 +102,7 @@ class Scene:
         text: str = CONFIGURATION,
         model: str = MODEL,
         is_layer: bool = False,
+        needs_scanner: bool = True,
     ) -> None:
         supervisor = supervisor_of(model, Deployment.LAYER if is_layer else Deployment.CONTROLLER)
         configuration = parse(text.encode(), "test.yaml").configuration
@@ -109,7 +110,9 @@ class Scene:
         self.clock = ManualClock(now_s=50.0)
         self.log = MemoryLog()
         self.safety = SafetyLayer(LIMITS)
-        job = Job(supervisor, ties, ties.settings(configuration.execution), True, starts_itself, stays, is_layer)
+        job = Job(
+            supervisor, ties, ties.settings(configuration.execution), needs_scanner, starts_itself, stays, is_layer
+        )
         stop = EmergencyStop(configuration.skills.emergency_stop)
         self.feed = Feed()
         self.daemon = Daemon(

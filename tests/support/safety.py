@@ -1,5 +1,6 @@
 """A safety layer between a commander and wheels that do as they are told, on a clock that the test moves."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -41,6 +42,7 @@ class Bench:
         silent: What is not reported: "scan", "drive", "loop", "operator", "command".
         wheels_m_s: What the wheels do; None: as they are told.
         holds: Whether the motors hold; None: as they are told.
+        ranges_m: What a full scan shows.
     """
 
     def __init__(self, **changes: Any) -> None:
@@ -52,12 +54,13 @@ class Bench:
         self.wheels_m_s: tuple[float, float] | None = None
         self.holds: bool | None = None
         self.battery_v: float | None = 12.0
+        self.ranges_m: tuple[float, ...] = ()
         self.last = Output(STANDSTILL, False, (), ())
 
     def report(self) -> None:
         """What the other threads report at this time."""
-        facts = {
-            "scan": self.layer.saw_scan,
+        facts: dict[str, Callable[[float], None]] = {
+            "scan": lambda now_s: self.layer.saw_scan(now_s, self.ranges_m),
             "loop": self.layer.loop_turned,
             "operator": self.layer.operator_seen,
         }

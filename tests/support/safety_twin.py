@@ -246,6 +246,8 @@ class SafetyTwin:
             reasons.add(Reason.COMMAND_SILENT)
         if self._is_stale("drive", limits.motor_timeout_s, now_s) or len(failures) >= limits.motor_failures:
             reasons.add(Reason.MOTOR_SILENT)
+        if limits.is_stopped_when_blind and self._is_blind():
+            reasons.add(Reason.SCAN_BLIND)
         velocity = STANDSTILL
         if not reasons and wanted != STANDSTILL:
             velocity = self._limited(
@@ -266,6 +268,22 @@ class SafetyTwin:
             Past("output", None, 0.0, now_s, frozenset(reasons), velocity, since_s, letting_go_s, frozenset(noted))
         )
         return Output(velocity, since_s is not None, tuple(reason for reason in Reason if reason in reasons), ())
+
+    def _is_blind(self) -> bool:
+        """Whether the last scan that tells of ranges shows nothing where the last command leads to."""
+        asked_m_s, scan = 0.0, list[float]()
+        for each in self.past:
+            if each.name == "disable" or (each.name == "reset" and each.value):
+                asked_m_s = 0.0
+            if each.name == "command":
+                numbers = (each.value.linear_m_s, each.value.angular_rad_s, each.time_s)
+                asked_m_s = each.value.linear_m_s if all(map(math.isfinite, numbers)) else 0.0
+            if each.name == "scan" and each.value:
+                scan = each.value
+        middle = 0 if asked_m_s > 0 else 180
+        seen = [scan[degree % 360] for degree in range(middle - 30, middle + 31)] if scan else []
+        valid = [range_m for range_m in seen if math.isfinite(range_m)]
+        return asked_m_s != 0 and bool(scan) and len(valid) < self.limits.min_valid_share * 61
 
     def _is_command_stale(self, now_s: float) -> bool:
         # A command that was refused is no sign of life.

@@ -121,6 +121,21 @@ class Safety(_Section, frozen=True):
     scan_timeout_s: Annotated[
         float, Meta(ge=0.05, le=10, description="Seconds without a full turn of the LiDAR after which they stop.")
     ] = 0.6
+    min_valid_share: Annotated[
+        float,
+        Meta(
+            gt=0,
+            le=1,
+            description="Share of valid ranges, 30° to both sides of where it goes, below which it is blind.",
+        ),
+    ] = 0.05
+    stops_when_blind: Annotated[
+        bool, Meta(description="Whether it may not go where the LiDAR measures nothing; else somebody is warned.")
+    ] = False
+    bad_frames_share: Annotated[
+        float,
+        Meta(gt=0, le=1, description="Share of the LiDAR's frames that are damaged above which somebody is warned."),
+    ] = 0.1
     motor_timeout_s: Annotated[
         float, Meta(ge=0.02, le=10, description="Seconds without an answer of the drive after which it has failed.")
     ] = 0.2
@@ -170,6 +185,18 @@ class Remote(_Section, frozen=True):
         _Text | None,
         Meta(description="Where the ground station is, such as udpout:192.168.1.2:14550; null: none."),
     ] = None
+    mavlink_system: Annotated[int, Meta(ge=1, le=255, description="Number of the vehicle.")] = 1
+    mavlink_key: Annotated[
+        _Text | None,
+        Meta(description="File with the key of signing: then only what is signed is obeyed; null: nothing is signed."),
+    ] = None
+    mavlink_link_id: Annotated[int, Meta(ge=0, le=255, description="Number of the signed stream.")] = 0
+    mavlink_unsigned_commands: Annotated[
+        bool, Meta(description="Whether unsigned commands of other computers do more than stopping.")
+    ] = False
+    mavlink_interval_s: Annotated[
+        float, Meta(ge=0.05, le=10, description="Seconds between two messages of pose, and of obstacles.")
+    ] = 0.1
 
 
 class SupervisorSource(_Section, frozen=True):

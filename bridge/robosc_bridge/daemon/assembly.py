@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,14 +15,7 @@ from robosc.execution.settings import Settings, SettingsError, require_settings_
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc_api.security import SecurityError, check_listening
-from robosc_bridge.configuration.channels import (
-    Channel,
-    FaultChannel,
-    GrpcChannel,
-    LineChannel,
-    LineLostChannel,
-    channel_name,
-)
+from robosc_bridge.configuration.channels import GrpcChannel
 from robosc_bridge.configuration.structure import Configuration, Scanner
 from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.device_thread import DeviceThread
@@ -30,13 +24,15 @@ from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.jobs import Job
 from robosc_bridge.daemon.loop import Daemon
 from robosc_bridge.daemon.operations import Operations
+from robosc_bridge.daemon.sight import camera_worker, needs_camera, sight_problems
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
-from robosc_bridge.devices.interface import DriveBase, RangeScanner
+from robosc_bridge.devices.interface import DriveBase, RangeScanner, Velocity
 from robosc_bridge.devices.registry import make_drive_base, make_range_scanner
 from robosc_bridge.devices.robots import ROBOTS, Body, Robot
 from robosc_bridge.drivers import facts_of
 from robosc_bridge.errors import BridgeError
+from robosc_bridge.ground import ground_settings
 from robosc_bridge.remote import settings_of
 from robosc_bridge.safety import SafetyLayer, SafetyLimits
 from robosc_bridge.skills import EmergencyStop, Rotate
@@ -50,10 +46,12 @@ RESTART_S = 3.0
 LONGEST_PERIOD_S = 0.9
 """The safety layer waits for the loop for two seconds at most, and for two periods at least."""
 
+SWITCH_S = 0.0005
+"""After how long a thread that computes lets others have their turn. With Python's own 5 ms, a remote face that is busy
+would hold up a stop three times: the scanner's thread, the loop, and the drive base's thread follow one another."""
+
 # Longer than anything that a device's thread does at once, such as calibrating a gyroscope.
 _THREAD_LIMIT_S = 10.0
-_NOT_SERVED: tuple[type[Channel], ...] = (LineChannel, LineLostChannel)
-_FACES_NOT_SERVED = ("mavlink_url",)
 
 
 class AssemblyError(BridgeError):
@@ -89,6 +87,8 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
             operator_timeout_s=chosen.operator_link_timeout_s,
             battery_warn_v=chosen.battery_warning_v,
             battery_stop_v=chosen.battery_stop_v,
+            min_valid_share=chosen.min_valid_share,
+            is_stopped_when_blind=chosen.stops_when_blind,
         )
     except ValueError as error:
         raise AssemblyError(f"safety: {error}") from error
@@ -104,12 +104,17 @@ def check_settings(configuration: Configuration, ties: Ties, deployment: Deploym
 
     Raises:
         AssemblyError: Something does not fit; says what.
+        GroundSettingsError: The ground station cannot be reached as it is said.
     """
-    _require_served(configuration, ties)
+    _require_faces(configuration, ties)
     if deployment is Deployment.LAYER and not is_remote(configuration):
         raise AssemblyError("a supervision layer needs 'remote.grpc_address' or 'remote.mavlink_url' for who asks it")
-    safety_limits(configuration)
+    limits = safety_limits(configuration)
+    ground_settings(configuration, Velocity(limits.linear_m_s, limits.angular_rad_s))
     settings = ties.settings(configuration.execution)
+    problems = sight_problems(configuration.skills.line, ties, settings)
+    if problems:
+        raise AssemblyError("; ".join(problems))
     try:
         require_settings_of(settings, str(deployment))
     except SettingsError as error:
@@ -156,12 +161,14 @@ class Machine:
         daemon: The loop, run by whoever calls `run`.
         drive: The drive base's thread.
         scanner: The LiDAR's; None: there is none.
+        camera: The camera's; None: nothing is tied to what it shows.
         operations: The daemon as remote faces see it.
     """
 
     daemon: Daemon
     drive: DeviceThread
     scanner: DeviceThread | None
+    camera: DeviceThread | None
     operations: Operations
 
     def run(self, faces: Sequence[Face] = ()) -> bool:
@@ -173,8 +180,10 @@ class Machine:
         Raises:
             BridgeError: A face cannot be started; no device was opened then.
         """
-        threads = [self.drive, *([self.scanner] if self.scanner else [])]
+        threads = [thread for thread in (self.drive, self.scanner, self.camera) if thread]
         with contextlib.ExitStack() as stack:
+            stack.callback(sys.setswitchinterval, sys.getswitchinterval())
+            sys.setswitchinterval(SWITCH_S)
             for face in faces:
                 stack.callback(face.stop)
                 face.start()
@@ -192,21 +201,8 @@ class Machine:
         self.daemon.post(Command.QUIT)
 
 
-def _require_served(configuration: Configuration, ties: Ties) -> None:
-    """What is asked for must be there; all that is not is listed."""
-    missing = [
-        f"'{item.name}' ('{item.identifier}') is tied to '{channel_name(kind)}'"
-        for kind in _NOT_SERVED
-        for item, _ in ties.tied_to(kind)
-    ]
-    missing += [
-        f"'{item.name}' ('{item.identifier}') is tied to 'fault' of a camera"
-        for item, tied in ties.tied_to(FaultChannel)
-        if isinstance(tied, FaultChannel) and tied.device == "camera"
-    ]
-    missing += [f"'remote.{name}'" for name in _FACES_NOT_SERVED if getattr(configuration.remote, name) is not None]
-    if missing:
-        raise AssemblyError(f"not served by this version of the bridge: {'; '.join(missing)}")
+def _require_faces(configuration: Configuration, ties: Ties) -> None:
+    """What is reached from elsewhere needs a remote face that may listen where it is to."""
     needing = [f"'{item.name}' ('{item.identifier}')" for item, _ in ties.tied_to(GrpcChannel)]
     if needing and configuration.remote.grpc_address is None:
         raise AssemblyError(f"tied to 'grpc', which needs 'remote.grpc_address': {', '.join(needing)}")
@@ -252,7 +248,14 @@ def assemble(
     # Who can be reached can be told to start again.
     is_layer = deployment is Deployment.LAYER
     job = Job(
-        supervisor, ties, settings, configuration.scanner is not None, starts_itself, is_remote(configuration), is_layer
+        supervisor,
+        ties,
+        settings,
+        needs_scanner=configuration.scanner is not None,
+        needs_camera=needs_camera(ties),
+        starts_itself=starts_itself,
+        stays_after_fault=is_remote(configuration),
+        is_layer=is_layer,
     )
     rotate = configuration.skills.rotate
     # A turn has a time limit, which goes by its speed.
@@ -276,10 +279,15 @@ def assemble(
             configuration.safety.scan_timeout_s,
             RESTART_S,
             clock.monotonic,
+            bad_frames_share=configuration.safety.bad_frames_share,
         )
         scanner = DeviceThread(listener, clock.monotonic)
-    daemon.connect(drive.hurry, worker.reset, lambda: drive.is_alive and (scanner is None or scanner.is_alive))
+    camera = None
+    if job.needs_camera:
+        camera = DeviceThread(camera_worker(configuration.skills.line, daemon.post, clock.monotonic), clock.monotonic)
+    threads = [thread for thread in (drive, scanner, camera) if thread]
+    daemon.connect(drive.hurry, worker.reset, lambda: all(thread.is_alive for thread in threads))
     operations = Operations(
         supervisor.model, ties, feed, daemon.post, lambda: safety.operator_seen(clock.monotonic()), is_layer=is_layer
     )
-    return Machine(daemon, drive, scanner, operations)
+    return Machine(daemon, drive, scanner, camera, operations)

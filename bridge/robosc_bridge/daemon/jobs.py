@@ -19,6 +19,7 @@ class Job:
         starts_itself: Whether it starts as soon as the devices are there; else it stays in standby.
         stays_after_fault: Whether it waits for somebody to start it again after a fault; else it ends.
         is_layer: Whether it is a supervision layer, so that programs ask for what it lets through; else a controller.
+        needs_camera: Whether a camera must be there before it starts.
     """
 
     supervisor: Supervisor
@@ -28,3 +29,4 @@ class Job:
     starts_itself: bool
     stays_after_fault: bool = False
     is_layer: bool = False
+    needs_camera: bool = False

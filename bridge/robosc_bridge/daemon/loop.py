@@ -23,7 +23,7 @@ from robosc_bridge.daemon.program_inbox import ProgramInbox
 from robosc_bridge.daemon.programs import FromProgram
 from robosc_bridge.daemon.programs_side import ProgramsSide
 from robosc_bridge.daemon.readiness import Readiness
-from robosc_bridge.daemon.reports import DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice
+from robosc_bridge.daemon.reports import DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice, Sighting
 from robosc_bridge.daemon.requesters import Requesters
 from robosc_bridge.daemon.robot import Robot
 from robosc_bridge.daemon.roster import Roster
@@ -31,7 +31,7 @@ from robosc_bridge.daemon.snapshots import Snapshots
 from robosc_bridge.daemon.states import Command, Order, State
 from robosc_bridge.daemon.stop_switch import StopSwitch
 from robosc_bridge.daemon.supervised import Listeners
-from robosc_bridge.devices.interface import DriveReading, Scan, Velocity
+from robosc_bridge.devices.interface import STANDSTILL, DriveReading, Scan, Velocity
 from robosc_bridge.safety import SafetyLayer
 from robosc_bridge.skills import EmergencyStop, Rotate
 
@@ -85,7 +85,7 @@ class Daemon:
         self._inbox: queue.SimpleQueue[Item] = queue.SimpleQueue()
         self._from_programs = ProgramInbox(lambda: self._inbox.put(_Woken()))
         self._orders = Orders()
-        self._readiness = Readiness(needs_scanner=job.needs_scanner)
+        self._readiness = Readiness(needs_scanner=job.needs_scanner, needs_camera=job.needs_camera)
         self._conductor = conductor = Conductor(job, safety, self._readiness, self._orders, clock)
         listeners, roster = Listeners(job.ties), Roster()
         exchange = Exchange(job.ties, listeners, roster)
@@ -107,6 +107,8 @@ class Daemon:
         self._snapshots = Snapshots(feed, self._execution, self._readiness, clock)
         conductor.lead(self._execution, self._robot, self._motion, self._switch, self._snapshots.note)
         self._wish = Velocity()
+        # Taken out of the inbox, and not taken up to its end.
+        self._in_hand: tuple[Item, ...] = ()
         self._hurry: Callable[[], None] = lambda: None
 
     @property
@@ -166,6 +168,8 @@ class Daemon:
 
     def _close(self) -> None:
         """Nothing is done any more: whoever waits for something is told so."""
+        for item in self._in_hand:
+            _refuse(item)
         self._drain()
         self._orders.close(OVER)
 
@@ -175,13 +179,13 @@ class Daemon:
                 item = self._inbox.get_nowait()
             except queue.Empty:
                 break
-            if isinstance(item, Order):
-                answer(item, "" if item.command is Command.QUIT else OVER)
+            _refuse(item)
 
     def turn(self, *items: Item) -> None:
         """Handle what has come, and decide if it is time."""
-        now_s = self._clock.monotonic()
-        self._safety.loop_turned(now_s)
+        self._in_hand = items
+        self._safety.loop_turned(self._clock.monotonic())
+        self._in_hand = ()
         for item in items:
             self._handle(item)
         # Not what comes meanwhile: nobody can keep the loop from its turn.
@@ -215,6 +219,9 @@ class Daemon:
                 self._readiness.scan = item
                 if executor is not None:
                     self._robot.saw_scan(item, executor)
+            case Sighting():
+                if executor is not None:
+                    self._robot.saw_line(item, executor)
             case DeviceUp(device):
                 self._conductor.device_came(device)
             case DeviceDown():
@@ -228,7 +235,9 @@ class Daemon:
                 if executor is not None:
                     self._robot.saw_key(key, executor)
             case Order():
+                self._in_hand = (item,)
                 self._conductor.obey(item)
+                self._in_hand = ()
             case _Woken():
                 pass  # What they have sent is taken up in any turn.
             case _:
@@ -236,6 +245,15 @@ class Daemon:
 
     def _command(self, velocity: Velocity, now_s: float) -> None:
         self._safety.command(velocity, now_s)
-        if velocity != self._wish:
-            self._wish = velocity
+        if velocity == self._wish:
+            return
+        self._wish = velocity
+        # On its way, a turn has another speed after each exchange; the next one is soon enough for it.
+        if not self._motion.is_turning or velocity == STANDSTILL:
             self._hurry()
+
+
+def _refuse(item: Item) -> None:
+    """Nobody takes it up any more."""
+    if isinstance(item, Order):
+        answer(item, "" if item.command is Command.QUIT else OVER)

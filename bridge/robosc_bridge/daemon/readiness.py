@@ -11,6 +11,7 @@ class Readiness:
 
     Args:
         needs_scanner: Whether a LiDAR belongs to it.
+        needs_camera: Whether a camera does.
 
     Attributes:
         devices: Whether each device that belongs to the robot works; replaced at each change, never changed.
@@ -18,8 +19,9 @@ class Readiness:
         scan: The LiDAR's last full turn; None: the same.
     """
 
-    def __init__(self, *, needs_scanner: bool) -> None:
-        self.devices = dict.fromkeys((Device.DRIVE, *([Device.SCANNER] * needs_scanner)), False)
+    def __init__(self, *, needs_scanner: bool, needs_camera: bool = False) -> None:
+        needed = {Device.DRIVE: True, Device.SCANNER: needs_scanner, Device.CAMERA: needs_camera}
+        self.devices = {device: False for device, is_needed in needed.items() if is_needed}
         self.reading: DriveReading | None = None
         self.scan: Scan | None = None
 

@@ -12,11 +12,12 @@ class Device(StrEnum):
 
     DRIVE = "drive"
     SCANNER = "scanner"
+    CAMERA = "camera"
 
 
 @dataclass(frozen=True)
 class DeviceUp:
-    """A device works: the drive base was opened, or the scanner has made a full turn.
+    """A device works: the drive base was opened, the scanner has made a full turn, or the camera has sent a picture.
 
     Attributes:
         device: Which one.
@@ -66,4 +67,17 @@ class SafetyNotice:
     warnings: tuple[Caution, ...]
 
 
-Report = DeviceUp | DeviceDown | ResetDone | SafetyNotice | DriveReading | Scan
+@dataclass(frozen=True)
+class Sighting:
+    """What the camera shows of the line, or that it shows nothing at all.
+
+    Attributes:
+        time_s: When the picture had come, or was missed.
+        correction_rad_s: How to turn to keep on the line, counter-clockwise above zero; None: no line is in sight.
+    """
+
+    time_s: float
+    correction_rad_s: float | None
+
+
+Report = DeviceUp | DeviceDown | ResetDone | SafetyNotice | Sighting | DriveReading | Scan

@@ -14,7 +14,7 @@ from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.exchange import Exchange
 from robosc_bridge.daemon.motion import Motion
 from robosc_bridge.daemon.readings import battery_data, imu_data, odometry_data, scan_data, shaped
-from robosc_bridge.daemon.reports import Device
+from robosc_bridge.daemon.reports import Device, Sighting
 from robosc_bridge.daemon.stop_switch import StopSwitch
 from robosc_bridge.daemon.supervised import Listeners, Supervised
 from robosc_bridge.daemon.turns import Turns, done
@@ -191,6 +191,14 @@ class Robot:
         """A full turn of the LiDAR."""
         for identifier, _ in self._listeners.of(channels.ScannerChannel):
             executor.receive(identifier, scan_data(scan))
+        self.settle(executor)
+
+    def saw_line(self, sighting: Sighting, executor: Supervised) -> None:
+        """The camera shows the line, or none."""
+        correction = sighting.correction_rad_s
+        kind = channels.LineLostChannel if correction is None else channels.LineChannel
+        for identifier, _ in self._listeners.of(kind):
+            executor.receive(identifier, shaped(self._by_identifier[identifier], correction))
         self.settle(executor)
 
     def saw_device(self, device: Device, text: str, executor: Supervised, *, is_lost: bool) -> None:

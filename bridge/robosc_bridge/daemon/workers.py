@@ -7,10 +7,11 @@ the safety layer decides that alone.
 
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from robosc_bridge.daemon.backoff import Backoff
+from robosc_bridge.daemon.frame_watch import FrameWatch
 from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice
 from robosc_bridge.devices.interface import DriveBase, DriveReading, MotorFault, RangeScanner, Scan, Velocity
 from robosc_bridge.errors import BridgeError, DeviceSilentError
@@ -27,6 +28,9 @@ _log = logging.getLogger(__name__)
 
 _CLOSED_S = 0.1
 """How often the safety layer is asked while there is no drive base: it must notice that nothing holds any more."""
+
+RESTART_LIMIT = 3
+"""So many restarts of a scanner's motor without a full turn, and the scanner is closed and opened anew."""
 
 VALID_LIMIT = 8
 """A turn with fewer valid ranges shows nothing: the LiDAR is covered, or something is too near."""
@@ -64,8 +68,11 @@ class Gate(Protocol):
     def drive_failed(self) -> None:
         """The drive base did not answer."""
 
-    def saw_scan(self, now_s: float) -> None:
-        """A full turn came."""
+    def saw_scan(self, now_s: float, ranges_m: Sequence[float]) -> None:
+        """A full turn came, with a range for each degree."""
+
+    def saw_noise(self, is_noisy: bool) -> None:
+        """Whether many frames of the scanner are damaged."""
 
 
 class Worker(Protocol):
@@ -159,7 +166,8 @@ class DriveWorker:
         self._report(DeviceUp(Device.DRIVE))
 
     def _exchange(self, now_s: float) -> None:
-        if self._is_reset_wanted:
+        is_reset = self._is_reset_wanted
+        if is_reset:
             self._is_reset_wanted = False
             self._reset()
         command = self._ask(now_s)
@@ -175,6 +183,9 @@ class DriveWorker:
             self._told |= news
         self._gate.saw_drive(reading)
         self._report(reading)
+        if is_reset:
+            # Now it is known how the motors are.
+            self._report(ResetDone())
         # One that came early, because it was hurried, is no reason for a long pause.
         self._due_s = min(self._due_s, now_s) + self._period_s
         if self._due_s <= now_s:
@@ -198,7 +209,6 @@ class DriveWorker:
         except BridgeError as error:
             self._report(ResetDone(str(error)))
             raise
-        self._report(ResetDone())
 
     def _failed(self, problem: str) -> float:
         self._is_open = self._has_torque = False
@@ -227,9 +237,10 @@ class ScannerWorker:
         gate: The safety layer.
         report: Takes what is told; must not wait.
         silent_after_s: After so long without a full turn it counts as lost.
-        restart_after_s: After so long its motor is restarted, again and again.
+        restart_after_s: After so long without any turn its motor is restarted, `RESTART_LIMIT` times; then it is lost.
         clock: What the time is, in seconds.
         backoff: Pauses between attempts to open it.
+        bad_frames_share: Of a second's frames, above which its line is told to be noisy.
     """
 
     name = "scanner"
@@ -243,6 +254,7 @@ class ScannerWorker:
         restart_after_s: float,
         clock: Callable[[], float],
         backoff: Backoff | None = None,
+        bad_frames_share: float = 0.1,
     ) -> None:
         self._scanner = scanner
         self._gate = gate
@@ -254,6 +266,8 @@ class ScannerWorker:
         self._is_open = False
         self._is_turning = False
         self._heard_s = self._restart_at_s = 0.0
+        self._restarts = 0
+        self._frames = FrameWatch(scanner.counters, bad_frames_share)
 
     def step(self, now_s: float) -> float:
         """Open it, or listen for a turn."""
@@ -265,6 +279,7 @@ class ScannerWorker:
                 self._is_open = True
                 self._heard_s = self._clock()
                 self._restart_at_s = self._heard_s + self._restart_after_s
+                self._restarts = 0
         except BridgeError as error:
             return self._failed(str(error))
         except Exception as error:  # Without a scanner, the safety layer stops the wheels.
@@ -280,19 +295,35 @@ class ScannerWorker:
             self._is_turning = False
             what = f"no full turn with valid ranges for {self._silent_after_s:g} s"
             self._report(DeviceDown(Device.SCANNER, what, 0.0, is_first=True))
-        if scan is None and self._clock() >= self._restart_at_s:
-            self._scanner.restart()
+        if scan is not None:
+            # It turns, whatever it sees.
+            self._restarts = 0
             self._restart_at_s = self._clock() + self._restart_after_s
+        elif self._clock() >= self._restart_at_s:
+            self._restart()
+        self._look_at_frames()
+
+    def _restart(self) -> None:
+        if self._restarts >= RESTART_LIMIT:
+            raise DeviceSilentError(f"no full turn, also after its motor was started anew {RESTART_LIMIT} times")
+        self._restarts += 1
+        self._scanner.restart()
+        self._restart_at_s = self._clock() + self._restart_after_s
+
+    def _look_at_frames(self) -> None:
+        found = self._frames.look(self._clock())
+        if found is not None:
+            self._gate.saw_noise(found.is_noisy)
+            _log.warning("scanner: %s", found.text)
 
     def _heard(self, scan: Scan) -> None:
         self._backoff.succeeded()
-        self._gate.saw_scan(scan.time_s)
+        self._gate.saw_scan(scan.time_s, scan.ranges_m)
         if not self._is_turning:
             self._is_turning = True
             self._report(DeviceUp(Device.SCANNER))
         self._report(scan)
         self._heard_s = scan.time_s
-        self._restart_at_s = scan.time_s + self._restart_after_s
 
     def _failed(self, problem: str) -> float:
         self._is_open = self._is_turning = False

@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from robosc_bridge.devices.mavlink_signing import Signing
 from robosc_bridge.devices.mavlink_state import Told, VehicleState
 from robosc_bridge.errors import LineBusyError, LineError, LineLostError
 from robosc_bridge.protocol.framing import FrameCounts
@@ -25,9 +24,11 @@ from robosc_bridge.protocol.mavlink_messages import (
     Telemetry,
     command,
     own_heartbeat,
+    vehicle_message,
 )
-from robosc_bridge.transport.network_line import NetworkLine, is_network_address
-from robosc_bridge.transport.serial_line import SerialLine
+from robosc_bridge.protocol.mavlink_signing import Signing
+from robosc_bridge.transport.lines import open_line
+from robosc_bridge.transport.network_line import NetworkLine
 
 BAUD = 57_600
 HEARTBEAT_S = 1.0
@@ -80,7 +81,7 @@ class VehicleLink:
             settings.signing.link if settings.signing else 0,
             self._signing.timestamp() if self._signing else 0,
         )
-        self._decoder = Decoder(self._codec)
+        self._decoder = Decoder(self._codec, vehicle_message)
         self._state = VehicleState(settings.system)
         self._obstacles: deque[Told[Obstacle]] = deque(maxlen=_KEPT_OBSTACLES)
         self._lost: LineError | None = None
@@ -88,11 +89,7 @@ class VehicleLink:
         self._changed = threading.Condition()
         self._sending = threading.Lock()
         self._heartbeat_s = -HEARTBEAT_S
-        self._line: SerialLine | NetworkLine = (
-            NetworkLine(settings.path)
-            if is_network_address(settings.path)
-            else SerialLine(settings.path, settings.baud)
-        )
+        self._line = open_line(settings.path, settings.baud)
         self._reader = threading.Thread(target=self._read, name=f"MAVLink {settings.path}", daemon=True)
         self._reader.start()
 

@@ -10,11 +10,11 @@ import time
 
 from robosc_bridge.devices.interface import RawScan, Scan, ScannerCounters
 from robosc_bridge.devices.mavlink_link import BAUD, LinkSettings, Obstacle, VehicleLink, acquire, release
-from robosc_bridge.devices.mavlink_signing import Signing
 from robosc_bridge.devices.mavlink_state import Told, VehicleState
 from robosc_bridge.errors import LineLostError
 from robosc_bridge.protocol.mavlink_messages import ObstacleRing, SectorDistance, Telemetry
 from robosc_bridge.protocol.mavlink_obstacles import Sector, nearest_in_sectors, ring_sectors, sensor_sector
+from robosc_bridge.protocol.mavlink_signing import Signing
 
 # As ArduPilot itself has it: what is older says nothing.
 STALE_AFTER_S = 0.5

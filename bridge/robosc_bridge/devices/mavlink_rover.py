@@ -16,7 +16,6 @@ from robosc_bridge.devices.interface import STANDSTILL, DriveLimits, DriveReadin
 from robosc_bridge.devices.kinematics import wheel_speeds, within_limits
 from robosc_bridge.devices.mavlink_link import BAUD, LinkSettings, VehicleLink, acquire, release
 from robosc_bridge.devices.mavlink_odometry import VehicleOdometry, estimate
-from robosc_bridge.devices.mavlink_signing import Signing
 from robosc_bridge.devices.mavlink_state import Told, VehicleState
 from robosc_bridge.devices.robots import Body
 from robosc_bridge.errors import (
@@ -38,6 +37,7 @@ from robosc_bridge.protocol.mavlink_messages import (
     entering,
     velocity_target,
 )
+from robosc_bridge.protocol.mavlink_signing import Signing
 
 HEARTBEAT_LIMIT_S = 3.5
 """Three heartbeats of the vehicle were lost."""

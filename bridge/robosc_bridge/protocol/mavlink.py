@@ -11,7 +11,6 @@ from typing import Any, ClassVar
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from robosc_bridge.protocol.framing import FrameDecoder
-from robosc_bridge.protocol.mavlink_messages import READERS, Message
 
 MAGIC = 0xFD
 _HEADER = 10
@@ -20,6 +19,9 @@ _SIGNATURE = 13
 _SIGNED = 1  # The only flag of what a receiver must understand.
 _RADIO_STATUS = 109  # Radios put it into the stream themselves, and have no key.
 KEY_LENGTH = 32
+
+_OLD_MAGIC = 0xFE
+_OLD_HEADER = 6
 
 
 class Codec:
@@ -33,10 +35,18 @@ class Codec:
         key: Of signing: `KEY_LENGTH` bytes; None: packets are not signed, and signatures are not asked for.
         link: Of the signed stream.
         timestamp: Of the first signed packet, in units of 10 us since 2015 in UTC; each takes at least one.
+        unsigned: Numbers of the messages that are let through without a valid signature; who takes them asks
+            `is_signed`.
     """
 
     def __init__(
-        self, system: int, component: int, key: bytes | None = None, link: int = 0, timestamp: int = 0
+        self,
+        system: int,
+        component: int,
+        key: bytes | None = None,
+        link: int = 0,
+        timestamp: int = 0,
+        unsigned: frozenset[int] = frozenset(),
     ) -> None:
         self._codec: Any = dialect.MAVLink(None, srcSystem=system, srcComponent=component)
         if key is not None:
@@ -47,7 +57,7 @@ class Codec:
             signing.link_id = link
             signing.timestamp = timestamp
             signing.sign_outgoing = True
-            signing.allow_unsigned_callback = lambda codec, number: number == _RADIO_STATUS
+            signing.allow_unsigned_callback = lambda codec, number: number == _RADIO_STATUS or number in unsigned
 
     @property
     def is_signing(self) -> bool:
@@ -78,27 +88,63 @@ class Codec:
         signing = self._codec.signing
         heard = dict(signing.stream_timestamps)
         try:
-            return self._codec.decode(bytearray(packet))
+            found = self._codec.decode(bytearray(packet))
         except dialect.MAVError:
+            found = None
+        if found is None or not is_signed(found):
             # It notes the time of a packet before it checks who signed it: one forged or damaged packet from the far
             # future would shut out all that come.
             signing.stream_timestamps = heard
-            return None
+        return found
 
 
-class Decoder(FrameDecoder[Message]):
+def is_signed(found: Any) -> bool:
+    """Whether a message of the library came with a valid signature; False where signatures are not asked for."""
+    return bool(found.get_signed())
+
+
+class Decoder[Content](FrameDecoder[Content]):
     """Finds packets of MAVLink 2; those of MAVLink 1 and of messages that the dialect does not know are skipped.
 
     Args:
         codec: That checks and unpacks them.
+        read: What a message of the library says; a `ValueError`: what cannot be.
     """
 
     first_byte: ClassVar[int] = MAGIC
     header_length: ClassVar[int] = _HEADER
 
-    def __init__(self, codec: Codec) -> None:
+    def __init__(self, codec: Codec, read: Callable[[Any], Content]) -> None:
         super().__init__()
         self._codec = codec
+        self._read = read
+
+    def take_datagram(self, data: bytes) -> list[Content]:
+        """The packets of one datagram, which begins with one and has no noise; a search of every byte is not needed.
+
+        What follows a packet whose length cannot be told is dropped, so that a hostile datagram costs little time.
+        """
+        found: list[Content] = []
+        at = 0
+        while at + _HEADER <= len(data):
+            if data[at] == _OLD_MAGIC:
+                length = _OLD_HEADER + data[at + 1] + _CHECKSUM
+            elif data[at] == MAGIC:
+                length = _HEADER + data[at + 1] + _CHECKSUM + (_SIGNATURE if data[at + 2] & _SIGNED else 0)
+            else:
+                break
+            if at + length > len(data):
+                break
+            frame = self._frame(data, at, length) if data[at] == MAGIC and self._length(data, at) else None
+            if frame is None:
+                self.counts.bad_frames += 1
+                self.counts.skipped_bytes += length
+            else:
+                self.counts.frames += 1
+                found.append(frame)
+            at += length
+        self.counts.skipped_bytes += len(data) - at
+        return found
 
     def _length(self, data: bytes, at: int) -> int:
         flags = data[at + 2]
@@ -107,13 +153,11 @@ class Decoder(FrameDecoder[Message]):
             return 0
         return _HEADER + data[at + 1] + _CHECKSUM + (_SIGNATURE if flags & _SIGNED else 0)
 
-    def _frame(self, data: bytes, at: int, length: int) -> Message | None:
+    def _frame(self, data: bytes, at: int, length: int) -> Content | None:
         found = self._codec.decode(data[at : at + length])
         if found is None:
             return None
-        number = found.get_msgId()
         try:
-            content = READERS[number](found) if number in READERS else None
+            return self._read(found)
         except ValueError:
             return None
-        return Message(found.get_srcSystem(), found.get_srcComponent(), content)

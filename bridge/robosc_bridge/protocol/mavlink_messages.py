@@ -16,16 +16,16 @@ GROUND_STATIONS = frozenset({6})
 ARMED = 128
 
 _ONBOARD_CONTROLLER = 18
-_NO_AUTOPILOT = 8
+NO_AUTOPILOT = 8
 _ACTIVE = 4
-_BODY_NED = 8
+BODY_NED = 8
 # All but the speeds and the turn rate is to be ignored; that of accelerations must be said.
-_VELOCITY_AND_TURN_RATE = 0x05E7
-_CUSTOM_MODE = 1
-_FORCE = 21196
-_LOCAL_NED, _LOCAL_FRD, _BODY_FRD = 1, 20, 12
-_UNKNOWN = 65535
-_CHUNK = 50
+VELOCITY_AND_TURN_RATE = 0x05E7
+CUSTOM_MODE = 1
+FORCE = 21196
+LOCAL_NED, LOCAL_FRD, BODY_FRD = 1, 20, 12
+UNKNOWN = 65535
+CHUNK = 50
 
 
 class Mode(IntEnum):
@@ -51,8 +51,32 @@ class Command(IntEnum):
     """What a vehicle can be asked for, with its number."""
 
     SET_MODE = 176
+    FLIGHT_TERMINATION = 185
+    PAUSE_CONTINUE = 193
+    REBOOT_SHUTDOWN = 246
     ARM_DISARM = 400
+    RUN_PREARM_CHECKS = 401
     SET_MESSAGE_INTERVAL = 511
+    REQUEST_MESSAGE = 512
+    REQUEST_CAPABILITIES = 520
+
+
+class Incoming(IntEnum):
+    """Messages that a vehicle heeds, with their numbers."""
+
+    HEARTBEAT = 0
+    PING = 4
+    SET_MODE = 11
+    PARAM_REQUEST_READ = 20
+    PARAM_REQUEST_LIST = 21
+    PARAM_SET = 23
+    MISSION_REQUEST_LIST = 43
+    MANUAL_CONTROL = 69
+    COMMAND_INT = 75
+    COMMAND_LONG = 76
+    SET_POSITION_TARGET = 84
+    FILE_TRANSFER = 110
+    TIMESYNC = 111
 
 
 class Result(IntEnum):
@@ -74,6 +98,8 @@ class Telemetry(IntEnum):
     LOCAL_POSITION = 32
     DISTANCE_SENSOR = 132
     BATTERY_STATUS = 147
+    NAMED_VALUE_FLOAT = 251
+    NAMED_VALUE_INT = 252
     OBSTACLE_DISTANCE = 330
     ODOMETRY = 331
 
@@ -174,7 +200,7 @@ class Text:
     @property
     def is_last(self) -> bool:
         """Whether no piece follows."""
-        return self.number == 0 or len(self.data) < _CHUNK
+        return self.number == 0 or len(self.data) < CHUNK
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,7 +288,7 @@ def _local_position(told: Any) -> LocalPosition:
 
 
 def _odometry(told: Any) -> Motion | None:
-    if told.frame_id not in (_LOCAL_NED, _LOCAL_FRD) or told.child_frame_id != _BODY_FRD:
+    if told.frame_id not in (LOCAL_NED, LOCAL_FRD) or told.child_frame_id != BODY_FRD:
         return None
     w, x, y, z, *_ = _finite(*told.q, told.x, told.y, told.vx, told.yawspeed)
     yaw_rad = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
@@ -274,14 +300,14 @@ def _share(percent: int) -> float | None:
 
 
 def _sys_status(told: Any) -> BatteryState:
-    voltage_v = None if told.voltage_battery in (0, _UNKNOWN) else told.voltage_battery / 1000
+    voltage_v = None if told.voltage_battery in (0, UNKNOWN) else told.voltage_battery / 1000
     return BatteryState(True, voltage_v, _share(told.battery_remaining))
 
 
 def _battery_status(told: Any) -> BatteryState | None:
     if told.id != 0:
         return None
-    cells_mv = [cell_mv for cell_mv in told.voltages if cell_mv != _UNKNOWN]
+    cells_mv = [cell_mv for cell_mv in told.voltages if cell_mv != UNKNOWN]
     return BatteryState(False, sum(cells_mv) / 1000 if any(cells_mv) else None, _share(told.battery_remaining))
 
 
@@ -299,7 +325,7 @@ def _obstacle_ring(told: Any) -> ObstacleRing:
     increment_deg = fine_deg or float(told.increment)
     if not 0.01 <= abs(increment_deg) <= 180.0 or abs(offset_deg) > 720.0:
         raise ValueError("no such angle")
-    is_body_fixed = told.frame == _BODY_FRD
+    is_body_fixed = told.frame == BODY_FRD
     distances_cm = tuple(told.distances)
     return ObstacleRing(distances_cm, increment_deg, offset_deg, told.min_distance, told.max_distance, is_body_fixed)
 
@@ -327,7 +353,7 @@ READERS: Mapping[int, Callable[[Any], Content]] = {
 
 def own_heartbeat(codec: Any) -> Any:
     """That a companion computer is there."""
-    return codec.heartbeat_encode(_ONBOARD_CONTROLLER, _NO_AUTOPILOT, 0, 0, _ACTIVE)
+    return codec.heartbeat_encode(_ONBOARD_CONTROLLER, NO_AUTOPILOT, 0, 0, _ACTIVE)
 
 
 def command(
@@ -348,12 +374,12 @@ def command(
 
 def arming(is_armed: bool, is_forced: bool = False) -> tuple[float, ...]:
     """Parameters of `Command.ARM_DISARM`."""
-    return (float(is_armed), float(_FORCE if is_forced else 0))
+    return (float(is_armed), float(FORCE if is_forced else 0))
 
 
 def entering(mode: Mode) -> tuple[float, ...]:
     """Parameters of `Command.SET_MODE`."""
-    return (float(_CUSTOM_MODE), float(mode))
+    return (float(CUSTOM_MODE), float(mode))
 
 
 def velocity_target(
@@ -372,6 +398,16 @@ def velocity_target(
     speeds = (linear_m_s + 0.0, 0.0, 0.0)
     unused = (0.0, 0.0, 0.0)
     return lambda codec: codec.set_position_target_local_ned_encode(
-        boot_ms, system, component, _BODY_NED, _VELOCITY_AND_TURN_RATE,
+        boot_ms, system, component, BODY_NED, VELOCITY_AND_TURN_RATE,
         *unused, *speeds, *unused, 0.0, -angular_rad_s + 0.0,
     )  # fmt: skip
+
+
+def vehicle_message(told: Any) -> Message:
+    """What a vehicle says with a message of the library.
+
+    Raises:
+        ValueError: What cannot be.
+    """
+    number = told.get_msgId()
+    return Message(told.get_srcSystem(), told.get_srcComponent(), READERS[number](told) if number in READERS else None)

@@ -4,16 +4,19 @@ A sector is as near as what is nearest in it, so its distance counts for every b
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from robosc_bridge.protocol.mavlink_messages import ObstacleRing, SectorDistance
 from robosc_bridge.protocol.turns import BINS, wrapped_deg
 
+RING = 72
+RING_STEP_DEG = 5
 _UNKNOWN_CM = 65535
 _EIGHTHS = 8
 _EIGHTH_DEG = 45.0
 _TINY_DEG = 1e-6
+_FAR_M = 1e6
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,3 +86,30 @@ def nearest_in_sectors(sectors: Iterable[Sector]) -> tuple[float, ...]:
         for k in range(first, min(last, first + BINS - 1) + 1):
             nearest[k % BINS] = min(nearest[k % BINS], sector.range_m)
     return tuple(math.nan if math.isinf(range_m) else range_m for range_m in nearest)
+
+
+def ring_distances_cm(ranges_m: Sequence[float], least_cm: int, most_cm: int) -> tuple[int, ...]:
+    """The `RING` distances of OBSTACLE_DISTANCE: `RING_STEP_DEG` apart, clockwise from the front.
+
+    Args:
+        ranges_m: `BINS` bins, counter-clockwise from the front; NaN: nothing valid was measured.
+        least_cm: Shortest that is told: what is nearer is told as this.
+        most_cm: Longest.
+
+    Returns:
+        Of the nearest of each entry's bins, never farther than it is; `most_cm` + 1: it is beyond that; 65535: nothing
+        was measured, which need not mean that nothing is there.
+    """
+    half = RING_STEP_DEG // 2
+    # Nothing was measured: farther than all that was, also than what is infinitely far.
+    clear = [range_m if 0.0 < range_m < _FAR_M else _FAR_M if range_m >= _FAR_M else math.inf for range_m in ranges_m]
+    clear = clear[-half:] + clear[: BINS - half]
+    found = []
+    for first in range(0, BINS, RING_STEP_DEG):
+        nearest_m = min(clear[first : first + RING_STEP_DEG])
+        if nearest_m == math.inf:
+            found.append(_UNKNOWN_CM)
+        else:
+            # The smallest part of a millimetre keeps 0.29 m at 29 cm.
+            found.append(max(int(min(nearest_m * 100 + 1e-6, most_cm + 1)), least_cm))
+    return (found[0], *reversed(found[1:]))

@@ -2,13 +2,14 @@
 
 import math
 import threading
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from robosc_bridge.devices.interface import STANDSTILL, DriveReading, MotorFault, Velocity
 from robosc_bridge.safety.limits import SafetyLimits
 from robosc_bridge.safety.motion import ramped, wheels, within
 from robosc_bridge.safety.reasons import LATCHING, TORQUE_OFF, Caution, Reason
-from robosc_bridge.safety.watches import BatteryWatch, Freshness, WheelWatch
+from robosc_bridge.safety.watches import BatteryWatch, Freshness, SightWatch, WheelWatch
 
 # The supply's bit alone does not switch a motor off; how much is left in the battery has a rule of its own.
 _HARMLESS = frozenset({MotorFault.VOLTAGE})
@@ -57,6 +58,8 @@ class SafetyLayer:
         # What is commanded, within the limits, and what was put out last.
         self._wanted = self._velocity = STANDSTILL
         self._is_refused = False
+        # Forward, as it was commanded last: whether it counts or not, that is where somebody wants to go.
+        self._asked_m_s = 0.0
         # Whether what was commanded up to the next output came too early to count.
         self._is_held = True
         # As put out last.
@@ -68,6 +71,8 @@ class SafetyLayer:
         self._operator = Freshness(limits.operator_timeout_s)
         self._failures = 0
         self._faults: frozenset[MotorFault] = frozenset()
+        self._sight = SightWatch(limits.min_valid_share)
+        self._is_noisy = False
         self._battery = BatteryWatch(limits)
         self._wheels = WheelWatch(limits)
         # When torque began to be wanted, None: it is not; whether the motors told since then that they hold.
@@ -88,6 +93,7 @@ class SafetyLayer:
         with self._lock:
             self._is_enabled = False
             self._is_held = True
+            self._asked_m_s = 0.0
 
     def command(self, velocity: Velocity, now_s: float) -> None:
         """Ask for a velocity.
@@ -102,14 +108,28 @@ class SafetyLayer:
             self._is_refused = not all(-math.inf < number < math.inf for number in numbers)
             if self._is_refused:
                 self._wanted = STANDSTILL
+                self._asked_m_s = 0.0
             else:
                 self._wanted = within(velocity, self._limits)
+                self._asked_m_s = self._wanted.linear_m_s
                 self._commands.hear(now_s)
 
-    def saw_scan(self, now_s: float) -> None:
-        """A full scan was complete then."""
+    def saw_scan(self, now_s: float, ranges_m: Sequence[float] = ()) -> None:
+        """A full scan was complete then.
+
+        Args:
+            now_s: When.
+            ranges_m: What was measured (`SightWatch.hear`); none: nothing is known about that.
+        """
         with self._lock:
             self._scans.hear(now_s)
+            if ranges_m:
+                self._sight.hear(ranges_m)
+
+    def saw_noise(self, is_noisy: bool) -> None:
+        """Whether many frames of the scanner are damaged."""
+        with self._lock:
+            self._is_noisy = is_noisy
 
     def saw_drive(self, reading: DriveReading) -> None:
         """The drive base has answered."""
@@ -175,6 +195,7 @@ class SafetyLayer:
                 self._latched.clear()
                 self._is_enabled = False
                 self._is_held = True
+                self._asked_m_s = 0.0
             return remaining
 
     def _holds(self, reason: Reason) -> bool:
@@ -235,6 +256,7 @@ class SafetyLayer:
             Reason.TORQUE_AWAITED: self._torque_since_s is not None and not self._is_torque_seen,
             Reason.COMMAND_SILENT: self._wanted != STANDSTILL and self._commands.is_stale(self._now_s),
             Reason.SCAN_STALE: self._scans.is_stale(self._now_s),
+            Reason.SCAN_BLIND: self._limits.is_stopped_when_blind and self._sight.is_blind(self._asked_m_s),
             Reason.MOTOR_SILENT: self._readings.is_stale(self._now_s) or self._failures >= self._limits.motor_failures,
             Reason.LOOP_OVERRUN: self._loop.is_stale(self._now_s),
             Reason.OPERATOR_LOST: self._operator.is_stale(self._now_s),
@@ -246,5 +268,7 @@ class SafetyLayer:
             Caution.BATTERY: self._battery.is_near_empty,
             Caution.MOTOR_VOLTAGE: MotorFault.VOLTAGE in self._faults,
             Caution.COMMAND_REFUSED: self._is_refused,
+            Caution.SCAN_BLIND: self._sight.is_blind(self._asked_m_s),
+            Caution.SCAN_NOISY: self._is_noisy,
         }
         return tuple(caution for caution, is_so in holds.items() if is_so)

@@ -55,10 +55,13 @@ class SafetyLimits:
         torque_on_s: Longest time that the motors take to hold.
         torque_off_s: Longest wait for the wheels to stand still before torque goes off.
         standstill_m_s: A wheel that is not faster stands still.
+        min_valid_share: The scanner sees nothing where the robot goes if a smaller share of its ranges there is valid,
+            in a full scan; at most 1.
         is_torque_off_on_operator_stop: Whether an operator's stop wants torque off, too.
+        is_stopped_when_blind: Whether the robot may not go where the scanner sees nothing; else a person is told.
 
     Raises:
-        ValueError: A number is not finite, not above 0 or inconsistent with another one; all of them are listed.
+        ValueError: A number is not finite, not above 0, too large or inconsistent with another; all of them are listed.
     """
 
     linear_m_s: float
@@ -83,11 +86,13 @@ class SafetyLimits:
     torque_on_s: float = 2.0
     torque_off_s: float = 1.0
     standstill_m_s: float = 0.01
+    min_valid_share: float = 0.05
     is_torque_off_on_operator_stop: bool = False
+    is_stopped_when_blind: bool = False
 
     def __post_init__(self) -> None:
         values = {each.name: getattr(self, each.name) for each in fields(self)}
-        del values["is_torque_off_on_operator_stop"]
+        del values["is_torque_off_on_operator_stop"], values["is_stopped_when_blind"]
         for name in ("scan_timeout_s", "operator_timeout_s"):
             if values[name] is None:
                 del values[name]
@@ -106,5 +111,7 @@ class SafetyLimits:
             for name, other in _NOT_BELOW
             if values[name] < values[other]
         ]
+        if self.min_valid_share > 1:
+            problems.append(f"min_valid_share must be at most 1, not {self.min_valid_share}")
         if problems:
             raise ValueError("; ".join(problems))

@@ -20,6 +20,7 @@ class Reason(StrEnum):
     TORQUE_AWAITED = "The motors do not hold yet."
     COMMAND_SILENT = "No command came for too long."
     SCAN_STALE = "The scanner has made no full turn for too long."
+    SCAN_BLIND = "The scanner measures nothing where the robot is to go."
     MOTOR_SILENT = "The motors have not answered for too long."
     LOOP_OVERRUN = "The supervisor's loop has not turned for too long."
     OPERATOR_LOST = "The link to the operator is lost."
@@ -48,3 +49,5 @@ class Caution(StrEnum):
     BATTERY = "The battery will soon be empty."
     MOTOR_VOLTAGE = "A motor tells that its supply is out of range."
     COMMAND_REFUSED = "A command was no number and counts as a stop."
+    SCAN_BLIND = "The scanner measures nothing where the robot goes: it is covered, or nothing is in its range."
+    SCAN_NOISY = "Many frames of the scanner are damaged."

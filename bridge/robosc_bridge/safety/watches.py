@@ -5,8 +5,12 @@ first looked at, and one that is no time is not heard.
 """
 
 import math
+from collections.abc import Sequence
 
 from robosc_bridge.safety.limits import SafetyLimits
+
+SECTOR_DEG = 30
+"""To both sides of where the robot goes, that the scanner must see: its own width, half a metre away."""
 
 
 class Freshness:
@@ -33,6 +37,37 @@ class Freshness:
             return True
         self._heard_s = min(self._heard_s, now_s)
         return now_s - self._heard_s > self._timeout_s
+
+
+class SightWatch:
+    """Finds out whether the scanner measures anything where the robot goes.
+
+    Ahead and behind are the sectors of 30 degrees to both sides of the front and of the back.
+
+    Args:
+        min_share: Of the ranges in a sector, below which nothing is seen there.
+    """
+
+    def __init__(self, min_share: float) -> None:
+        self._min_share = min_share
+        # Without any scan, nobody can tell that a part of it is missing.
+        self._is_blind_ahead = self._is_blind_behind = False
+
+    def hear(self, ranges_m: Sequence[float]) -> None:
+        """A full scan came.
+
+        Args:
+            ranges_m: One for each degree, counter-clockwise from the front; NaN where nothing valid was measured.
+        """
+        self._is_blind_ahead = self._is_blind((*ranges_m[-SECTOR_DEG:], *ranges_m[: SECTOR_DEG + 1]))
+        self._is_blind_behind = self._is_blind(ranges_m[180 - SECTOR_DEG : 180 + SECTOR_DEG + 1])
+
+    def _is_blind(self, ranges_m: Sequence[float]) -> bool:
+        return sum(map(math.isfinite, ranges_m)) < self._min_share * len(ranges_m)
+
+    def is_blind(self, linear_m_s: float) -> bool:
+        """Whether nothing is seen in the direction of a speed; to a turn on the spot, no direction belongs."""
+        return (linear_m_s > 0 and self._is_blind_ahead) or (linear_m_s < 0 and self._is_blind_behind)
 
 
 class BatteryWatch:

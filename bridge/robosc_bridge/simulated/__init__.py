@@ -1,11 +1,15 @@
 """Simulated devices on pseudo-terminals, and the planar world that they move in and see.
 
 `SimulatedTurtleBot3` is a whole robot; its parts can be put together otherwise: a `World` with `Walls`, `Servo`s on a
-`ServoBus`, an `OpenCr`, one of the `LIDARS`, each on a `SimulatedLine`. `python -m robosc_bridge.simulated` serves one
-in a process of its own. Nothing here knows the drivers' encoders and decoders: both sides stand on the manuals alone.
+`ServoBus`, an `OpenCr`, one of the `LIDARS`, each on a `SimulatedLine`, a `SimulatedCamera` over a `Track`.
+`python -m robosc_bridge.simulated` serves one in a process of its own. Nothing here knows the drivers' encoders and
+decoders: both sides stand on the manuals alone.
 """
 
+from robosc_bridge.simulated.camera import SimulatedCamera
 from robosc_bridge.simulated.datagram_line import DatagramFaults, DatagramLine
+from robosc_bridge.simulated.eye import Eye, Mount
+from robosc_bridge.simulated.floor import Track, oval, parse_track
 from robosc_bridge.simulated.lidar import LIDARS, Lds01, Lds02, Lds03, Lidar
 from robosc_bridge.simulated.line import Faults, SimulatedLine
 from robosc_bridge.simulated.opencr import OpenCr
@@ -26,26 +30,32 @@ __all__ = [
     "Body",
     "DatagramFaults",
     "DatagramLine",
+    "Eye",
     "Faults",
     "HardwareError",
     "Lds01",
     "Lds02",
     "Lds03",
     "Lidar",
+    "Mount",
     "OpenCr",
     "Record",
     "Recorder",
     "Rover",
     "Servo",
     "ServoBus",
+    "SimulatedCamera",
     "SimulatedLine",
     "SimulatedTurtleBot3",
     "Tap",
     "Timebase",
+    "Track",
     "Walls",
     "Wheel",
     "World",
     "maze",
+    "oval",
+    "parse_track",
     "parse_walls",
     "read_records",
     "room",

@@ -1,7 +1,8 @@
 """`python -m robosc_bridge.simulated`: serve a simulated TurtleBot3 until interrupted.
 
-A process of its own leaves the timing of a busy driver alone. It prints the two ports, one a line, as `base PATH` and
-`scanner PATH`, then does what its standard input says, one command a line (`help` lists them).
+A process of its own leaves the timing of a busy driver alone. It prints the ports, one a line, as `base PATH`,
+`scanner PATH` and, where there is a camera, `camera PATH`; then it does what its standard input says, one command a
+line (`help` lists them).
 """
 
 import argparse
@@ -14,11 +15,14 @@ from pathlib import Path
 from types import FrameType
 
 from robosc_bridge.simulated.commands import UnknownCommandError, obey
+from robosc_bridge.simulated.floor import Track, oval, parse_track
 from robosc_bridge.simulated.lidar import LIDARS
 from robosc_bridge.simulated.recorder import Recorder
 from robosc_bridge.simulated.robots import BODIES
 from robosc_bridge.simulated.turtlebot3 import BASES, SimulatedTurtleBot3
 from robosc_bridge.simulated.walls import Walls, maze, parse_walls, room
+
+OVAL = "oval"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -45,7 +49,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 recorder = Recorder(stack.enter_context(options.record.open("w", encoding="ascii")))
             robot = stack.enter_context(_robot(options, recorder))
             print(f"base {robot.base_path}")
-            print(f"scanner {robot.scanner_path}", flush=True)
+            print(f"scanner {robot.scanner_path}")
+            if robot.camera is not None:
+                print(f"camera {robot.camera.path}")
+            sys.stdout.flush()
             threading.Thread(target=_listen, args=(robot,), name="commands", daemon=True).start()
             ended.wait()
     except (OSError, ValueError) as error:
@@ -66,6 +73,8 @@ def _robot(options: argparse.Namespace, recorder: Recorder | None) -> SimulatedT
         scanner_link=options.scanner_link,
         seed=options.seed,
         noise_m=options.noise,
+        line=_track(options.line),
+        camera_link=options.camera_link,
         recorder=recorder,
     )
 
@@ -89,6 +98,12 @@ def _walls(options: argparse.Namespace) -> Walls:
         columns, rows = options.maze
         return maze(round(columns), round(rows), seed=options.seed)
     return room(*options.room)
+
+
+def _track(name: str | None) -> Track | None:
+    if name is None:
+        return None
+    return oval() if name == OVAL else parse_track(Path(name).read_text(encoding="utf-8"))
 
 
 def _numbers(text: str, separator: str, count: int) -> tuple[float, ...]:
@@ -122,6 +137,11 @@ def _parser() -> argparse.ArgumentParser:
     place.add_argument("--maze", type=_size, metavar="COLUMNSxROWS", help="a maze of 0.6 m cells, start at the first")
     place.add_argument("--walls", type=Path, metavar="FILE", help="walls from a file, `x1 y1 x2 y2` in metres a line")
     parser.add_argument(
+        "--line",
+        metavar="oval|FILE",
+        help="a line on the floor, and a camera that sees it: an oval from the start, or `x y` in metres a line",
+    )
+    parser.add_argument(
         "--pose", type=_pose, default=(0.0, 0.0, 0.0), metavar="X,Y,HEADING", help="start, in m and rad; default: 0,0,0"
     )
     parser.add_argument("--speed", type=float, default=1.0, metavar="N", help="the world passes N times as fast")
@@ -129,6 +149,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--seed", type=int, default=0, help="of the maze and of all faults that come by chance")
     parser.add_argument("--base-link", type=Path, metavar="PATH", help="where the base's port is to be")
     parser.add_argument("--scanner-link", type=Path, metavar="PATH", help="where the LiDAR's port is to be")
+    parser.add_argument("--camera-link", type=Path, metavar="PATH", help="where the camera's socket is to be")
     parser.add_argument(
         "--record", type=Path, metavar="FILE", help="write all bytes on both lines into a file, with their times"
     )

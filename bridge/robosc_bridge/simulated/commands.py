@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import fields
 
+from robosc_bridge.simulated.camera import SimulatedCamera
 from robosc_bridge.simulated.line import Faults, SimulatedLine
 from robosc_bridge.simulated.rover import Rover
 from robosc_bridge.simulated.servo import HardwareError, Servo
@@ -23,6 +24,8 @@ rover disarm|restart|silent|heard           the rover's autopilot
 press|let NAME                              button_1, button_2, bumper_1, bumper_2 of OpenCR
 scanner cover|uncover|stall|go              the LiDAR
 scanner turn SHARE                          its speed, as a share of the nominal one
+camera disconnect|reconnect                 the plug of the camera
+camera cover|uncover|freeze|go              the camera
 pose [X Y HEADING]                          tell where the robot is, or put it there (m, rad)
 collisions                                  tell how often it came to a wall"""
 
@@ -84,6 +87,8 @@ def _obey(robot: SimulatedTurtleBot3, words: list[str]) -> str:
             robot.scanner.is_stalled = what == "stall"
         case ["scanner", "turn", share]:
             robot.scanner.turn_at(float(share))
+        case ["camera", what] if robot.camera is not None:
+            _to_camera(robot.camera, what)
         case ["base", "answers_as", device_id] if robot.rover is None:
             answers_as = None if device_id == "own" else int(device_id)
             # It has one of the two.
@@ -114,6 +119,20 @@ def _to_servo(servo: Servo, words: list[str]) -> None:
             servo.brown_out(float(voltage))
         case _:
             raise UnknownCommandError(f"a servo does not know {' '.join(words)!r}; `help` lists what it knows")
+
+
+def _to_camera(camera: SimulatedCamera, what: str) -> None:
+    match what:
+        case "disconnect":
+            camera.disconnect()
+        case "reconnect":
+            camera.reconnect()
+        case "cover" | "uncover":
+            camera.is_covered = what == "cover"
+        case "freeze" | "go":
+            camera.is_frozen = what == "freeze"
+        case _:
+            raise UnknownCommandError(f"a camera does not know {what!r}; `help` lists what it knows")
 
 
 def _to_rover(rover: Rover, words: list[str]) -> None:

@@ -1,4 +1,4 @@
-"""A whole TurtleBot3 in a world: a drive base and a LiDAR, each on a serial line of its own.
+"""A whole TurtleBot3 in a world: a drive base and a LiDAR, each on a serial line of its own, and maybe a camera.
 
 Its body may also have the autopilot of a MAVLink rover in place of its own base; the wheels are the autopilot's then.
 """
@@ -8,6 +8,8 @@ from types import TracebackType
 from typing import Self
 
 from robosc.execution.clock import Clock
+from robosc_bridge.simulated.camera import SimulatedCamera
+from robosc_bridge.simulated.floor import Track
 from robosc_bridge.simulated.lidar import LIDARS, Lidar
 from robosc_bridge.simulated.line import Faults, SimulatedLine
 from robosc_bridge.simulated.opencr import OpenCr
@@ -50,6 +52,8 @@ class SimulatedTurtleBot3:
         has_motors: Whether OpenCR has found its motors when it started.
         calibration_s: How long OpenCR's gyroscope is calibrated.
         noise_m: Standard deviation of what the LiDAR measures.
+        line: On the floor; with one, there is a camera.
+        camera_link: Where the camera's socket is to be; with a place, there is a camera, also without a line.
         recorder: Takes all bytes, as of the lines `base` and `scanner`; None: nobody does.
 
     Attributes:
@@ -63,6 +67,7 @@ class SimulatedTurtleBot3:
         scanner: The LiDAR.
         base_line: The base's line, with its faults.
         scanner_line: The LiDAR's.
+        camera: That looks at the floor; None: there is none.
 
     Raises:
         ValueError: There is no such robot, base or LiDAR.
@@ -85,6 +90,8 @@ class SimulatedTurtleBot3:
         has_motors: bool = True,
         calibration_s: float = 5.0,
         noise_m: float = 0.0,
+        line: Track | None = None,
+        camera_link: Path | None = None,
         recorder: Recorder | None = None,
     ) -> None:
         for kind, name, known in (("robot", robot, BODIES), ("base", base, BASES), ("LiDAR", lidar, LIDARS)):
@@ -108,8 +115,15 @@ class SimulatedTurtleBot3:
         self.scanner: Lidar = LIDARS[lidar](self.world, seed=seed, noise_m=noise_m)
         base_tap, scanner_tap = (None if recorder is None else recorder.tap(line) for line in ("base", "scanner"))
         self.base_line = SimulatedLine(device, self.time, base_link, seed, base_tap)
+        self.camera: SimulatedCamera | None = None
         try:
             self.scanner_line = SimulatedLine(self.scanner, self.time, scanner_link, seed + 1, scanner_tap)
+            try:
+                if line is not None or camera_link is not None:
+                    self.camera = SimulatedCamera(self.world, line, camera_link)
+            except BaseException:
+                self.scanner_line.close()
+                raise
         except BaseException:
             self.base_line.close()
             raise
@@ -140,6 +154,8 @@ class SimulatedTurtleBot3:
 
     def close(self) -> None:
         """End it; may be called again."""
+        if self.camera is not None:
+            self.camera.close()
         self.base_line.close()
         self.scanner_line.close()
 

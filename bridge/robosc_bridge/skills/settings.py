@@ -38,7 +38,11 @@ class LineSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
     camera: Annotated[
         str,
-        Meta(min_length=1, max_length=4096, description="Video device, such as /dev/video0; or `simulated`."),
+        Meta(
+            min_length=1,
+            max_length=4096,
+            description="Device such as /dev/video0, or a film; or `simulated:PATH`, served by a simulator.",
+        ),
     ] = "/dev/video0"
     shade: Annotated[
         Literal["dark", "light"], Meta(description="Whether the line is darker or lighter than the floor.")

@@ -107,6 +107,17 @@ class NetworkLine:
             raise LineLostError(self.path, "the other end has closed the connection")
         return data
 
+    @property
+    def is_stranger(self) -> bool:
+        """Whether the last datagram came from elsewhere than where what is written goes; only for who listens."""
+        return self._is_listening and self._peer is not None and self._sender != self._peer
+
+    def reply(self, data: bytes) -> None:
+        """Send one datagram to where the last one came from; only for who listens. It may get lost."""
+        if self._is_listening and self._sender is not None:
+            with contextlib.suppress(OSError):
+                self._socket.sendto(data, self._sender)
+
     def answer_sender(self) -> None:
         """From now on, what is written goes to where the last datagram came from; only for who listens."""
         self._peer = self._sender

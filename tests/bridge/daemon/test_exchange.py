@@ -169,6 +169,17 @@ def test_an_answer_that_comes_after_the_time_for_it_means_nothing() -> None:
     assert state(scene) == "asked"
 
 
+def test_a_server_that_never_answers_makes_nothing_grow() -> None:
+    scene = helped()
+    server, _ = called(scene)
+    for _ in range(5):
+        scene.live(1.2, 2.0)
+        server.say(Told, "/go", 2)
+        scene.live(0.1, 2.0)
+    assert len(server.of(CallMade)) == 1
+    assert len(scene.daemon._programs._exchange._open) == 1
+
+
 @pytest.mark.parametrize("make", [Replied, CallFailed])
 def test_only_who_is_asked_may_answer(make: Any) -> None:
     scene = helped()

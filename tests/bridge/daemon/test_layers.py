@@ -4,6 +4,8 @@ import math
 from typing import Any
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from robosc_bridge.daemon.programs import (
     Answered,
@@ -84,8 +86,8 @@ FORWARD = {"linear": {"x": 0.1}}
 ZERO = {"linear": {"x": 0.0}}
 
 
-def driven(text: str = CONFIGURATION, **options: Any) -> Scene:
-    scene = Scene(text=text, model=MODEL, is_layer=True, stays=True, **options)
+def driven(model: str = MODEL) -> Scene:
+    scene = Scene(text=CONFIGURATION, model=model, is_layer=True, stays=True)
     scene.up()
     return scene
 
@@ -334,7 +336,12 @@ def test_what_is_not_finite_is_held_back(
     assert (scene.out, scene.daemon.state) == (STANDSTILL, State.RUNNING)
 
 
-def test_what_is_left_out_is_zero_for_model_and_wheels_alike(scene: Scene, program: Connected) -> None:
+def test_what_is_left_out_is_zero_for_model_and_wheels_alike() -> None:
+    first, second = (line for line in MODEL.splitlines(keepends=True) if '"/cmd_vel"' in line)
+    halt = second.replace("type: Twist", "type: Twist, when: value.linear.x = 0.0")
+    walk = first.replace(", when: value.linear.x != 0.0", "")
+    scene = driven(model=MODEL.replace(first, halt).replace(second, walk))
+    program = Connected(scene, "an operator")
     scene.live(0.1, 0.3)
     # Not to walk, for which there is no way, but to halt.
     nothing: list[Any] = [None, {}, {"linear": None}, {"linear": {}}, {"angular": {"z": 0}}]
@@ -361,3 +368,57 @@ def test_a_lost_drive_base_ends_a_layers_run(scene: Scene, program: Connected) -
     assert scene.daemon.state is State.FAULT
     scene.daemon.post(Detached(program.program))
     scene.daemon.turn()
+
+
+EVERYTHING = [
+    (Requested, ("/cmd_vel", FORWARD)),
+    (Requested, ("/cmd_vel", ZERO)),
+    (Requested, ("/spin", 40)),
+    (Called, ("turn", "1", {"angle": 40})),
+    (Called, ("think", "2", "?")),
+    (GoalSent, ("face", "3", {"angle": 40})),
+    (CancelWanted, ("face", "3")),
+    (Told, ("/mood", "x")),
+]
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            st.integers(0, 2), st.none() | st.sampled_from(EVERYTHING), st.sampled_from([0.02, 0.1]), st.booleans()
+        ),
+        min_size=1,
+        max_size=15,
+    )
+)
+def test_programs_may_come_and_go_in_the_middle_of_everything(steps: list[tuple[int, Any, float, bool]]) -> None:
+    scene = driven()
+    names = iter(range(1000))
+
+    def come() -> Connected:
+        return Connected(scene, str(next(names)), ("think",))
+
+    programs = [come() for _ in range(3)]
+    for who, what, seconds, is_free in steps:
+        if what is None:
+            programs[who].leave()
+            programs[who] = come()
+        else:
+            make, arguments = what
+            programs[who].say(make, *arguments)
+        scene.live(seconds, 2.0 if is_free else 0.3)
+        assert scene.daemon.state is State.RUNNING
+    for program in programs:
+        program.leave()
+    scene.exchange()
+    # Nobody is there who wants anything to move.
+    assert scene.out == STANDSTILL
+    scene.live(1.0, 2.0)
+    assert (scene.out, scene.daemon.state) == (STANDSTILL, State.RUNNING)
+    # Whoever comes finds everything free.
+    late = come()
+    late.say(GoalSent, "face", "1", {"angle": 10})
+    assert GoalTaken("1") in late.told
+    scene.live(3.0, 2.0)
+    assert [item.outcome for item in late.of(GoalOver)] == ["succeeded"]

@@ -10,7 +10,7 @@ from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, SafetyNot
 from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.devices.interface import STANDSTILL, Velocity
 from robosc_bridge.safety import Caution, Reason
-from support.daemons import CONFIGURATION, PERIOD_S, Scene
+from support.daemons import CONFIGURATION, MODEL, PERIOD_S, Scene
 
 
 @pytest.fixture
@@ -63,6 +63,18 @@ def test_it_turns_by_the_angle_that_is_asked_for_and_tells_when_it_has(scene: Sc
     scene.live(0.5, 2.0)
     quarter = math.remainder(scene.heading_rad, math.pi / 2)
     assert abs(quarter) < 0.05 or scene.daemon.state is State.RUNNING
+
+
+def test_a_turn_is_steered_at_the_period_of_the_exchanges(scene: Scene) -> None:
+    """If each new speed hurried the next exchange, they would follow one another without a pause."""
+    scene.up(0.3)
+    speeds_rad_s, hurries = [scene.out.angular_rad_s], scene.hurries
+    while scene.out != STANDSTILL:
+        scene.live(PERIOD_S, 0.3)
+        speeds_rad_s.append(scene.out.angular_rad_s)
+    assert len(set(speeds_rad_s)) > 10
+    # That it has arrived is worth one.
+    assert scene.hurries == hurries + 1
 
 
 def test_a_silent_scanner_stops_the_wheels_and_they_go_on_when_it_is_back(scene: Scene) -> None:
@@ -257,3 +269,14 @@ def test_a_turn_that_fails_unheard_is_a_fault() -> None:
     scene.daemon.post(Command.STOP)
     scene.live(0.2, 0.3)
     assert scene.daemon.problem.startswith("a turn has failed, and no message of the model tells it so: ")
+
+
+def test_the_scan_from_before_the_start_is_decided_on_whatever_the_model_says_of_its_age() -> None:
+    scene = Scene(model=MODEL.replace(", max_age: 0.8", ""))
+    scene.daemon.post(DeviceUp(Device.DRIVE))
+    scene.daemon.post(DeviceUp(Device.SCANNER))
+    scene.scan(2.0)
+    scene.live(0.1)
+    assert scene.daemon.state is State.RUNNING
+    assert "drive.request" in scene.events()
+    assert "turn.request" not in scene.events()

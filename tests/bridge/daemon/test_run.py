@@ -148,17 +148,6 @@ def test_a_signed_supervisor_is_run_without_its_model(tmp_path: Path) -> None:
         assert (refused.returncode, "has been changed" in refused.stderr) == (2, True)
 
 
-def test_what_is_not_served_is_refused(tmp_path: Path) -> None:
-    model = EXAMPLES / "line_follower" / "line_follower.rscd"
-    made = bridge("init", "--model", str(model))
-    file = tmp_path / "bridge.yaml"
-    file.write_text(made.stdout)
-    done = bridge("run", "--model", str(model), "--config", str(file))
-    assert done.returncode == 2
-    assert "not served by this version of the bridge: " in done.stderr
-    assert "is tied to 'line'" in done.stderr
-
-
 def test_standby_without_a_remote_face_is_refused(tmp_path: Path) -> None:
     with SimulatedTurtleBot3("burger", "opencr", "lds01") as robot:
         file = configured(tmp_path, robot, "opencr")

@@ -1,14 +1,14 @@
 """The devices' workers, step by step: what goes out, what is reported, and what follows a failure."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import pytest
 
 from robosc_bridge.daemon.backoff import Backoff
 from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice
-from robosc_bridge.daemon.workers import SILENT_LIMIT, VALID_LIMIT, DriveWorker, ScannerWorker
+from robosc_bridge.daemon.workers import RESTART_LIMIT, SILENT_LIMIT, VALID_LIMIT, DriveWorker, ScannerWorker
 from robosc_bridge.devices.interface import (
     BINS,
     STANDSTILL,
@@ -54,6 +54,8 @@ class Gate:
         self.readings: list[DriveReading] = []
         self.failures = 0
         self.scans: list[float] = []
+        self.ranges_m: Sequence[float] = ()
+        self.noises: list[bool] = []
 
     def output(self, now_s: float) -> Output:
         self.asked.append(now_s)
@@ -65,8 +67,12 @@ class Gate:
     def drive_failed(self) -> None:
         self.failures += 1
 
-    def saw_scan(self, now_s: float) -> None:
+    def saw_scan(self, now_s: float, ranges_m: Sequence[float]) -> None:
         self.scans.append(now_s)
+        self.ranges_m = ranges_m
+
+    def saw_noise(self, is_noisy: bool) -> None:
+        self.noises.append(is_noisy)
 
 
 class Base:
@@ -283,7 +289,9 @@ def test_a_reset_is_done_once_before_the_next_exchange(scene: Scene) -> None:
     scene.worker.reset()
     scene.step()
     assert scene.taken() == ["reset", ("torque", True), ("exchange", STANDSTILL)]
-    assert scene.reports[0] == ResetDone()
+    # When it is told, it is known how the motors are.
+    assert scene.reports[0] == scene.gate.readings[-1]
+    assert scene.reports[1] == ResetDone()
     scene.step()
     assert scene.taken() == [("exchange", STANDSTILL)]
 
@@ -406,6 +414,59 @@ def test_a_silent_scanner_is_told_once_and_its_first_turn_again(turning: Scanner
     turning.scanner.coming = [scan(turning.clock.now_s)]
     turning.step()
     assert turning.reports[0] == DeviceUp(Device.SCANNER)
+
+
+def test_a_motor_that_stays_silent_is_restarted_so_often_and_then_opened_anew(turning: ScannerScene) -> None:
+    problem = f"no full turn, also after its motor was started anew {RESTART_LIMIT} times"
+    for is_first, retry_s in ((True, 0.5), (False, 1.0)):
+        turning.scanner.calls.clear()
+        while "close" not in turning.scanner.calls:
+            due_s = turning.worker.step(turning.clock.now_s)
+        assert [name for name in turning.scanner.calls if name != "open"] == ["restart"] * RESTART_LIMIT + ["close"]
+        assert turning.reports[-1] == DeviceDown(Device.SCANNER, problem, retry_s, is_first)
+        assert due_s - turning.clock.now_s == pytest.approx(retry_s)
+    # A turn makes good for all.
+    turning.scanner.calls.clear()
+    turning.step()
+    turning.scanner.coming = [scan(turning.clock.now_s)]
+    for _ in range(6 * RESTART_LIMIT):
+        turning.step()
+    assert turning.scanner.calls == ["open", *["restart"] * RESTART_LIMIT]
+
+
+def test_a_covered_scanner_that_turns_is_not_restarted(turning: ScannerScene) -> None:
+    covered = replace(scan(0.0), ranges_m=(math.nan,) * BINS)
+    for _ in range(40):
+        # A turn, and a wait for the next one that is in vain.
+        turning.scanner.coming = [covered]
+        turning.step()
+        turning.step()
+    assert turning.scanner.calls == []
+    assert [type(item) for item in turning.reports] == [DeviceDown]
+
+
+def test_what_a_turn_shows_is_told_to_the_safety_layer(turning: ScannerScene) -> None:
+    shown = replace(scan(100.1), ranges_m=(*[1.0] * 180, *[math.nan] * 180))
+    turning.scanner.coming = [shown]
+    turning.step()
+    assert turning.gate.ranges_m == shown.ranges_m
+
+
+def test_damaged_frames_are_told_with_their_numbers_once(
+    turning: ScannerScene, caplog: pytest.LogCaptureFixture
+) -> None:
+    counters = turning.scanner.counters
+    for bad in (10, 10, 11, 30, 6, 5, 5):
+        counters.bad_frames += bad
+        counters.frames += 100 - bad
+        turning.clock.now_s += 1.0
+        turning.scanner.coming = [scan(turning.clock.now_s)]
+        turning.step()
+    assert turning.gate.noises == [True, False]
+    assert [record.message for record in caplog.records] == [
+        "scanner: many frames are damaged: 11 of 100 in 1.0 s (11.0%)",
+        "scanner: its frames are sound again: 5 of 100 in 1.0 s (5.0%)",
+    ]
 
 
 def test_a_motor_that_falls_silent_is_restarted_again_and_again(turning: ScannerScene) -> None:

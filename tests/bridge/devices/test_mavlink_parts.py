@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from robosc_bridge.devices.interface import Pose, Velocity
 from robosc_bridge.devices.mavlink_odometry import VehicleOdometry, estimate
-from robosc_bridge.devices.mavlink_signing import Signing, SigningError
 from robosc_bridge.devices.mavlink_state import Told, VehicleState
 from robosc_bridge.protocol.mavlink_messages import (
     Answer,
@@ -22,6 +21,7 @@ from robosc_bridge.protocol.mavlink_messages import (
     Motion,
     Text,
 )
+from robosc_bridge.protocol.mavlink_signing import Signing, SigningError
 
 OWN = (255, 190)
 ROVER = Heartbeat(10, 3, False, 0)

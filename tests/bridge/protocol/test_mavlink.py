@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from robosc_bridge.protocol.mavlink import Codec, Decoder
+from robosc_bridge.protocol.mavlink import Codec, Decoder, is_signed
 from robosc_bridge.protocol.mavlink_messages import (
     Answer,
     Attitude,
@@ -26,6 +26,7 @@ from robosc_bridge.protocol.mavlink_messages import (
     command,
     entering,
     own_heartbeat,
+    vehicle_message,
     velocity_target,
 )
 
@@ -39,8 +40,8 @@ TARGET = (
 KEY = bytes(range(32))
 
 
-def _decoder() -> Decoder:
-    return Decoder(Codec(255, 190))
+def _decoder() -> Decoder[Message]:
+    return Decoder(Codec(255, 190), vehicle_message)
 
 
 def _said(make: Any) -> Any:
@@ -216,7 +217,7 @@ def test_a_signed_packet_is_longer_by_its_signature_and_counts_once() -> None:
     packet = Codec(1, 1, KEY, timestamp=1000).encode(own_heartbeat)
     assert len(packet) == 34
     assert packet[2] == 1
-    decoder = Decoder(Codec(255, 190, KEY, timestamp=1000))
+    decoder = Decoder(Codec(255, 190, KEY, timestamp=1000), vehicle_message)
     assert len(decoder.feed(packet)) == 1
     assert decoder.feed(packet) == []
     assert decoder.counts.bad_frames >= 1
@@ -224,18 +225,18 @@ def test_a_signed_packet_is_longer_by_its_signature_and_counts_once() -> None:
 
 @pytest.mark.parametrize("key", [None, bytes(32)])
 def test_what_is_not_signed_with_the_key_does_not_count(key: bytes | None) -> None:
-    decoder = Decoder(Codec(255, 190, KEY))
+    decoder = Decoder(Codec(255, 190, KEY), vehicle_message)
     assert decoder.feed(Codec(1, 1, key).encode(own_heartbeat)) == []
 
 
 def test_a_radio_has_no_key() -> None:
     status = Codec(51, 68).encode(lambda codec: codec.radio_status_encode(1, 2, 3, 4, 5, 6, 7))
-    assert len(Decoder(Codec(255, 190, KEY)).feed(status)) == 1
+    assert len(Decoder(Codec(255, 190, KEY), vehicle_message).feed(status)) == 1
 
 
 def test_a_forged_packet_from_the_future_shuts_nobody_out() -> None:
     vehicle = Codec(1, 1, KEY, timestamp=1000)
-    decoder = Decoder(Codec(255, 190, KEY, timestamp=1000))
+    decoder = Decoder(Codec(255, 190, KEY, timestamp=1000), vehicle_message)
     assert decoder.feed(Codec(1, 1, bytes(32), timestamp=2**47).encode(own_heartbeat)) == []
     assert len(decoder.feed(vehicle.encode(own_heartbeat))) == 1
     damaged = bytearray(vehicle.encode(own_heartbeat))
@@ -251,10 +252,52 @@ def test_time_goes_on_by_packets_by_the_clock_and_by_what_is_heard() -> None:
     codec.not_before(5000)
     codec.not_before(4000)
     assert codec.timestamp == 5000
-    Decoder(codec).feed(Codec(1, 1, KEY, timestamp=9000).encode(own_heartbeat))
+    Decoder(codec, vehicle_message).feed(Codec(1, 1, KEY, timestamp=9000).encode(own_heartbeat))
     assert codec.timestamp == 9000
 
 
 def test_a_short_key_is_refused() -> None:
     with pytest.raises(ValueError, match="32 bytes, not 4"):
         Codec(1, 1, b"open")
+
+
+def test_a_datagram_is_taken_packet_by_packet() -> None:
+    old = bytes.fromhex("fe 09 00 ff be 00 00 00 00 00 06 08 00 00 03 00 00")
+    unknown = bytes.fromhex("fd 01 00 00 00 01 01 ff ff ff 00 00 00")
+    damaged = bytes.fromhex(HEARTBEAT)[:-1] + b"\0"
+    good = bytes.fromhex(HEARTBEAT + ACK)
+    decoder = _decoder()
+    found = decoder.take_datagram(old + unknown + damaged + good + good[:15])
+    assert found == [Message(1, 191, Heartbeat(18, 8, False, 0)), Message(1, 191, Answer(400, 0, 255, 190))]
+    assert (decoder.counts.frames, decoder.counts.bad_frames) == (2, 3)
+    assert decoder.counts.skipped_bytes == len(old + unknown + damaged) + 15
+    # Noise is not searched through, and nothing is kept for the next one.
+    assert decoder.take_datagram(b"x" + good) == []
+    assert decoder.take_datagram(good[15:]) == []
+    assert len(decoder.take_datagram(good)) == 2
+
+
+@given(st.binary(max_size=400))
+def test_every_byte_of_a_datagram_is_counted(data: bytes) -> None:
+    decoder = _decoder()
+    found = decoder.take_datagram(b"\xfd" + data)
+    assert found == []
+    assert decoder.counts.skipped_bytes == len(data) + 1
+
+
+def test_what_may_come_unsigned_does_and_says_so() -> None:
+    read: list[bool] = []
+
+    def note(told: Any) -> bool:
+        read.append(is_signed(told))
+        return True
+
+    codec = Codec(1, 1, KEY, timestamp=1000, unsigned=frozenset({76}))
+    decoder = Decoder(codec, note)
+    stop = command(1, 1, Command.ARM_DISARM, 0, *arming(False))
+    for key in (None, bytes(32)):
+        assert decoder.feed(Codec(255, 190, key, timestamp=2**47).encode(stop)) == [True]
+        assert decoder.feed(Codec(255, 190, key, timestamp=2**47).encode(own_heartbeat)) == []
+    # Nor has the forged one from the future moved the time of the stream.
+    assert decoder.feed(Codec(255, 190, KEY, timestamp=2000).encode(stop)) == [True]
+    assert read == [False, False, True]

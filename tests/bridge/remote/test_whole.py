@@ -15,7 +15,7 @@ import pytest
 
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_bridge.simulated import SimulatedTurtleBot3
-from support.driven import preferred
+from support.real_time import preferred
 from support.remote import Attachment, connected, eventually
 from support.terminals import Terminal
 

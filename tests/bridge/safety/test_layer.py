@@ -44,6 +44,12 @@ def test_every_call_may_be_the_first() -> None:
     assert not layer.output(101.0).is_torque_wanted
 
 
+def test_before_the_first_command_there_is_nothing_to_warn_of() -> None:
+    layer = Bench().layer
+    layer.saw_scan(100.0, (math.nan,) * 360)
+    assert layer.output(100.0).warnings == ()
+
+
 def test_torque_comes_first_then_a_new_command() -> None:
     bench = Bench()
     bench.cycle()

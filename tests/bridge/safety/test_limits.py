@@ -9,7 +9,7 @@ import pytest
 from robosc_bridge.safety import SCAN_TIMEOUTS_S, SafetyLimits
 from support.safety import LIMITS
 
-NUMBERS = [each.name for each in fields(SafetyLimits) if each.name != "is_torque_off_on_operator_stop"]
+NUMBERS = [each.name for each in fields(SafetyLimits) if not each.name.startswith("is_")]
 LONGEST = {
     "command_timeout_s": 1.0,
     "scan_timeout_s": 2.0,
@@ -61,7 +61,9 @@ def test_the_defaults_are_those_of_the_page() -> None:
         torque_on_s=2.0,
         torque_off_s=1.0,
         standstill_m_s=0.01,
+        min_valid_share=0.05,
         is_torque_off_on_operator_stop=False,
+        is_stopped_when_blind=False,
     )
     assert SCAN_TIMEOUTS_S == {"lds01": 0.6, "lds02": 0.5, "lds03": 0.3}
 
@@ -72,6 +74,13 @@ def test_a_time_has_a_longest_value(name: str, longest: float) -> None:
     beyond = math.nextafter(longest, math.inf)
     with pytest.raises(ValueError, match=f"^{name} must be at most {longest} s, not {beyond}$"):
         changed(name, beyond)
+
+
+def test_a_share_is_at_most_all() -> None:
+    assert changed("min_valid_share", 1.0).min_valid_share == 1.0
+    beyond = math.nextafter(1.0, 2.0)
+    with pytest.raises(ValueError, match=f"^min_valid_share must be at most 1, not {beyond}$"):
+        changed("min_valid_share", beyond)
 
 
 @pytest.mark.parametrize(
@@ -97,6 +106,6 @@ def test_only_scanner_and_operator_may_be_missing() -> None:
 
 
 def test_all_problems_are_told_at_once() -> None:
-    wrong: dict[str, Any] = {"linear_m_s": 0, "torque_off_s": 300, "battery_warn_v": 11}
-    with pytest.raises(ValueError, match=r"^linear_m_s .*; torque_off_s .*; battery_warn_v .*$"):
+    wrong: dict[str, Any] = {"linear_m_s": 0, "torque_off_s": 300, "battery_warn_v": 11, "min_valid_share": 5}
+    with pytest.raises(ValueError, match=r"^linear_m_s .*; torque_off_s .*; battery_warn_v .*; min_valid_share .*$"):
         replace(LIMITS, **wrong)

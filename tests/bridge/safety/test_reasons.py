@@ -49,7 +49,7 @@ def test_every_reason_is_a_sentence_and_either_latches_or_not() -> None:
     told = {*LATCHED, Reason.WHEEL_ASTRAY, Reason.BATTERY_LOW}
     assert set(LATCHING) == told
     others = {reason for reason, _ in END_BY_THEMSELVES.values()}
-    assert told | others | {Reason.STANDBY, Reason.CLOCK, Reason.TORQUE_AWAITED} == set(Reason)
+    assert told | others | {Reason.STANDBY, Reason.CLOCK, Reason.TORQUE_AWAITED, Reason.SCAN_BLIND} == set(Reason)
     assert all(text.endswith(".") and text[0].isupper() for text in [*Reason, *Caution])
 
 
@@ -348,6 +348,81 @@ def test_several_reasons_are_told_together_in_their_order() -> None:
     bench.layer.operator_stop()
     bench.silent |= {"scan"}
     assert bench.cycles(1.0).reasons == (Reason.OPERATOR_STOP, Reason.SUPERVISOR_FAULT, Reason.SCAN_STALE)
+
+
+AHEAD, BEHIND, NOWHERE = (
+    tuple(1.0 if degree in seen else math.nan for degree in range(360))
+    for seen in ({*range(90), *range(270, 360)}, set(range(90, 270)), set[int]())
+)
+
+
+@pytest.mark.parametrize(("blind", "speed_m_s"), [(BEHIND, 0.1), (AHEAD, -0.1), (NOWHERE, 0.1), (NOWHERE, -0.1)])
+def test_where_the_scanner_sees_nothing_a_person_is_told(blind: tuple[float, ...], speed_m_s: float) -> None:
+    bench = Bench()
+    bench.ranges_m = blind
+    bench.drive(speed_m_s)
+    assert bench.last.warnings == (Caution.SCAN_BLIND,)
+    assert bench.last.reasons == ()
+    # Not where it does not go to.
+    bench.wanted = Velocity(0.0, 0.5)
+    assert bench.cycle().warnings == ()
+    bench.wanted = Velocity(-speed_m_s)
+    assert bench.cycle().warnings == ((Caution.SCAN_BLIND,) if blind is NOWHERE else ())
+    bench.wanted = Velocity(speed_m_s)
+    assert bench.cycle().warnings == (Caution.SCAN_BLIND,)
+    bench.layer.command(Velocity(math.nan), bench.now_s)
+    assert bench.layer.output(bench.now_s).warnings == (Caution.COMMAND_REFUSED,)
+    assert bench.cycle().warnings == (Caution.SCAN_BLIND,)
+    bench.silent.add("command")
+    bench.layer.disable()
+    assert bench.cycle().warnings == ()
+
+
+def test_where_the_scanner_sees_nothing_the_robot_may_not_go_if_it_is_configured() -> None:
+    bench = Bench(is_stopped_when_blind=True)
+    bench.ranges_m = AHEAD
+    bench.drive(0.1)
+    bench.ranges_m = BEHIND
+    assert bench.cycle().velocity == STANDSTILL
+    # It does not flutter while the command is repeated.
+    for _ in range(50):
+        assert bench.cycle().velocity == STANDSTILL
+        assert bench.last.reasons == (Reason.SCAN_BLIND,)
+    assert bench.last.is_torque_wanted
+    # It may turn to where it sees something, and go back.
+    bench.wanted = Velocity(0.0, 0.5)
+    assert bench.cycle().reasons == ()
+    assert bench.cycles(0.5).velocity == Velocity(0.0, 0.5)
+    bench.wanted = Velocity(-0.1)
+    assert bench.cycles(0.5).velocity == Velocity(-0.1)
+    bench.wanted = Velocity(0.1)
+    assert bench.cycle().reasons == (Reason.SCAN_BLIND,)
+    bench.ranges_m = AHEAD
+    assert bench.cycle().reasons == ()
+    assert bench.cycles(0.5).velocity == Velocity(0.1)
+
+
+def test_a_reset_forgets_where_it_was_to_go() -> None:
+    bench = Bench(is_stopped_when_blind=True)
+    bench.ranges_m = AHEAD
+    bench.drive(0.1)
+    bench.layer.operator_stop()
+    bench.cycle()
+    bench.ranges_m = BEHIND
+    bench.cycle()
+    bench.silent.add("command")
+    assert bench.layer.reset() == ()
+    assert bench.cycle().reasons == (Reason.STANDBY,)
+
+
+def test_damaged_frames_are_told() -> None:
+    bench = Bench()
+    bench.drive()
+    bench.layer.saw_noise(True)
+    assert bench.cycle().warnings == (Caution.SCAN_NOISY,)
+    assert bench.last.velocity == Velocity(0.1)
+    bench.layer.saw_noise(False)
+    assert bench.cycle().warnings == ()
 
 
 def test_without_scanner_and_operator_none_is_missed() -> None:

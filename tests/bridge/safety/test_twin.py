@@ -16,6 +16,11 @@ from support.safety_twin import SafetyTwin
 SPEEDS = st.sampled_from([0.0, -0.0, 0.005, 0.1, 0.2, -0.2, 0.5, 3.0, -3.0, math.nan, math.inf]) | st.floats(-3, 3)
 # Behind the clock or ahead of it, and no time at all; most reports come just in time.
 SHIFTS = st.sampled_from([0.0] * 6 + [0.01, 0.1, 50.0, -0.1, -0.4, -1.0, math.nan, math.inf])
+SEEN, NOT_SEEN = (1.0,) * 180, (math.nan,) * 180
+# Front and left, back and right, all and nothing; or not told.
+SCANS = st.sampled_from(
+    [(), SEEN + SEEN, SEEN + NOT_SEEN, NOT_SEEN + SEEN, (*SEEN[90:], *NOT_SEEN, *SEEN[90:]), NOT_SEEN * 2]
+)
 STEPS = st.sampled_from([STEP_S] * 8 + [0.0, 0.001, 0.15, 0.25, 0.7, 2.1, 6.0])
 FAULTS = st.sampled_from([frozenset[MotorFault]()] * 8 + [frozenset({fault}) for fault in MotorFault])
 
@@ -28,9 +33,15 @@ class Sequence(RuleBasedStateMachine):
         self.now_s = 100.0
         self.last = Output(STANDSTILL, False, (), ())
 
-    @initialize(is_off=st.booleans(), needs_all=st.booleans(), is_driving=st.sampled_from([True, True, False]))
-    def begin(self, is_off: bool, needs_all: bool, is_driving: bool) -> None:
-        changes: dict[str, Any] = {"is_torque_off_on_operator_stop": is_off, "battery_mean_s": 0.1, "astray_s": 0.1}
+    @initialize(
+        is_off=st.booleans(),
+        needs_all=st.booleans(),
+        is_driving=st.sampled_from([True, True, False]),
+        is_stopped=st.booleans(),
+    )
+    def begin(self, is_off: bool, needs_all: bool, is_driving: bool, is_stopped: bool) -> None:
+        changes: dict[str, Any] = {"is_torque_off_on_operator_stop": is_off, "is_stopped_when_blind": is_stopped}
+        changes |= {"battery_mean_s": 0.1, "astray_s": 0.1}
         if not needs_all:
             changes |= {"scan_timeout_s": None, "operator_timeout_s": None}
         self.limits = LIMITS.__class__(**{**LIMITS.__dict__, **changes})
@@ -105,6 +116,11 @@ class Sequence(RuleBasedStateMachine):
         self.twin.tells(found)
         if faults - {MotorFault.VOLTAGE}:
             self.stopped.add(Reason.MOTOR_FAULT)
+
+    @rule(ranges_m=SCANS)
+    def scan(self, ranges_m: tuple[float, ...]) -> None:
+        self.layer.saw_scan(self.now_s, ranges_m)
+        self.twin.happens("scan", ranges_m, self.now_s)
 
     @rule()
     def failure(self) -> None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from robosc_bridge.safety.watches import BatteryWatch, Freshness, WheelWatch
+from robosc_bridge.safety.watches import BatteryWatch, Freshness, SightWatch, WheelWatch
 from support.safety import LIMITS
 
 # Powers of two: no rounding at the borders.
@@ -33,6 +33,60 @@ def test_a_report_from_the_future_counts_from_when_it_is_looked_at() -> None:
     assert not watch.is_stale(10.0)
     assert not watch.is_stale(10.5)
     assert watch.is_stale(10.625)
+
+
+SEEN = {"ahead": {*range(31), *range(330, 360)}, "behind": set(range(150, 211))}
+
+
+def scan(*degrees: int) -> tuple[float, ...]:
+    """Ranges with valid ones at these degrees alone."""
+    return tuple(1.0 if degree in degrees else math.nan for degree in range(360))
+
+
+@pytest.mark.parametrize(("sector", "speed_m_s"), [("ahead", 0.001), ("behind", -0.001)])
+def test_each_degree_of_a_sector_counts_and_no_other(sector: str, speed_m_s: float) -> None:
+    watch = SightWatch(1.0)
+    inside = SEEN[sector]
+    watch.hear(scan(*inside))
+    assert not watch.is_blind(speed_m_s)
+    assert watch.is_blind(-speed_m_s)
+    assert not watch.is_blind(0.0)
+    for degree in inside:
+        watch.hear(scan(*inside - {degree}))
+        assert watch.is_blind(speed_m_s), degree
+    one = SightWatch(0.01)
+    for degree in range(360):
+        one.hear(scan(degree))
+        assert one.is_blind(speed_m_s) is (degree not in inside)
+
+
+@pytest.mark.parametrize("nothing", [math.nan, math.inf, -math.inf])
+def test_what_is_no_number_is_not_seen(nothing: float) -> None:
+    watch = SightWatch(0.5)
+    watch.hear((nothing,) * 360)
+    assert watch.is_blind(0.1) and watch.is_blind(-0.1)
+
+
+@pytest.mark.parametrize("missing", [0, 30, 31, 61])
+def test_a_sector_is_blind_below_its_share(missing: int) -> None:
+    # 61 ranges: half of them are 30.5.
+    watch = SightWatch(0.5)
+    watch.hear(scan(*sorted(SEEN["ahead"])[missing:]))
+    assert watch.is_blind(0.1) is (missing >= 31)
+
+
+def test_before_the_first_scan_nothing_is_missing() -> None:
+    watch = SightWatch(1.0)
+    assert not watch.is_blind(1.0) and not watch.is_blind(-1.0)
+
+
+def test_exactly_the_share_is_enough() -> None:
+    watch = SightWatch(0.25)
+    # 61 ranges: 15.25.
+    watch.hear(scan(*range(16)))
+    assert not watch.is_blind(0.1)
+    watch.hear(scan(*range(15)))
+    assert watch.is_blind(0.1)
 
 
 @pytest.mark.parametrize("time_s", [math.nan, math.inf, -math.inf])

@@ -1,6 +1,7 @@
 """The simulator as a program of its own, and what can be told to it."""
 
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -64,6 +65,24 @@ def test_it_serves_until_it_is_interrupted(number: int, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def test_with_a_line_it_serves_a_camera_as_well(tmp_path: Path) -> None:
+    track = tmp_path / "track"
+    track.write_text("0 0\n2 0\n")
+    for arguments in (["--line", "oval"], ["--line", str(track), "--camera-link", str(tmp_path / "camera")]):
+        program = Program(*arguments)
+        with program.process as process:
+            found = dict(program.output.readline().split() for _ in range(3))
+            assert list(found) == ["base", "scanner", "camera"]
+            with socket.socket(socket.AF_UNIX) as client:
+                client.settimeout(10.0)
+                client.connect(found["camera"])
+                assert client.recv(15, socket.MSG_WAITALL) == b"P5 160 120 255\n"
+            process.terminate()
+            assert process.wait(10) == 0
+    assert found["camera"] == str(tmp_path / "camera")
+    assert list(tmp_path.iterdir()) == [track]
+
+
 def test_it_goes_on_when_its_input_ends() -> None:
     program = Program("--lidar", "lds01")
     with program.process as process:
@@ -81,6 +100,9 @@ def test_it_goes_on_when_its_input_ends() -> None:
         (["--speed", "0"], "speed factor"),
         (["--walls", "/nowhere"], "No such file"),
         (["--maze", "0x2"], "one cell"),
+        (["--line", "/nowhere"], "No such file"),
+        (["--line", "/dev/null"], "at least two points"),
+        (["--camera-link", "/dev/null"], "something at /dev/null already"),
     ],
 )
 def test_what_cannot_be_simulated_is_told(

@@ -9,7 +9,10 @@ from pathlib import Path
 import pytest
 
 from robosc_bridge.errors import LineBusyError, LineError, LineLostError, LineMissingError
+from robosc_bridge.transport.lines import open_line
 from robosc_bridge.transport.network_line import NetworkLine, is_network_address
+from robosc_bridge.transport.serial_line import SerialLine
+from support.pty_end import PtyEnd
 
 
 @pytest.fixture
@@ -145,3 +148,35 @@ def test_a_closed_line_is_told_and_leaves_nothing(peer: socket.socket) -> None:
         line.read(0.0)
     with pytest.raises(LineLostError, match="closed"):
         line.write(b"x")
+
+
+def test_who_listens_can_tell_strangers_and_answer_them(peer: socket.socket) -> None:
+    line = NetworkLine("udpin:127.0.0.1:0")
+    line.reply(b"to nobody")
+    peer.sendto(b"first", ("127.0.0.1", line.port))
+    assert line.read(3.0) == b"first"
+    assert not line.is_stranger
+    line.answer_sender()
+    assert not line.is_stranger
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.settimeout(3.0)
+        other.sendto(b"second", ("127.0.0.1", line.port))
+        assert line.read(3.0) == b"second"
+        assert line.is_stranger
+        line.reply(b"to the other")
+        assert other.recv(100) == b"to the other"
+    line.write(b"to the peer")
+    assert peer.recv(100) == b"to the peer"
+    line.close()
+
+
+def test_a_line_is_opened_by_its_address(peer: socket.socket) -> None:
+    line = open_line(f"udpout:127.0.0.1:{_port(peer)}", 9600)
+    assert isinstance(line, NetworkLine)
+    line.close()
+    end = PtyEnd()
+    serial = open_line(end.path, 9600)
+    assert isinstance(serial, SerialLine)
+    assert serial.baud == 9600
+    serial.close()
+    end.unplug()

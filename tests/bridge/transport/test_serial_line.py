@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import fcntl
 import os
 import resource
 import termios
@@ -9,8 +10,10 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+import serial.serialposix
 
 from robosc_bridge.errors import (
     BridgeError,
@@ -35,6 +38,24 @@ def pty() -> Iterator[PtyEnd]:
 def line(pty: PtyEnd) -> Iterator[SerialLine]:
     with SerialLine(pty.path, 115200) as opened:
         yield opened
+
+
+def test_an_adapter_is_told_to_keep_no_bytes_back(pty: PtyEnd, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The setting of a UART's driver, `struct serial_struct` of the kernel: a pseudo-terminal has none."""
+    wanted = []
+
+    def ioctl(file: int, request: int, argument: Any = 0, mutate: bool = True) -> Any:
+        if request == termios.TIOCGSERIAL:
+            return 0
+        if request == termios.TIOCSSERIAL:
+            wanted.append(argument[4] & 0x2000)  # ASYNC_LOW_LATENCY among its flags
+            return 0
+        return real(file, request, argument, mutate)
+
+    real = fcntl.ioctl
+    monkeypatch.setattr(serial.serialposix.fcntl, "ioctl", ioctl)
+    with SerialLine(pty.path, 1_000_000):
+        assert wanted == [0x2000]
 
 
 def _everything(line: SerialLine, length: int) -> bytes:

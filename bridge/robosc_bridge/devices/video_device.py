@@ -1,29 +1,22 @@
-"""Where pictures come from: a V4L2 device through OpenCV, or whoever else has them (a simulator)."""
+"""A V4L2 device or a film through OpenCV, whose calls may wait for ever: for a process of its own."""
 
 import errno
+import math
 import os
 from pathlib import Path
-from typing import Protocol
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
+from robosc_bridge.devices.camera import DENIED, MISSING
 from robosc_bridge.errors import LineDeniedError, LineError, LineLostError, LineMissingError
-from robosc_bridge.skills.line import Picture
 
+Picture = NDArray[np.uint8]
+"""Rows of pixels from above: blue, green and red, or shades of grey."""
 
-class PictureSource(Protocol):
-    """A camera; used from one thread of its own, for pictures are waited for."""
-
-    def read(self) -> Picture:
-        """The next picture, waiting for it.
-
-        Raises:
-            LineLostError: The camera is gone, or has no more pictures.
-        """
-
-    def close(self) -> None:
-        """Give the camera back; may be called again."""
+# No film is watched faster or slower than this, whatever its file says.
+_SLOWEST_S, _FASTEST_S = 1.0, 0.005
 
 
 class VideoDevice:
@@ -41,13 +34,23 @@ class VideoDevice:
     def __init__(self, path: str) -> None:
         self._path = path
         _require_readable(path)
-        kind = cv2.CAP_V4L2 if Path(path).is_char_device() else cv2.CAP_ANY
-        self._capture = cv2.VideoCapture(path, kind)
+        self._is_film = not Path(path).is_char_device()
+        self._capture = cv2.VideoCapture(path, cv2.CAP_ANY if self._is_film else cv2.CAP_V4L2)
         if not self._capture.isOpened():
             self._capture.release()
             raise LineError(path, "no pictures can be read: another program uses it, or it is no camera")
         # The newest picture counts: those that wait show the past. Not every device can do so.
         self._capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
+
+    @property
+    def period_s(self) -> float:
+        """Time between pictures that must be waited for; 0: reading waits for them."""
+        if not self._is_film:
+            return 0.0
+        rate = float(self._capture.get(cv2.CAP_PROP_FPS))
+        if not (math.isfinite(rate) and rate > 0.0):
+            return _SLOWEST_S
+        return min(max(1.0 / rate, _FASTEST_S), _SLOWEST_S)
 
     def read(self) -> Picture:
         """The next picture, waiting for it.
@@ -77,7 +80,7 @@ def _require_readable(path: str) -> None:
     except OSError as error:
         match error.errno:
             case errno.ENOENT | errno.ENODEV | errno.ENXIO:
-                raise LineMissingError(path, "there is no such camera; is it plugged in?") from error
+                raise LineMissingError(path, MISSING) from error
             case errno.EACCES | errno.EPERM:
-                raise LineDeniedError(path, "no permission; is this user in the group video?") from error
+                raise LineDeniedError(path, DENIED) from error
         raise LineError(path, f"cannot be opened: {error.strerror}") from error

@@ -1,6 +1,7 @@
 """The key of MAVLink signing, and its time, which must never be used twice, not even across restarts.
 
-Source: mavlink.io, "Message Signing". It says who sent a packet; it hides nothing.
+Source: mavlink.io, "Message Signing". It says who sent a packet; it hides nothing. Of this package it alone reads files
+and the clock.
 """
 
 import time
@@ -12,7 +13,8 @@ from robosc_bridge.protocol.mavlink import KEY_LENGTH
 
 _EPOCH_S = 1_420_070_400  # 2015-01-01 in UTC.
 _UNITS_PER_S = 100_000
-_RESERVED = 60 * _UNITS_PER_S
+# Whoever begins anew within this time is ahead of the clock by as much; others are heard up to a minute behind.
+_RESERVED = 10 * _UNITS_PER_S
 
 
 class SigningError(DeviceError):
@@ -43,8 +45,8 @@ class Signing:
 class SigningTime:
     """A time that only goes on.
 
-    It is reserved in steps ahead of what is used, so that a file is written once a minute and a program that is killed
-    has used nothing beyond what its successor begins with.
+    It is reserved in steps ahead of what is used, so that a file is written every ten seconds and a program that is
+    killed has used nothing beyond what its successor begins with.
 
     Args:
         key: Of signing.
@@ -76,7 +78,18 @@ class SigningTime:
         """
         if timestamp < self._reserved:
             return
-        self._reserved = timestamp + _RESERVED
+        self._keep(timestamp + _RESERVED)
+
+    def release(self, timestamp: int) -> None:
+        """Nothing is signed any more: a successor may begin with this one.
+
+        Raises:
+            SigningError: It cannot be kept.
+        """
+        self._keep(timestamp)
+
+    def _keep(self, timestamp: int) -> None:
+        self._reserved = timestamp
         written = self._path.with_name(self._path.name + ".new")
         try:
             written.write_text(str(self._reserved), encoding="ascii")

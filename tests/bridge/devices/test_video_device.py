@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
+from robosc_bridge.devices.video_device import VideoDevice
 from robosc_bridge.errors import LineDeniedError, LineError, LineLostError, LineMissingError
 from robosc_bridge.skills import LineSettings
-from robosc_bridge.skills.camera import PictureSource, VideoDevice
 from robosc_bridge.skills.line import line_offset
 
 
@@ -23,7 +23,7 @@ def film(path: Path, middles: tuple[int, ...]) -> Path:
 
 
 def test_pictures_of_a_film_show_its_line_until_it_ends(tmp_path: Path) -> None:
-    source: PictureSource = VideoDevice(str(film(tmp_path / "line.avi", (12, 32, 52))))
+    source = VideoDevice(str(film(tmp_path / "line.avi", (12, 32, 52))))
     seen = [line_offset(source.read(), LineSettings()) for _ in range(3)]
     assert seen == pytest.approx([0.5 - middle / 64 for middle in (12, 32, 52)], abs=0.02)
     with pytest.raises(LineLostError, match="no more pictures"):
@@ -56,6 +56,6 @@ def test_a_camera_that_one_may_not_open_is_told(tmp_path: Path, monkeypatch: pyt
     def refuse(*_: object) -> int:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("robosc_bridge.skills.camera.os.open", refuse)
+    monkeypatch.setattr("robosc_bridge.devices.video_device.os.open", refuse)
     with pytest.raises(LineDeniedError, match="in the group video"):
         VideoDevice(str(tmp_path))

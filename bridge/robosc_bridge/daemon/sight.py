@@ -1,0 +1,44 @@
+"""Whether a model needs the camera, and the worker that looks through it."""
+
+from collections.abc import Callable
+
+from robosc.execution.settings import Settings
+from robosc_bridge.configuration.channels import FaultChannel, LineChannel, LineLostChannel
+from robosc_bridge.configuration.ties import Ties
+from robosc_bridge.daemon.reports import Report
+from robosc_bridge.daemon.workers import Worker
+from robosc_bridge.skills.settings import LineSettings
+
+
+def needs_camera(ties: Ties) -> bool:
+    """Whether a communication is tied to what the camera shows, or to its faults; `any` device alone needs none."""
+    faults = (tied for _, tied in ties.tied_to(FaultChannel))
+    return bool(
+        ties.tied_to(LineChannel)
+        or ties.tied_to(LineLostChannel)
+        or any(isinstance(tied, FaultChannel) and tied.device == "camera" for tied in faults)
+    )
+
+
+def sight_problems(line: LineSettings, ties: Ties, settings: Settings) -> list[str]:
+    """What is wrong with how the line is to be seen; nobody may follow one that no one tells is lost."""
+    found = []
+    if needs_camera(ties) and line.camera == "simulated":
+        found.append("skills.line.camera: tell where the simulator serves its pictures, as simulated:PATH")
+    if not ties.tied_to(LineLostChannel):
+        found += [
+            f"'{item.name}' ('{item.identifier}') is tied to 'line', and nothing tells when the line is lost: tie a "
+            f"message to 'line_lost', or set execution.max_age_s for '{item.identifier}'"
+            for item, _ in ties.tied_to(LineChannel)
+            if item.max_age is None and item.identifier not in settings.max_age_s
+        ]
+    return found
+
+
+def camera_worker(settings: LineSettings, report: Callable[[Report], None], clock: Callable[[], float]) -> Worker:
+    """What keeps the camera open, which is not opened yet."""
+    # OpenCV and numpy are for those who look.
+    from robosc_bridge.daemon.camera_worker import CameraWorker
+    from robosc_bridge.devices.camera import make_camera
+
+    return CameraWorker(make_camera(settings.camera), settings, report, clock)

@@ -1,0 +1,223 @@
+"""Commands of ground stations: each is answered once, whatever becomes of it, and none makes anybody wait.
+
+A command that is repeated because its answer was lost changes nothing a second time. Stopping takes effect before it is
+answered. What the daemon answers later is waited for without waiting; what it does not answer has failed, and is undone
+where it could still make the robot move.
+"""
+
+import struct
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+
+from robosc_bridge.daemon.operations import Operations
+from robosc_bridge.daemon.states import Command as Wish
+from robosc_bridge.ground.commands import Change, Checks, Interval, Meaning, Once, Parameters, Refusal, Stop
+from robosc_bridge.ground.notices import standing
+from robosc_bridge.ground.status import is_held, run_mode
+from robosc_bridge.ground.stream import HEARTBEAT, Stream
+from robosc_bridge.ground.telemetry import Make
+from robosc_bridge.ground.texts import Severity
+from robosc_bridge.protocol.mavlink_messages import Result
+
+ANSWER_LIMIT_S = 5.0
+RESET_LIMIT_S = 20.0
+"""How long the daemon may take for an answer."""
+
+REPEATED_S = 10.0
+"""For so long it is known how a command was answered, if its sender asks again."""
+
+_MOST_PENDING = 8
+_MOST_REMEMBERED = 32
+# A stop is on its way into the next snapshot.
+_STOP_SHOWN_S = 1.0
+_SAME_STOP_S = 0.05
+_UNDONE_BY = {Wish.START: Wish.STANDBY, Wish.RESUME: Wish.STOP}
+
+type Say = Callable[[Severity, str], None]
+type _Key = tuple[tuple[int, int], int, bytes]
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A command as it came.
+
+    Attributes:
+        sender: System and component.
+        number: MAV_CMD.
+        parameters: Its seven.
+        is_repeated: Whether its sender says that it was sent before.
+    """
+
+    sender: tuple[int, int]
+    number: int
+    parameters: Parameters
+    is_repeated: bool = False
+
+    @property
+    def key(self) -> _Key:
+        """What makes it the same command; parameters may be no numbers."""
+        return self.sender, self.number, struct.pack("<7d", *self.parameters)
+
+
+@dataclass(frozen=True)
+class _Pending:
+    asked: Asked
+    wish: Wish
+    answer: "Future[str]"
+    since_s: float
+
+
+def acknowledgement(asked: Asked, result: Result) -> Make:
+    """The answer to a command, for its sender."""
+    system, component = asked.sender
+    return lambda codec: codec.command_ack_encode(asked.number, int(result), 0, 0, system, component)
+
+
+class Asking:
+    """Commands and their answers.
+
+    Args:
+        operations: The daemon.
+        stream: What is told of it.
+        say: Tells a person something.
+    """
+
+    def __init__(self, operations: Operations, stream: Stream, say: Say) -> None:
+        self._operations = operations
+        self._stream = stream
+        self._say = say
+        self._pending: dict[_Key, _Pending] = {}
+        self._remembered: dict[_Key, tuple[Result, float]] = {}
+        self._stops_s: dict[Stop, float] = {}
+
+    def stop(self, stop: Stop, by: tuple[int, int], now_s: float) -> None:
+        """Stop now."""
+        ordered_s = self._stops_s.get(stop)
+        if ordered_s is not None and 0.0 <= now_s - ordered_s < _SAME_STOP_S:
+            return  # Nothing else was ordered since: a flood of stops is one.
+        self._stops_s[stop] = now_s
+        self._operations.order(stop.wish, _name(by))
+
+    def take(self, asked: Asked, wanted: Meaning, now_s: float) -> list[Make]:
+        """Obey a command; what goes to its sender at once.
+
+        Args:
+            asked: As it came.
+            wanted: What it means.
+            now_s: The time.
+        """
+        if isinstance(wanted, Stop):
+            self.stop(wanted, asked.sender, now_s)
+            return [acknowledgement(asked, Result.ACCEPTED)]
+        if asked.key in self._pending:
+            return [acknowledgement(asked, Result.IN_PROGRESS)]
+        known = self._remembered.get(asked.key)
+        if isinstance(wanted, Change) and asked.is_repeated and known is not None and now_s - known[1] <= REPEATED_S:
+            return [acknowledgement(asked, known[0])]
+        match wanted:
+            case Change():
+                return self._change(asked, wanted, now_s)
+            case Checks():
+                return [acknowledgement(asked, self._checks(now_s))]
+            case Interval(message, interval_s):
+                return [acknowledgement(asked, self._interval(message, interval_s))]
+            case Once(message):
+                found = self._stream.once(message, now_s)
+                if found is None:
+                    return [acknowledgement(asked, Result.UNSUPPORTED)]
+                return [acknowledgement(asked, Result.ACCEPTED if found else Result.TEMPORARILY_REJECTED), *found]
+            case Refusal(result, why):
+                if why:
+                    self._say(Severity.WARNING, why)
+                return [acknowledgement(asked, result)]
+
+    def look(self, now_s: float) -> list[Make]:
+        """The answers that have come."""
+        found = []
+        for key, pending in list(self._pending.items()):
+            limit_s = RESET_LIMIT_S if pending.wish is Wish.RESET else ANSWER_LIMIT_S
+            if pending.answer.done():
+                result = self._result(pending)
+            elif now_s - pending.since_s > limit_s:
+                result = self._unanswered(pending)
+            else:
+                continue
+            del self._pending[key]
+            found.append(self._answered(pending.asked, result, now_s))
+        return found
+
+    def _change(self, asked: Asked, change: Change, now_s: float) -> list[Make]:
+        if self._stream.is_stale(now_s) or self._stream.snapshot is None:
+            self._say(Severity.WARNING, "The bridge's loop does not turn.")
+            return [self._answered(asked, Result.TEMPORARILY_REJECTED, now_s)]
+        own = run_mode(self._operations.is_layer)
+        if change.mode is not None and change.mode is not own:
+            self._say(Severity.NOTICE, f"The supervisor runs in mode {own.name}, not {change.mode.name}.")
+        if change.wish is Wish.RESUME and not self._is_held(now_s):
+            return [self._answered(asked, Result.ACCEPTED, now_s)]
+        if change.wish is Wish.RESET and self._stream.is_running:
+            self._say(Severity.WARNING, "The robot is armed: disarm it before it is reset.")
+            return [self._answered(asked, Result.TEMPORARILY_REJECTED, now_s)]
+        if len(self._pending) >= _MOST_PENDING:
+            return [acknowledgement(asked, Result.TEMPORARILY_REJECTED)]
+        self._stops_s.clear()
+        answer = self._operations.order(change.wish, _name(asked.sender))
+        self._pending[asked.key] = _Pending(asked, change.wish, answer, now_s)
+        return []
+
+    def _is_held(self, now_s: float) -> bool:
+        snapshot = self._stream.snapshot
+        stopped_s = self._stops_s.get(Stop.OPERATOR)
+        if stopped_s is not None and now_s - stopped_s < _STOP_SHOWN_S:
+            return True
+        return snapshot is not None and is_held(snapshot)
+
+    def _result(self, pending: _Pending) -> Result:
+        why = pending.answer.result()
+        if not why:
+            return Result.ACCEPTED
+        self._say(Severity.WARNING, f"{_NOT_DONE[pending.wish]}: {why}")
+        return Result.TEMPORARILY_REJECTED
+
+    def _unanswered(self, pending: _Pending) -> Result:
+        undone_by = _UNDONE_BY.get(pending.wish)
+        if undone_by is not None:
+            # What a person was told has failed does not happen later.
+            self._operations.order(undone_by, _name(pending.asked.sender))
+        self._say(Severity.ERROR, f"{_NOT_DONE[pending.wish]}: the bridge's loop does not answer.")
+        return Result.FAILED
+
+    def _answered(self, asked: Asked, result: Result, now_s: float) -> Make:
+        self._remembered.pop(asked.key, None)
+        if len(self._remembered) >= _MOST_REMEMBERED:
+            del self._remembered[next(iter(self._remembered))]
+        self._remembered[asked.key] = (result, now_s)
+        return acknowledgement(asked, result)
+
+    def _checks(self, now_s: float) -> Result:
+        snapshot = self._stream.snapshot
+        if snapshot is None or self._stream.is_stale(now_s):
+            self._say(Severity.WARNING, "The bridge's loop does not turn.")
+            return Result.TEMPORARILY_REJECTED
+        found = [text for severity, text in standing(snapshot) if severity <= Severity.WARNING]
+        for text in found:
+            self._say(Severity.WARNING, text)
+        return Result.TEMPORARILY_REJECTED if found else Result.ACCEPTED
+
+    def _interval(self, message: int, interval_s: float | None) -> Result:
+        if message == HEARTBEAT:
+            self._say(Severity.WARNING, "The heartbeat comes once a second, always.")
+            return Result.DENIED
+        return Result.ACCEPTED if self._stream.schedule.change(message, interval_s) else Result.UNSUPPORTED
+
+
+_NOT_DONE = {
+    Wish.START: "Not armed",
+    Wish.RESUME: "Not resumed",
+    Wish.RESET: "Not reset",
+}
+
+
+def _name(sender: tuple[int, int]) -> str:
+    return f"MAVLink {sender[0]}/{sender[1]}"

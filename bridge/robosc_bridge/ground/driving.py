@@ -1,0 +1,147 @@
+"""Motion that is asked for by set-points, as requests of a program to a supervision layer.
+
+Sources: mavlink.io (SET_POSITION_TARGET_LOCAL_NED, MANUAL_CONTROL) and ArduPilot Rover. Turns are clockwise there and
+counter-clockwise here. Whoever drives by hand must go on telling so: a stream that ends is a request to stand still.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from robosc.expressions import ObjectType
+from robosc.model.structure import Communication, CommunicationKind, Model
+from robosc_bridge.configuration.channels import DriveChannel
+from robosc_bridge.configuration.ties import Ties
+from robosc_bridge.daemon.programs import Attached, Detached, FromProgram, Program, Requested, ToProgram
+from robosc_bridge.devices.interface import STANDSTILL, Velocity
+
+SILENCE_S = 0.5
+"""After so long without a set-point, who drove by hand no longer does."""
+
+_BODY_FRAMES = (8, 9, 12)
+_VX, _VY, _FORCE, _YAW_RATE = 8, 16, 512, 2048
+_POSITION, _ACCELERATION, _YAW = 1 | 2 | 4, 64 | 128 | 256, 1024
+_FULL = 1000.0
+
+
+class Unusable(Exception):
+    """A set-point cannot be followed; says why."""
+
+
+def from_position_target(told: Any) -> Velocity:
+    """The velocity that SET_POSITION_TARGET_LOCAL_NED asks for.
+
+    Raises:
+        Unusable: It asks for anything else than a speed ahead and a turn rate.
+    """
+    mask = told.type_mask
+    if told.coordinate_frame not in _BODY_FRAMES:
+        raise Unusable("Set-points must be in the robot's own frame (8 BODY_NED, 9 or 12).")
+    must_ignore = _POSITION | _ACCELERATION | _YAW
+    if mask & must_ignore != must_ignore or mask & _FORCE or mask & (_VX | _YAW_RATE) == _VX | _YAW_RATE:
+        raise Unusable("Set-points may hold a velocity and a turn rate only, such as type mask 1511.")
+    speed_m_s = 0.0 if mask & _VX else told.vx
+    aside_m_s = 0.0 if mask & _VY else told.vy
+    turn_rad_s = 0.0 if mask & _YAW_RATE else told.yaw_rate
+    if not all(map(math.isfinite, (speed_m_s, aside_m_s, turn_rad_s))):
+        raise Unusable("A set-point is no number.")
+    if aside_m_s != 0.0:
+        raise Unusable("The robot cannot go sideways: vy must be 0.")
+    return Velocity(speed_m_s, -turn_rad_s + 0.0)
+
+
+def from_manual_control(told: Any, fastest: Velocity) -> Velocity:
+    """The velocity of a stick: x ahead, r to the right, as ground stations send it; y, z and buttons are not heeded.
+
+    Args:
+        told: MANUAL_CONTROL.
+        fastest: What a full stick means.
+
+    Raises:
+        Unusable: An axis that is needed is not there.
+    """
+    if abs(told.x) > _FULL or abs(told.r) > _FULL:
+        raise Unusable("A stick has no x or no r axis.")
+    return Velocity(told.x / _FULL * fastest.linear_m_s, -told.r / _FULL * fastest.angular_rad_s + 0.0)
+
+
+def drive_message(ties: Ties) -> Communication | None:
+    """The message to the robot that is tied to the drive; of several, the first of the model."""
+    return next(
+        (item for item, _ in ties.tied_to(DriveChannel) if item.kind is CommunicationKind.INCOMING_MESSAGE), None
+    )
+
+
+def drive_data(model: Model, message: Communication, velocity: Velocity) -> dict[str, Any]:
+    """A velocity in the shape of the message: a twist, or a twist with a stamp around it."""
+    twist = {
+        "linear": {"x": velocity.linear_m_s, "y": 0.0, "z": 0.0},
+        "angular": {"x": 0.0, "y": 0.0, "z": velocity.angular_rad_s},
+    }
+    if isinstance(message.request, ObjectType):
+        names = {item.name for item in model.object(message.request.name).properties}
+        if "twist" in names:
+            return {"twist": twist}
+    return twist
+
+
+@dataclass
+class _Drive:
+    program: Program
+    last_s: float
+    velocity: Velocity
+
+
+class Driving:
+    """A person at the ground station who drives: attached to the layer while set-points come.
+
+    Args:
+        model: That the layer is for.
+        message: Its message that is tied to the drive.
+        tell: The daemon's inbox.
+        heed: Is told what the layer says; from the loop's thread, neither waits nor raises.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        message: Communication,
+        tell: Callable[[FromProgram], None],
+        heed: Callable[[ToProgram], None],
+    ) -> None:
+        self._model = model
+        self._message = message
+        self._tell = tell
+        self._heed = heed
+        self._drive: _Drive | None = None
+
+    def take(self, now_s: float, velocity: Velocity) -> None:
+        """A set-point came."""
+        if self._drive is None:
+            self._drive = _Drive(Program("MAVLink", self._heed, may_request=True), now_s, velocity)
+            self._tell(Attached(self._drive.program))
+        self._drive.last_s, self._drive.velocity = now_s, velocity
+        self._request(self._drive, velocity)
+
+    def look(self, now_s: float) -> bool:
+        """End driving that has fallen silent; whether it has just ended while the robot was to move."""
+        drive = self._drive
+        if drive is None or now_s - drive.last_s < SILENCE_S:
+            return False
+        return self.end()
+
+    def end(self) -> bool:
+        """End driving; whether the robot was to move."""
+        drive, self._drive = self._drive, None
+        if drive is None:
+            return False
+        was_moving = drive.velocity != STANDSTILL
+        if was_moving:
+            self._request(drive, STANDSTILL)
+        self._tell(Detached(drive.program))
+        return was_moving
+
+    def _request(self, drive: _Drive, velocity: Velocity) -> None:
+        data = drive_data(self._model, self._message, velocity)
+        self._tell(Requested(drive.program, self._message.identifier, data))

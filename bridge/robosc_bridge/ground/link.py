@@ -1,0 +1,145 @@
+"""The thread of a ground station: opens its line again and again, and carries bytes to and from a session."""
+
+import contextlib
+import logging
+import threading
+import time
+from collections.abc import Callable
+
+from robosc_bridge.daemon.backoff import Backoff
+from robosc_bridge.daemon.operations import Operations
+from robosc_bridge.errors import BridgeError
+from robosc_bridge.ground.session import STATION_LIMIT_S, Session
+from robosc_bridge.ground.settings import GroundSettings
+from robosc_bridge.transport.lines import Line, open_line
+from robosc_bridge.transport.network_line import NetworkLine
+
+_log = logging.getLogger(__name__)
+
+TURN_S = 0.05
+"""Longest time between two looks at what the daemon shows."""
+
+LONGEST_DATAGRAM = 2048
+"""Bytes of a datagram that are looked at."""
+
+REST = 2.0
+"""Where bytes wait already, a pause so many times as long as the work on those before leaves the processor to the
+robot."""
+
+LASTING_S = 5.0
+"""A line that has been open for so long works."""
+
+_LONGEST_REST_S = 0.1
+_JOIN_S = 3.0
+
+
+class GroundLink:
+    """A link to a ground station. Whatever happens to it, the daemon goes on.
+
+    Args:
+        operations: The daemon.
+        settings: How the station is reached.
+        clock: The time, by the clock that readings and scans have theirs from.
+
+    Raises:
+        SigningError: There is no key, or its time cannot be kept.
+    """
+
+    def __init__(
+        self, operations: Operations, settings: GroundSettings, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._settings = settings
+        self._clock = clock
+        self._session = Session(operations, settings, clock())
+        self._backoff = Backoff()
+        self._guard = threading.Lock()
+        self._line: Line | None = None
+        self._over = threading.Event()
+        self._peer_s = -STATION_LIMIT_S
+        self._problem = ""
+        self._thread = threading.Thread(target=self._run, name="ground station", daemon=True)
+
+    @property
+    def port(self) -> int | None:
+        """Of its own end, where there is a network and the line is open."""
+        with self._guard:
+            return self._line.port if isinstance(self._line, NetworkLine) else None
+
+    def start(self) -> None:
+        """Begin; whether the station is there is nobody's concern."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End, with a last heartbeat; may be called again, and before `start`."""
+        self._over.set()
+        with self._guard:
+            if self._line is not None:
+                self._line.wake()
+        if self._thread.ident is not None:
+            self._thread.join(_JOIN_S)
+
+    def _run(self) -> None:
+        while not self._over.is_set():
+            try:
+                self._talk(self._opened())
+            except BridgeError as error:
+                self._failed(str(error))
+            except Exception:  # Nothing that a station sends or the daemon shows may end the link.
+                _log.exception("ground station")
+                self._failed("an internal error; see above")
+        with contextlib.suppress(BridgeError):
+            last = self._session.end(self._clock())
+            if self._line is not None:
+                self._line.write(last)
+        self._close()
+
+    def _opened(self) -> Line:
+        line = open_line(self._settings.address, self._settings.baud)
+        with self._guard:
+            self._line = line
+        self._peer_s = -STATION_LIMIT_S
+        return line
+
+    def _talk(self, line: Line) -> None:
+        opened_s = self._clock()
+        while not self._over.is_set():
+            asked_s = self._clock()
+            data = line.read(TURN_S)
+            now_s = self._clock()
+            if isinstance(line, NetworkLine) and line.is_datagram:
+                self._datagram(line, data[:LONGEST_DATAGRAM], now_s)
+            else:
+                line.write(self._session.step(now_s, data))
+            done_s = self._clock()
+            if now_s - opened_s > LASTING_S:
+                self._backoff.succeeded()
+                self._problem = ""
+            if now_s - asked_s < done_s - now_s:
+                self._over.wait(min((done_s - now_s) * REST, _LONGEST_REST_S))
+
+    def _datagram(self, line: NetworkLine, data: bytes, now_s: float) -> None:
+        if data and line.is_stranger and now_s - self._peer_s < STATION_LIMIT_S:
+            # One station at a time; another may stop the robot.
+            line.reply(self._session.overheard(now_s, data))
+            data = b""
+        before = self._session.accepted
+        found = self._session.step(now_s, data, is_datagram=True)
+        if self._session.accepted > before:
+            self._peer_s = now_s
+            line.answer_sender()
+        if found:
+            line.write(found)
+
+    def _failed(self, problem: str) -> None:
+        if problem != self._problem:
+            _log.warning("ground station: %s", problem)
+        self._problem = problem
+        self._close()
+        self._session.lost()
+        self._over.wait(self._backoff.failed())
+
+    def _close(self) -> None:
+        with self._guard:
+            line, self._line = self._line, None
+        if line is not None:
+            line.close()

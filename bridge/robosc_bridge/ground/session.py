@@ -1,0 +1,315 @@
+"""A conversation with a ground station, driven by time and bytes alone: what came in, what goes out.
+
+It needs no socket, thread or clock. Whatever comes is untrusted: garbage is counted, a message that makes no sense is
+answered or dropped, and nothing raises.
+"""
+
+import logging
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from robosc_bridge.daemon.operations import Operations
+from robosc_bridge.daemon.programs import Refused, ToProgram
+from robosc_bridge.devices.interface import STANDSTILL, Velocity
+from robosc_bridge.ground import requests
+from robosc_bridge.ground.asking import Asked, Asking
+from robosc_bridge.ground.commands import Change, Meaning, Refusal, Stop, meaning, mode_meaning
+from robosc_bridge.ground.driving import Driving, Unusable, drive_message, from_manual_control, from_position_target
+from robosc_bridge.ground.notices import happened, standing, written
+from robosc_bridge.ground.schedule import Bucket
+from robosc_bridge.ground.settings import GroundSettings
+from robosc_bridge.ground.status import is_held
+from robosc_bridge.ground.stream import Stream
+from robosc_bridge.ground.telemetry import Make
+from robosc_bridge.ground.texts import Severity, Texts
+from robosc_bridge.protocol.mavlink import Codec, Decoder, is_signed
+from robosc_bridge.protocol.mavlink_messages import GROUND_STATIONS, Incoming, Result
+
+_log = logging.getLogger(__name__)
+
+STATION_LIMIT_S = 5.0
+"""After so long without its heartbeat a ground station is lost."""
+
+MESSAGES_PER_S, MOST_MESSAGES = 100.0, 200.0
+"""Messages that are heeded; beyond that, only those that stop."""
+
+_STOPPING = frozenset({Incoming.SET_MODE, Incoming.COMMAND_LONG, Incoming.COMMAND_INT})
+_NOT_SIGNED = "Only stopping is obeyed here without a valid signature."
+
+
+@dataclass(frozen=True)
+class Heard:
+    """A message that came.
+
+    Attributes:
+        sender: System and component.
+        number: Of the message.
+        told: The library's message.
+        is_signed: Whether it has a valid signature.
+    """
+
+    sender: tuple[int, int]
+    number: int
+    told: Any
+    is_signed: bool
+
+
+def _wanted(asked: Asked) -> Meaning:
+    # The old message for modes is answered as a command of its number, as ArduPilot does.
+    if asked.number == Incoming.SET_MODE:
+        return mode_meaning(asked.parameters[0], asked.parameters[1])
+    return meaning(asked.number, asked.parameters)
+
+
+def _heard(told: Any) -> Heard:
+    return Heard((told.get_srcSystem(), told.get_srcComponent()), told.get_msgId(), told, is_signed(told))
+
+
+class Session:
+    """What is said to a ground station and what it says.
+
+    Args:
+        operations: The daemon.
+        settings: Of the link.
+        now_s: The time, by the clock that readings and scans have theirs from.
+
+    Attributes:
+        accepted: How many messages have come that count.
+
+    Raises:
+        SigningError: There is no key, or its time cannot be kept.
+    """
+
+    def __init__(self, operations: Operations, settings: GroundSettings, now_s: float) -> None:
+        self.accepted = 0
+        self._operations = operations
+        self._settings = settings
+        self._signing = settings.signing.begin() if settings.signing else None
+        self._codec = Codec(
+            settings.system,
+            settings.component,
+            self._signing.key if self._signing else None,
+            settings.signing.link if settings.signing else 0,
+            self._signing.timestamp() if self._signing else 0,
+            _STOPPING,
+        )
+        self._decoder = Decoder(self._codec, _heard)
+        self._texts = Texts()
+        self._stream = Stream(operations, settings, now_s)
+        self._asking = Asking(operations, self._stream, self._answer_in_words)
+        message = drive_message(operations.ties) if operations.is_layer else None
+        self._told: deque[ToProgram] = deque(maxlen=16)
+        self._driving = Driving(operations.model, message, operations.tell, self._told.append) if message else None
+        self._bytes = Bucket(settings.bytes_per_s, settings.bytes_per_s)
+        self._heeded = Bucket(MESSAGES_PER_S, MOST_MESSAGES)
+        self._station_s: float | None = None
+        self._now_s = now_s
+        self._subscription = operations.feed.subscribe(lambda: None)
+        short = [f"{value.name} is {value.meaning}" for value in self._stream.values if value.name != value.meaning]
+        if short:
+            _log.info("names at the ground station: %s", ", ".join(short))
+
+    def step(self, now_s: float, data: bytes = b"", *, is_datagram: bool = False) -> bytes:
+        """Go on.
+
+        Args:
+            now_s: The time.
+            data: What has come.
+            is_datagram: Whether that is one whole datagram.
+
+        Returns:
+            What is to be sent: whole packets.
+
+        Raises:
+            SigningError: The time of signed packets cannot be kept.
+        """
+        self._pass_time(now_s)
+        # What is asked is judged by what is so now.
+        self._look()
+        replies: list[Make] = []
+        for heard in self._decoder.take_datagram(data) if is_datagram else self._decoder.feed(data):
+            self.accepted += self._is_trusted(heard)
+            replies += self._take(heard)
+        replies += self._asking.look(now_s)
+        self._stream.bad_packets = self._decoder.counts.bad_frames
+        # The reason of an answer comes before it.
+        urgent = (*self._texts.take(now_s), *replies, *self._stream.pulse(now_s))
+        return self._encoded(urgent, self._stream.due(now_s))
+
+    def overheard(self, now_s: float, data: bytes) -> bytes:
+        """A datagram of somebody else than the station in use, who may stop the robot and nothing more.
+
+        Returns:
+            What is to be sent to them.
+        """
+        self._pass_time(now_s)
+        replies: list[Make] = []
+        for heard in self._decoder.take_datagram(data):
+            asked = self._asked(heard)
+            if asked is not None and isinstance(wanted := _wanted(asked), Stop):
+                replies += self._asking.take(asked, wanted, now_s)
+        return self._encoded(replies, ())
+
+    def lost(self) -> None:
+        """The line is gone: nobody drives any more."""
+        self._end_driving(self._driving is not None and self._driving.end())
+        self._decoder.forget()
+
+    def end(self, now_s: float) -> bytes:
+        """The bridge ends; what is to be sent last."""
+        self.lost()
+        found = self.step(now_s)
+        self._subscription.close()
+        found += self._encoded(self._stream.once(Incoming.HEARTBEAT, now_s) or (), ())
+        if self._signing:
+            self._signing.release(self._codec.timestamp)
+        return found
+
+    def _pass_time(self, now_s: float) -> None:
+        self._now_s = now_s
+        self._bytes.pass_time(now_s)
+        self._heeded.pass_time(now_s)
+
+    def _encoded(self, urgent: Iterable[Make], telemetry: Iterable[Make]) -> bytes:
+        if self._signing:
+            self._codec.not_before(self._signing.timestamp())
+        packets = []
+        for make in urgent:
+            packets.append(self._codec.encode(make))
+            self._bytes.take(len(packets[-1]))
+        waiting = iter(telemetry)
+        while self._bytes.has_some and (due := next(waiting, None)) is not None:
+            packets.append(self._codec.encode(due))
+            self._bytes.take(len(packets[-1]))
+        if self._signing and packets:
+            self._signing.reserve(self._codec.timestamp)
+        return b"".join(packets)
+
+    # What the daemon shows.
+
+    def _look(self) -> None:
+        now_s = self._now_s
+        update = self._subscription.take()
+        before = self._stream.snapshot
+        holding = []
+        if self._stream.look(update.snapshot, now_s) and update.snapshot is not None:
+            for severity, text in happened(before, update.snapshot):
+                self._texts.say(now_s, severity, text, again_s=0.0)
+        for entry in update.entries:
+            self._stream.held_back += entry.get("kind") == "blocked"
+            notice = written(entry)
+            if notice is not None:
+                self._texts.say(now_s, *notice)
+        if self._stream.is_stale(now_s):
+            holding.append((Severity.CRITICAL, "The bridge's loop does not turn."))
+        elif self._stream.snapshot is not None:
+            holding += standing(self._stream.snapshot)
+        self._texts.stand(now_s, holding)
+        while self._told:
+            told = self._told.popleft()
+            if isinstance(told, Refused):
+                self._texts.say(now_s, Severity.WARNING, told.why)
+        if self._driving is not None:
+            self._end_driving(self._driving.look(now_s))
+        if self._station_s is not None and now_s - self._station_s > STATION_LIMIT_S:
+            self._station_s = None
+            self._texts.say(now_s, Severity.WARNING, "The ground station is lost.", again_s=0.0)
+            _log.warning("the ground station is lost")
+
+    def _end_driving(self, was_moving: bool) -> None:
+        if was_moving:
+            self._texts.say(self._now_s, Severity.WARNING, "No set-point any more: the robot stands.", again_s=0.0)
+            _log.warning("set-points of the ground station have ended while the robot was to move")
+
+    def _answer_in_words(self, severity: Severity, text: str) -> None:
+        self._texts.say(self._now_s, severity, text, again_s=0.0)
+
+    # What the ground station says.
+
+    def _is_trusted(self, heard: Heard) -> bool:
+        """Whether it may ask and be heard; not whether it may change anything."""
+        return heard.is_signed or self._signing is None
+
+    def _may_change(self, heard: Heard) -> bool:
+        return heard.is_signed or (self._signing is None and self._settings.obeys_unsigned)
+
+    def _take(self, heard: Heard) -> list[Make]:
+        if heard.sender == (self._settings.system, self._settings.component):
+            return []  # Our own, sent back.
+        asked = self._asked(heard)
+        if asked is not None and isinstance(wanted := _wanted(asked), Stop):
+            return self._asking.take(asked, wanted, self._now_s)
+        if not self._heeded.has_some:
+            return []
+        self._heeded.take()
+        if asked is not None:
+            return self._command(heard, asked, _wanted(asked))
+        if not self._is_trusted(heard):
+            return []
+        match heard.number:
+            case Incoming.HEARTBEAT if heard.told.type in GROUND_STATIONS:
+                self._station(heard)
+            case Incoming.MANUAL_CONTROL if heard.told.target == self._settings.system:
+                self._drive(heard, lambda: from_manual_control(heard.told, self._settings.fastest))
+            case Incoming.SET_POSITION_TARGET if self._is_for_us(heard.told):
+                self._drive(heard, lambda: from_position_target(heard.told))
+            case _ if self._is_for_us(heard.told):
+                return requests.answers(heard.number, heard.told, heard.sender, self._settings, self._now_s)
+        return []
+
+    def _command(self, heard: Heard, asked: Asked, wanted: Meaning) -> list[Make]:
+        is_refused = isinstance(wanted, Change) and not self._may_change(heard)
+        if is_refused or not self._is_trusted(heard):
+            self._texts.say(self._now_s, Severity.WARNING, _NOT_SIGNED)
+            wanted = Refusal(Result.DENIED)
+        return self._asking.take(asked, wanted, self._now_s)
+
+    def _asked(self, heard: Heard) -> Asked | None:
+        """The command that a message is, if it is one and for us."""
+        told = heard.told
+        if heard.number not in _STOPPING or not self._is_for_us(told):
+            return None
+        if heard.number == Incoming.SET_MODE:
+            return Asked(heard.sender, Incoming.SET_MODE, (told.base_mode, told.custom_mode, 0, 0, 0, 0, 0))
+        first = (told.param1, told.param2, told.param3, told.param4)
+        if heard.number == Incoming.COMMAND_INT:
+            return Asked(heard.sender, told.command, (*first, float(told.x), float(told.y), told.z))
+        last = (told.param5, told.param6, told.param7)
+        return Asked(heard.sender, told.command, (*first, *last), told.confirmation > 0)
+
+    def _is_for_us(self, told: Any) -> bool:
+        system, component = getattr(told, "target_system", 0), getattr(told, "target_component", 0)
+        return system in (0, self._settings.system) and component in (0, self._settings.component)
+
+    def _station(self, heard: Heard) -> None:
+        if self._station_s is None:
+            # It has not been told anything yet.
+            self._texts.forget()
+            _log.info("the ground station %d/%d is there", *heard.sender)
+        self._station_s = self._now_s
+        if self._may_change(heard):
+            self._operations.operator_seen()
+
+    def _drive(self, heard: Heard, read: Callable[[], Velocity]) -> None:
+        why = ""
+        snapshot = self._stream.snapshot
+        if not self._may_change(heard):
+            why = _NOT_SIGNED
+        elif self._driving is None:
+            why = "Set-points are for a supervision layer whose drive is tied; this supervisor drives by itself."
+        elif snapshot is None or not self._stream.is_running or self._stream.is_stale(self._now_s):
+            why = "The robot is not armed: set-points are not heeded."
+        elif is_held(snapshot):
+            why = "An operator has stopped the robot: set-points are not heeded."
+        try:
+            velocity = read()
+        except Unusable as error:
+            why = str(error)
+            velocity = STANDSTILL
+        if not why and self._driving is not None:
+            self._driving.take(self._now_s, velocity)
+        elif why and (velocity != STANDSTILL or heard.number == Incoming.SET_POSITION_TARGET):
+            # A stick at rest asks for nothing.
+            self._texts.say(self._now_s, Severity.WARNING, why)

@@ -1,0 +1,119 @@
+"""How a ground station is reached, and what it may do; checked before anything starts."""
+
+import ipaddress
+from dataclasses import dataclass
+from pathlib import Path
+
+from robosc_bridge.configuration.structure import Configuration
+from robosc_bridge.devices.interface import Velocity
+from robosc_bridge.errors import BridgeError
+from robosc_bridge.protocol.mavlink_signing import Signing
+from robosc_bridge.transport.network_line import is_network_address
+
+AUTOPILOT = 1
+"""The component that a ground station takes for a vehicle."""
+
+BAUD = 57_600
+
+NETWORK_BYTES_PER_S = 60_000
+"""Most that is sent over a network."""
+
+_FORMS = "udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, or a serial port's path, also with ,BAUD"
+# Of a LiDAR that is not known, and of one that is: what its maker says, in metres.
+_ANY_RANGE_M = (0.05, 100.0)
+_RANGES_M = {"lds01": (0.12, 3.5), "lds02": (0.16, 8.0), "lds03": (0.05, 12.0)}
+
+
+class GroundSettingsError(BridgeError):
+    """A ground station cannot be reached as the configuration says."""
+
+
+@dataclass(frozen=True)
+class GroundSettings:
+    """How a ground station is reached.
+
+    Attributes:
+        address: Of `transport.network_line`, or a serial port's path.
+        fastest: What a full stick means.
+        baud: Of a serial port.
+        system: Number of the vehicle.
+        component: Of the bridge in it.
+        signing: The key; None: nothing is signed.
+        obeys_unsigned: Whether, without a key, more than stopping and asking is allowed.
+        interval_s: Between two messages of pose, and of obstacles.
+        range_m: Shortest and longest that the LiDAR measures.
+    """
+
+    address: str
+    fastest: Velocity
+    baud: int = BAUD
+    system: int = 1
+    component: int = AUTOPILOT
+    signing: Signing | None = None
+    obeys_unsigned: bool = False
+    interval_s: float = 0.1
+    range_m: tuple[float, float] = _ANY_RANGE_M
+
+    @property
+    def bytes_per_s(self) -> float:
+        """Most that is sent, over some time: a serial line keeps a third free for what comes unasked."""
+        return NETWORK_BYTES_PER_S if is_network_address(self.address) else self.baud / 10 * 2 / 3
+
+
+def ground_settings(configuration: Configuration, fastest: Velocity) -> GroundSettings | None:
+    """The settings of a configuration; None: there is no ground station.
+
+    Args:
+        configuration: Whose section `remote` says it.
+        fastest: Limits of speed and turn rate.
+
+    Raises:
+        GroundSettingsError: They do not go together.
+    """
+    remote = configuration.remote
+    if remote.mavlink_url is None:
+        return None
+    address, baud = _parsed(remote.mavlink_url)
+    if remote.mavlink_key is not None and remote.mavlink_unsigned_commands:
+        raise GroundSettingsError(
+            "remote.mavlink_unsigned_commands: with a key (mavlink_key), only signed commands are obeyed; take one away"
+        )
+    scanner = configuration.scanner
+    return GroundSettings(
+        address,
+        fastest,
+        baud,
+        remote.mavlink_system,
+        signing=None if remote.mavlink_key is None else Signing(Path(remote.mavlink_key), remote.mavlink_link_id),
+        obeys_unsigned=remote.mavlink_unsigned_commands or is_loopback(address),
+        interval_s=remote.mavlink_interval_s,
+        range_m=_ANY_RANGE_M if scanner is None else _RANGES_M.get(scanner.driver, _ANY_RANGE_M),
+    )
+
+
+def is_loopback(address: str) -> bool:
+    """Whether only programs on this computer are reached there, and can reach it."""
+    if not is_network_address(address):
+        return False
+    host = address.split(":")[1]
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _parsed(url: str) -> tuple[str, int]:
+    """Address and baud rate."""
+    if is_network_address(url):
+        scheme, _, place = url.partition(":")
+        host, _, port = place.rpartition(":")
+        is_port = port.isascii() and port.isdecimal() and (0 if scheme == "udpin" else 1) <= int(port) <= 65535
+        if host and ":" not in host and is_port:
+            return url, BAUD
+    elif url.startswith("/"):
+        path, _, baud = url.partition(",")
+        if not baud:
+            return path, BAUD
+        if baud.isascii() and baud.isdecimal() and 1 <= int(baud) <= 10_000_000:
+            return path, int(baud)
+    raise GroundSettingsError(f"remote.mavlink_url: '{url}' cannot be used; it is {_FORMS}")

@@ -1,0 +1,136 @@
+"""A bridge as `robosc-bridge run` makes it, which measures itself: in standby first, then running.
+
+Usage: bridge_process.py MODEL CONFIGURATION STANDBY_S RUNNING_S [WATCHERS]
+
+Watchers take everything that the bridge shows, as soon as there is something new, and put the measurements of each
+snapshot into JSON as a remote face would.
+
+Prints one JSON document: by how much each decision was late, overruns, and how much of a processor the process took.
+"""
+
+import json
+import logging
+import sys
+import threading
+import time
+from pathlib import Path
+
+from robosc.execution.event_log import NullLog
+from robosc.execution.executor import Executor
+from robosc.model.structure import Deployment
+from robosc_bridge.configuration import load, tie
+from robosc_bridge.daemon.assembly import Machine, assemble
+from robosc_bridge.daemon.feed import Feed
+from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.daemon.supervisors import Source, obtain
+
+LIMIT_S = 60.0
+SETTLE_S = 1.0
+
+
+def _watch_decisions(machine: Machine) -> list[float]:
+    """Where it will be noted how late each decision is."""
+    found: list[float] = []
+    tick = Executor.tick
+
+    def timed(self: Executor) -> None:
+        # Only the loop knows its schedule.
+        found.append(time.monotonic() - machine.daemon._execution.due_s)
+        tick(self)
+
+    Executor.tick = timed  # type: ignore[method-assign]
+    return found
+
+
+class _Watcher:
+    """Looks at all that a bridge shows."""
+
+    def __init__(self, feed: Feed) -> None:
+        self._woken = threading.Semaphore(0)
+        self._subscription = feed.subscribe(self._woken.release)
+        self._thread = threading.Thread(target=self._run)
+        self._is_over = False
+        self.snapshots = 0
+        self._thread.start()
+
+    def _run(self) -> None:
+        seen = -1
+        while True:
+            self._woken.acquire()
+            if self._is_over:
+                return
+            snapshot = self._subscription.take().snapshot
+            if snapshot is not None and snapshot.number != seen:
+                seen = snapshot.number
+                self.snapshots += 1
+                ranges_m = snapshot.scan.ranges_m if snapshot.scan else ()
+                json.dumps((snapshot.number, snapshot.state, snapshot.components, snapshot.enabled, ranges_m))
+
+    def close(self) -> None:
+        self._subscription.close()
+        self._is_over = True
+        self._woken.release()
+        self._thread.join()
+
+
+def _await(machine: Machine, state: State) -> None:
+    end_s = time.monotonic() + LIMIT_S
+    while machine.daemon.state is not state:
+        if time.monotonic() > end_s:
+            raise TimeoutError(f"the bridge is not {state} within {LIMIT_S:g} s: {machine.daemon.state}")
+        time.sleep(0.01)
+    time.sleep(SETTLE_S)
+
+
+def _share(seconds: float) -> float:
+    """How much of a processor the process takes for so long."""
+    begin_cpu_s, begin_s = time.process_time(), time.monotonic()
+    time.sleep(seconds)
+    return (time.process_time() - begin_cpu_s) / (time.monotonic() - begin_s)
+
+
+def main() -> int:
+    """Measure."""
+    logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
+    model, configuration_file = map(Path, sys.argv[1:3])
+    standby_s, running_s = map(float, sys.argv[3:5])
+    watchers = int(sys.argv[5]) if len(sys.argv) > 5 else 0
+    loaded = load(configuration_file)
+    supervisor = obtain(Source(model, Deployment.CONTROLLER, None, None), lambda text: None)
+    ties = tie(supervisor.model, loaded.configuration, loaded.document)
+    machine = assemble(loaded.configuration, ties, supervisor, NullLog(), starts_itself=True)
+    noted_s = _watch_decisions(machine)
+    # As soon as the devices are there it would start.
+    machine.daemon.post(Command.STANDBY)
+    loop = threading.Thread(target=machine.run)
+    loop.start()
+    faces = [_Watcher(machine.operations.feed) for _ in range(watchers)]
+    try:
+        _await(machine, State.STANDBY)
+        in_standby = _share(standby_s)
+        machine.daemon.post(Command.START)
+        _await(machine, State.RUNNING)
+        noted_s.clear()
+        overruns = machine.daemon.overruns
+        running = _share(running_s)
+        late_s = list(noted_s)
+        overruns = machine.daemon.overruns - overruns
+    finally:
+        machine.quit()
+        loop.join()
+        for face in faces:
+            face.close()
+    found = {
+        "late_s": late_s,
+        "overruns": overruns,
+        "standby": in_standby,
+        "running": running,
+        "snapshots": [face.snapshots for face in faces],
+        "problem": machine.daemon.problem,
+    }
+    sys.stdout.write(json.dumps(found) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

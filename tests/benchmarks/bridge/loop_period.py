@@ -1,0 +1,103 @@
+"""How punctually the bridge decides, and how much of a processor it takes in standby and driving.
+
+A robot wanders through a simulated room. It is a process of its own at the far end of real pseudo-terminals, the bridge
+another one; they go before other programs where that is permitted. *Watchers* take all that the bridge shows. *Late*: a
+decision, against the schedule. *CPU*: user and system time of the whole bridge process over the time that passed.
+
+Usage: loop_period.py [SECONDS]
+"""
+
+import json
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[3]
+sys.path[:0] = [str(Path(__file__).parent), str(ROOT / "tests" / "benchmarks")]
+
+from rig import (  # noqa: E402
+    LIMIT_S,
+    WANDERER,
+    WANDERER_CHANNELS,
+    Machine,
+    configuration,
+    environment,
+    preferred,
+    simulated,
+    spread,
+)
+
+from figures import text_table  # noqa: E402  # found through the path above
+
+SECONDS = 30.0
+STANDBY_S = 5.0
+CASES = (
+    ("dynamixel", 0.010, 0),
+    ("dynamixel", 0.010, 1),
+    ("dynamixel", 0.020, 0),
+    ("opencr", 0.020, 0),
+    ("opencr", 0.020, 1),
+)
+"""Base, period, and how many watch."""
+
+LIDAR = "lds02"
+
+HEADER = [
+    "base, period, watchers", "decisions", "late p50, ms", "p99, ms", "max, ms", "overruns", "CPU standby", "running",
+]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What one run has shown.
+
+    Attributes:
+        late_s: Of each decision.
+        overruns: Decisions that were left out.
+        standby: Share of a processor.
+        running: The same, driving.
+    """
+
+    late_s: tuple[float, ...]
+    overruns: int
+    standby: float
+    running: float
+
+
+def measured(base: str, period_s: float, watchers: int, seconds: float, standby_s: float = STANDBY_S) -> Measured:
+    """Measure one base at one period."""
+    with preferred(), simulated("--base", base, "--lidar", LIDAR) as robot, tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "bridge.yaml"
+        file.write_text(configuration(robot, base, LIDAR, period_s, WANDERER_CHANNELS))
+        command = [
+            sys.executable, str(Path(__file__).with_name("bridge_process.py")), str(WANDERER), str(file),
+            str(standby_s), str(seconds), str(watchers),
+        ]  # fmt: skip
+        done = subprocess.run(
+            command, stdout=subprocess.PIPE, text=True, check=True, env=environment(), timeout=seconds + 3 * LIMIT_S
+        )
+    found = json.loads(done.stdout)
+    if found["problem"]:
+        raise RuntimeError(f"the robot was stopped: {found['problem']}")
+    return Measured(tuple(found["late_s"]), found["overruns"], found["standby"], found["running"])
+
+
+def _row(base: str, period_s: float, watchers: int, seconds: float) -> list[str]:
+    found = measured(base, period_s, watchers, seconds)
+    label = f"{base}, {period_s * 1e3:.0f} ms, {watchers}"
+    shares = [f"{found.standby:.1%}", f"{found.running:.1%}"]
+    return [label, str(len(found.late_s)), *spread(found.late_s), str(found.overruns), *shares]
+
+
+def table(seconds: float = SECONDS) -> str:
+    """One row for each base and period."""
+    machine = Machine()
+    with machine.watched():
+        rows = [_row(*case, seconds) for case in CASES]
+    return text_table(f"Loop of the bridge, {seconds:g} s each ({machine})", HEADER, rows)
+
+
+if __name__ == "__main__":
+    sys.stdout.write(table(*map(float, sys.argv[1:2])) + "\n")

@@ -1,0 +1,286 @@
+"""The link over real UDP, TCP and a pseudo-terminal, with pymavlink's own ground station at the other end."""
+
+import contextlib
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+import tty
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from robosc_bridge.daemon.programs import Detached
+from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.devices.interface import Velocity
+from robosc_bridge.ground import link as link_module
+from robosc_bridge.ground.link import GroundLink
+from robosc_bridge.ground.settings import GroundSettings
+from robosc_bridge.protocol.mavlink_signing import Signing
+from support.ground import KEY, PlayedDaemon, Station, of_type
+from support.wire import wait_until
+
+FASTEST = Velocity(0.2, 2.0)
+
+
+class Peer:
+    """A station at a UDP socket."""
+
+    def __init__(self, port: int | None = None, key: bytes | None = None, system: int = 255) -> None:
+        self.station = Station(key, system)
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", 0))
+        self.socket.settimeout(0.2)
+        self.to = None if port is None else ("127.0.0.1", port)
+
+    @property
+    def port(self) -> int:
+        return int(self.socket.getsockname()[1])
+
+    def send(self, data: bytes) -> None:
+        assert self.to is not None
+        self.socket.sendto(data, self.to)
+
+    def receive(self) -> list[Any]:
+        with contextlib.suppress(TimeoutError, ConnectionRefusedError):
+            data, self.to = self.socket.recvfrom(65535)
+            return self.station.hear(data)
+        return []
+
+    def until(self, name: str, limit_s: float = 5.0, is_so: Callable[[Any], bool] = lambda _: True) -> Any:
+        """The next message of a kind."""
+        end_s = time.monotonic() + limit_s
+        while time.monotonic() < end_s:
+            for item in of_type(name, self.receive()):
+                if is_so(item):
+                    return item
+        raise AssertionError(f"no {name} within {limit_s} s")
+
+
+@contextmanager
+def linked(
+    address: str, daemon: PlayedDaemon | None = None, **values: Any
+) -> Iterator[tuple[PlayedDaemon, GroundLink]]:
+    daemon = daemon or PlayedDaemon()
+    link = GroundLink(daemon.operations, GroundSettings(address, FASTEST, **{"obeys_unsigned": True, **values}))
+    over = threading.Event()
+
+    def turn() -> None:
+        while not over.wait(0.02):
+            daemon.show()
+
+    loop = threading.Thread(target=turn)
+    link.start()
+    loop.start()
+    try:
+        yield daemon, link
+    finally:
+        over.set()
+        loop.join()
+        link.stop()
+        assert not link._thread.is_alive()
+        assert not daemon.feed.is_watched
+
+
+@contextmanager
+def peer(*arguments: Any, **values: Any) -> Iterator[Peer]:
+    found = Peer(*arguments, **values)
+    with found.socket:
+        yield found
+
+
+def _port(link: GroundLink) -> int:
+    wait_until(lambda: link.port is not None, 5.0)
+    assert link.port is not None
+    return link.port
+
+
+def test_a_station_that_is_called_sees_the_robot_and_arms_it() -> None:
+    with peer() as station, linked(f"udpout:127.0.0.1:{station.port}") as (daemon, _):
+        beat = station.until("HEARTBEAT", 2.0)
+        assert (beat.type, beat.get_srcSystem(), beat.get_srcComponent()) == (10, 1, 1)
+        daemon.answers[Command.START] = ""
+        station.send(station.station.heartbeat())
+        station.send(station.station.command(400, 1.0))
+        assert station.until("COMMAND_ACK").result == 0
+        assert daemon.commands == [Command.START]
+        wait_until(lambda: daemon.seen == 1, 2.0)
+        daemon.show(state=State.RUNNING)
+        assert station.until("HEARTBEAT", is_so=lambda beat: bool(beat.base_mode & 128)).custom_mode == 10
+
+
+def test_one_station_is_answered_and_another_may_stop() -> None:
+    with (
+        linked("udpin:127.0.0.1:0") as (daemon, link),
+        peer(_port(link)) as first,
+        peer(_port(link), system=254) as second,
+    ):
+        first.send(first.station.heartbeat())
+        first.until("HEARTBEAT")
+        second.send(second.station.command(400, 1.0))
+        second.send(second.station.command(400, 0.0))
+        assert second.until("COMMAND_ACK").result == 0
+        assert daemon.commands == [Command.STANDBY]
+        assert {item.get_type() for item in second.station.heard} == {"COMMAND_ACK"}
+        first.until("HEARTBEAT")
+
+
+def test_when_a_station_is_gone_another_takes_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(link_module, "STATION_LIMIT_S", 0.3)
+    with linked("udpin:127.0.0.1:0") as (_, link), peer(_port(link)) as first, peer(_port(link)) as second:
+        first.send(first.station.heartbeat())
+        first.until("HEARTBEAT")
+        end_s = time.monotonic() + 5.0
+        while not second.station.heard and time.monotonic() < end_s:
+            second.send(second.station.heartbeat())
+            second.receive()
+        second.until("HEARTBEAT")
+
+
+def test_garbage_takes_nobodys_place() -> None:
+    with linked("udpin:127.0.0.1:0") as (_, link), peer(_port(link)) as station, peer(_port(link)) as other:
+        for size in (1, 12, 300, 9000, 60_000):
+            other.send(b"\xfd" * size)
+            other.send(os.urandom(size))
+        station.send(station.station.heartbeat())
+        station.until("HEARTBEAT")
+        assert other.receive() == []
+
+
+def test_a_flood_of_datagrams_leaves_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    with linked("udpin:127.0.0.1:0") as (daemon, link), peer(_port(link)) as station:
+        evil = b"".join(station.station.command(410) for _ in range(100))
+        # From another process, with a processor of its own.
+        flood = f"""
+import socket
+source = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+while True:
+    source.sendto(bytes.fromhex("{evil.hex()}"), ("127.0.0.1", {_port(link)}))
+"""
+        station.send(station.station.heartbeat())
+        station.until("HEARTBEAT")
+        process = subprocess.Popen([sys.executable, "-c", flood])
+        try:
+            wait_until(lambda: link._session._decoder.counts.frames > 1000, 10.0)
+            rest, rested_s = link._over.wait, []
+
+            def note(limit_s: float) -> bool:
+                rested_s.append(limit_s)
+                return rest(limit_s)
+
+            monkeypatch.setattr(link._over, "wait", note)
+            station.until("HEARTBEAT")
+            station.until("HEARTBEAT")
+        finally:
+            process.kill()
+            process.wait()
+        assert len(rested_s) >= 3
+        assert daemon.orders == []
+
+
+def test_signed(tmp_path: Path) -> None:
+    (tmp_path / "key").write_bytes(KEY)
+    signing = Signing(tmp_path / "key")
+    with (
+        linked("udpin:0.0.0.0:0", signing=signing, obeys_unsigned=False) as (daemon, link),
+        peer(_port(link)) as stranger,
+        peer(_port(link), key=KEY) as station,
+    ):
+        stranger.send(stranger.station.heartbeat())
+        station.station.codec.signing.timestamp = signing.begin().timestamp()
+        station.send(station.station.heartbeat())
+        beat = station.until("HEARTBEAT")
+        assert beat.get_signed()
+        daemon.answers[Command.START] = ""
+        station.send(station.station.command(400, 1.0))
+        assert station.until("COMMAND_ACK").result == 0
+        assert stranger.station.heard == []
+
+
+def test_a_server_that_goes_and_comes_again_is_found() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        with linked(f"tcp:127.0.0.1:{port}"):
+            for _ in range(2):
+                server.settimeout(10.0)
+                connection, _ = server.accept()
+                with connection:
+                    connection.settimeout(5.0)
+                    station = Station()
+                    connection.sendall(station.command(410))
+                    while not of_type("COMMAND_ACK", station.heard):
+                        station.hear(connection.recv(4096))
+
+
+def test_nobody_there_is_told_once(caplog: pytest.LogCaptureFixture) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+    with linked(f"tcp:127.0.0.1:{port}"):
+        wait_until(lambda: "nobody serves there" in caplog.text, 5.0)
+        time.sleep(1.0)
+    assert caplog.text.count("nobody serves there") == 1
+
+
+def test_a_serial_line() -> None:
+    ours, theirs = os.openpty()
+    tty.setraw(theirs)
+    try:
+        with linked(os.ttyname(theirs), baud=57600) as (daemon, _):
+            station = Station()
+            os.write(ours, b"noise\xfd" + station.command(410) + station.command(400, 0.0))
+            end_s = time.monotonic() + 5.0
+            while len(of_type("COMMAND_ACK", station.heard)) < 2:
+                assert time.monotonic() < end_s
+                station.hear(os.read(ours, 4096))
+            assert daemon.commands == [Command.STANDBY]
+    finally:
+        os.close(ours)
+        os.close(theirs)
+
+
+def test_a_lost_line_ends_driving_at_once() -> None:
+    daemon = PlayedDaemon(is_layer=True)
+    daemon.show(state=State.RUNNING)
+    with socket.create_server(("127.0.0.1", 0)) as server, linked(f"tcp:127.0.0.1:{server.getsockname()[1]}", daemon):
+        connection, _ = server.accept()
+        station = Station()
+        with connection:
+            stick = station.codec.manual_control_encode(1, 500, 0, 0, 0, 0)
+            connection.sendall(station.pack(stick))
+            wait_until(lambda: len(daemon.told) == 2, 0.4)
+        wait_until(lambda: isinstance(daemon.told[-1], Detached), 0.4)
+
+
+def test_the_last_heartbeat_says_that_it_ends() -> None:
+    with peer() as station:
+        with linked(f"udpout:127.0.0.1:{station.port}") as (daemon, _):
+            station.until("HEARTBEAT")
+            daemon.show(state=State.OVER)
+        while station.receive():
+            pass
+        assert of_type("HEARTBEAT", station.station.heard)[-1].system_status == 7
+
+
+def test_it_may_be_stopped_at_any_time() -> None:
+    link = GroundLink(PlayedDaemon().operations, GroundSettings("udpin:127.0.0.1:0", FASTEST))
+    link.stop()
+    link = GroundLink(PlayedDaemon().operations, GroundSettings("tcp:127.0.0.1:1", FASTEST))
+    link.start()
+    began_s = time.monotonic()
+    link.stop()
+    link.stop()
+    assert time.monotonic() - began_s < 2.0
+
+
+def test_an_error_inside_ends_nothing(caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch) -> None:
+    with peer() as station, linked(f"udpout:127.0.0.1:{station.port}") as (_, link):
+        station.until("HEARTBEAT")
+        with monkeypatch.context() as patch:
+            patch.setattr(link._session, "step", lambda *_, **__: 1 / 0)
+            wait_until(lambda: "ZeroDivisionError" in caplog.text, 5.0)
+        station.until("HEARTBEAT")

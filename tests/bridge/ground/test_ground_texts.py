@@ -1,0 +1,103 @@
+"""Texts in chunks, against a receiver that puts them together; how often they are told."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robosc_bridge.ground.texts import BURST, LONGEST, MOST_WAITING, RATE_PER_S, Severity, Texts, chunks, plain_text
+from robosc_bridge.protocol.mavlink import Codec
+from support.ground import Station, joined_texts
+
+
+def _received(text: str) -> str:
+    """What a station puts together: a chunk that is not full ends a text."""
+    parts = b""
+    for place, chunk in enumerate(chunks(text, 7)):
+        assert (chunk.number, chunk.place) in ((0, 0), (7, place))
+        chunk.data.decode("utf-8")
+        assert len(chunk.data) <= 50
+        parts += chunk.data
+        is_last = chunk.number == 0 or len(chunk.data) < 50
+        assert is_last == (place == len(chunks(text, 7)) - 1)
+    return parts.decode("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("length", "sizes"),
+    [(0, [0]), (49, [49]), (50, [50]), (51, [50, 1]), (100, [50, 50, 0]), (149, [50, 50, 49]), (150, [50] * 3 + [0])],
+)
+def test_a_text_that_fills_its_chunks_has_one_more(length: int, sizes: list[int]) -> None:
+    found = chunks("x" * length, 7)
+    assert [len(chunk.data) for chunk in found] == sizes
+    assert {chunk.number for chunk in found} == ({0} if len(sizes) == 1 else {7})
+
+
+def test_a_character_is_never_cut() -> None:
+    text = "x" * 49 + "äöü" * 20
+    assert [len(chunk.data) for chunk in chunks(text, 7)][:2] == [50, 50]
+    assert _received(text).replace(" ", "") == text
+
+
+@given(st.text(alphabet=st.characters(exclude_characters="\0 ", codec="utf-8"), max_size=300))
+def test_a_station_reads_what_was_said(text: str) -> None:
+    assert _received(text).replace(" ", "") == text
+
+
+@given(st.text(max_size=600))
+def test_any_text_is_made_plain(text: str) -> None:
+    plain = plain_text(text)
+    assert len(plain.encode()) <= LONGEST
+    assert plain.isprintable()
+
+
+def test_a_long_text_is_cut() -> None:
+    assert plain_text("ä" * 300).endswith("ä...")
+    assert plain_text("a\nb\0c") == "a b c"
+
+
+def _told(texts: Texts, now_s: float) -> list[str]:
+    codec = Codec(1, 1)
+    return joined_texts(Station().hear(b"".join(codec.encode(make) for make in texts.take(now_s))))
+
+
+def test_the_same_is_not_told_again_and_again() -> None:
+    texts = Texts()
+    found = []
+    for tick in range(300):
+        texts.say(tick / 10, Severity.ERROR, "warm")
+        found += _told(texts, tick / 10)
+    assert found == ["warm"] * 2
+    texts.say(30.0, Severity.ERROR, "warm", again_s=0.0)
+    assert _told(texts, 30.0) == ["warm"]
+
+
+def test_what_holds_is_told_every_twenty_seconds_and_when_it_comes_again() -> None:
+    texts = Texts()
+    told = {}
+    for tick in range(450):
+        holds = tick < 410 or 415 <= tick < 420 or tick >= 435
+        texts.stand(tick / 10, [(Severity.ERROR, "cold")] if holds else [])
+        if found := _told(texts, tick / 10):
+            told[tick / 10] = found
+    assert list(told) == [0.0, 20.0, 40.0, 43.5]
+
+
+def test_there_are_never_too_many_a_second() -> None:
+    texts = Texts()
+    count = 0
+    for tick in range(1000):
+        for number in range(5):
+            texts.say(tick / 100, Severity.INFO, f"{tick} {number}")
+        count += len(texts.take(tick / 100))
+        assert len(texts._waiting) <= MOST_WAITING + 6
+        assert len(texts._recent) <= 201
+    assert count <= BURST + 10.0 * RATE_PER_S + 1
+
+
+def test_who_listens_anew_is_told_again() -> None:
+    texts = Texts()
+    texts.stand(0.0, [(Severity.ERROR, "cold")])
+    assert _told(texts, 0.0) == ["cold"]
+    texts.forget()
+    texts.stand(1.0, [(Severity.ERROR, "cold")])
+    assert _told(texts, 1.0) == ["cold"]

@@ -1,0 +1,202 @@
+"""A daemon that a test plays for its remote faces, and a ground station of pymavlink's own making."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from robosc.execution.event_log import Entry
+from robosc.model import check
+from robosc_bridge.configuration import parse, tie
+from robosc_bridge.daemon.feed import Feed, Snapshot
+from robosc_bridge.daemon.operations import Operations
+from robosc_bridge.daemon.programs import FromProgram
+from robosc_bridge.daemon.reports import Device
+from robosc_bridge.daemon.states import Command, Order, State
+from robosc_bridge.devices.interface import BINS, DriveReading, Pose, RawScan, Scan, Velocity
+from support.models import bundle_of
+
+MODEL = """
+robot Carrier {
+    interface twist use Twist from geometry_msgs
+    datatype object Vector { x: double z: double }
+    datatype object Twist { linear: Vector angular: Vector }
+    datatype enum Load from double to { value > 5.0 -> heavy value > 1.0 -> light default -> none_at_all }
+    component Lift {
+        outgoing message load with identifier: "/load", type: Load
+        outgoing message weight with identifier: "/weight", type: double
+        behaviour {
+            variable load: Load = none_at_all
+            variable is_full: boolean
+            variable count: integer(0..9) = 3
+            variable weight_of_all: double
+            on response from load do load := value
+            on response from weight do weight_of_all := value
+            initial marked state down {}
+            marked state up {}
+        }
+    }
+    component LongishComponentName {
+        incoming message drive with identifier: "/cmd_vel", type: Twist links twist
+        behaviour { initial marked state ready { on request to drive } }
+    }
+    provide drive with { linear: { x: 0.1 } }
+}
+"""
+CONFIGURATION = """
+robot: burger
+drive: {driver: opencr, port: /dev/base}
+channels:
+  /load: {channel: none}
+  /weight: {channel: none}
+  /cmd_vel: {channel: drive}
+"""
+KEY = bytes(range(32))
+
+
+def scan_of(ranges_m: Mapping[int, float], time_s: float = 100.0) -> Scan:
+    """A turn with a few ranges; NaN elsewhere."""
+    found = tuple(ranges_m.get(k, math.nan) for k in range(BINS))
+    return Scan(time_s, found, RawScan((), (), ()), 5.0)
+
+
+def reading_of(time_s: float = 100.0, **values: Any) -> DriveReading:
+    """What a drive base tells."""
+    told: dict[str, Any] = {"pose": Pose(), "velocity": Velocity(), "wheels_m_s": (0.0, 0.0), "is_torque_on": False}
+    return DriveReading(time_s=time_s, **{**told, **values})
+
+
+STANDBY = Snapshot(
+    number=1,
+    time_s=1.7e9,
+    state=State.STANDBY,
+    problem="",
+    reasons=(),
+    warnings=(),
+    stops=(),
+    devices={Device.DRIVE: True, Device.SCANNER: True},
+    components={},
+    enabled=(),
+    reading=None,
+    scan=None,
+    overruns=0,
+)
+
+
+@dataclass
+class PlayedDaemon:
+    """A daemon of which a test says what it shows and answers.
+
+    Attributes:
+        orders: That came, oldest first.
+        told: What programs told it.
+        seen: How often the operator was seen.
+        answers: To orders at once, by command; others wait for `answer`.
+    """
+
+    is_layer: bool = False
+    model: str = MODEL
+    configuration: str = CONFIGURATION
+    orders: list[Order] = field(default_factory=list)
+    told: list[FromProgram] = field(default_factory=list)
+    seen: int = 0
+    answers: dict[Command, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        checked = check(bundle_of(self.model))
+        assert checked.model is not None, checked.diagnostics
+        self.feed = Feed()
+        configuration = parse(self.configuration.encode(), "test.yaml").configuration
+        ties = tie(checked.model, configuration)
+        self.operations = Operations(
+            checked.model, ties, self.feed, self._post, self._operator_seen, is_layer=self.is_layer
+        )
+        self.snapshot = STANDBY
+        self.show()
+
+    def _post(self, item: Order | FromProgram) -> None:
+        if not isinstance(item, Order):
+            self.told.append(item)
+            return
+        self.orders.append(item)
+        if item.command in self.answers:
+            item.answer(self.answers[item.command])
+
+    def _operator_seen(self) -> None:
+        self.seen += 1
+
+    @property
+    def commands(self) -> list[Command]:
+        """That were ordered."""
+        return [order.command for order in self.orders]
+
+    def show(self, **values: Any) -> None:
+        """Show another snapshot."""
+        self.snapshot = replace(self.snapshot, number=self.snapshot.number + 1, **values)
+        self.feed.show(self.snapshot)
+
+    def write(self, **entry: Any) -> None:
+        """Write an entry into the event log."""
+        told: Entry = entry
+        self.feed.tell(told)
+
+
+class Station:
+    """A ground station's codec.
+
+    Args:
+        key: Of signing; None: it does not sign.
+        system: Its own.
+    """
+
+    def __init__(self, key: bytes | None = None, system: int = 255, component: int = 190) -> None:
+        self.codec: Any = dialect.MAVLink(None, srcSystem=system, srcComponent=component)
+        self.codec.robust_parsing = True
+        if key is not None:
+            self.codec.signing.secret_key = key
+            self.codec.signing.sign_outgoing = True
+            self.codec.signing.timestamp = 2**40
+            self.codec.signing.allow_unsigned_callback = lambda *_: False
+        self.heard: list[Any] = []
+
+    def pack(self, message: Any) -> bytes:
+        """A message as bytes."""
+        data = bytes(message.pack(self.codec))
+        self.codec.seq = (self.codec.seq + 1) % 256
+        return data
+
+    def heartbeat(self) -> bytes:
+        return self.pack(self.codec.heartbeat_encode(6, 8, 0, 0, 4))
+
+    def command(self, number: int, *parameters: float, confirmation: int = 0, to: tuple[int, int] = (1, 1)) -> bytes:
+        values = (*parameters, *(0.0,) * (7 - len(parameters)))
+        return self.pack(self.codec.command_long_encode(*to, number, confirmation, *values))
+
+    def command_int(self, number: int, *parameters: float, to: tuple[int, int] = (1, 1)) -> bytes:
+        first = (*parameters, *(0.0,) * (4 - len(parameters)))
+        return self.pack(self.codec.command_int_encode(*to, 0, number, 0, 0, *first, 0, 0, 0.0))
+
+    def hear(self, data: bytes) -> list[Any]:
+        """The messages in what came."""
+        found = [item for item in self.codec.parse_buffer(data) or [] if item.get_type() != "BAD_DATA"]
+        self.heard += found
+        return found
+
+
+def of_type(name: str, messages: list[Any]) -> list[Any]:
+    """The messages of one kind."""
+    return [item for item in messages if item.get_type() == name]
+
+
+def joined_texts(messages: list[Any]) -> list[str]:
+    """The texts of STATUSTEXT messages, put together as a station does."""
+    found, parts = [], b""
+    for item in of_type("STATUSTEXT", messages):
+        data = bytes(item._text_raw).partition(b"\0")[0]
+        parts += data
+        if item.id == 0 or len(data) < 50:
+            found.append(parts.decode("utf-8"))
+            parts = b""
+    return found

@@ -1,0 +1,90 @@
+"""A simulated rover in a world, and a driver of it, over a pseudo-terminal or UDP."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from robosc_bridge.devices.interface import (
+    STANDSTILL,
+    DriveReading,
+    Velocity,
+)
+from robosc_bridge.devices.mavlink_rover import MavlinkRover
+from robosc_bridge.devices.registry import make_drive_base
+from robosc_bridge.devices.robots import Body
+from robosc_bridge.simulated import BODIES, DatagramLine, Rover, SimulatedLine, Timebase, World, room
+
+BODY = Body(0.5, 2.0, BODIES["burger"].wheel_separation_m)
+FORWARD = Velocity(0.2)
+POSE = (0.3, 0.2, 0.7)
+KEY = bytes(range(32))
+
+
+@dataclass
+class Bench:
+    """A simulated rover in a world, and drivers of it."""
+
+    rover: Rover
+    world: World
+    time: Timebase
+    line: SimulatedLine | DatagramLine
+    base: MavlinkRover
+    path: str
+
+    def start(self) -> None:
+        self.base.open()
+        self.base.set_torque(True)
+
+    def drive(self, velocity: Velocity = STANDSTILL, seconds: float = 0.0) -> DriveReading:
+        end_s = time.monotonic() + seconds
+        while True:
+            reading = self.base.exchange(velocity)
+            if time.monotonic() >= end_s:
+                return reading
+            time.sleep(0.01)
+
+    def drive_until(
+        self, is_so: Callable[[DriveReading], bool], velocity: Velocity = STANDSTILL, limit_s: float = 5.0
+    ) -> DriveReading:
+        end_s = time.monotonic() + limit_s
+        while not is_so(reading := self.base.exchange(velocity)):
+            assert time.monotonic() < end_s, f"not within {limit_s} s; the last reading is {reading}"
+            time.sleep(0.01)
+        return reading
+
+    @property
+    def speed_m_s(self) -> float:
+        """That its motors are told."""
+        wheels = (self.world.left, self.world.right)
+        return sum(wheel.goal_rad_s * 0.033 / 2 for wheel in wheels if wheel.is_driven)
+
+
+@contextmanager
+def rig(
+    kind: str = "pty", key: bytes | None = None, vehicle: tuple[int, int] = (10, 3), **arguments: Any
+) -> Iterator[Bench]:
+    passing = Timebase()
+    world = World(BODIES["burger"], room(4.0, 3.0), passing, POSE)
+    rover = Rover(world, key=key, heartbeat_s=0.2)
+    rover.kind, rover.autopilot = vehicle
+    line: SimulatedLine | DatagramLine
+    if kind == "pty":
+        line = SimulatedLine(rover, passing)
+        path = line.path
+    elif kind == "udpout":
+        line = DatagramLine(rover, passing)
+        path = f"udpout:127.0.0.1:{line.port}"
+    else:
+        with DatagramLine(rover, passing) as other:
+            free = other.port
+        line = DatagramLine(rover, passing, free)
+        path = f"udpin:127.0.0.1:{free}"
+    base = make_drive_base("mavlink-rover", path=path, robot=BODY, **arguments)
+    assert isinstance(base, MavlinkRover)
+    try:
+        yield Bench(rover, world, passing, line, base, path)
+    finally:
+        base.close()
+        line.close()

@@ -113,7 +113,8 @@ class Conductor:
             return
         self._robot.saw_device(report.device, report.problem, executor, is_lost=True)
         if report.device is Device.DRIVE:
-            self._is_drive_lost = True
+            # A fault that was there before does not end with the drive base's return.
+            self._is_drive_lost = not self.problem
             self._fault(f"the drive base is lost: {report.problem}")
 
     def heed(self, notice: SafetyNotice) -> None:
@@ -160,6 +161,9 @@ class Conductor:
             case Command.RESET:
                 self._order_reset(order)
             case Command.QUIT:
+                if self.state is State.FAULT:
+                    # It was told when it came; whoever wanted the end gets an orderly one.
+                    self.problem = ""
                 self._orders.wait(Until.RESTING, order)
                 if self.state is not State.STOPPING:
                     self._end("the bridge ends", State.OVER)
@@ -189,7 +193,7 @@ class Conductor:
             return "the robot is being stopped"
         if self.state is State.FAULT:
             return f"the robot is in fault: {self.problem}; reset it first"
-        if self._orders.is_stop_coming:
+        if self._orders.is_halt_coming:
             return "it was told to stop meanwhile"
         if self._orders.is_waiting(Until.RESET):
             return "the motors are being reset"
@@ -255,13 +259,20 @@ class Conductor:
         executor = self._execution.begin()
         self.problem = ""
         self.state = State.RUNNING
-        self._safety.enable()
+        self._enable()
         executor.start()
         self._switch.begin(executor)
         if self._readiness.scan is not None:
             # It must not decide on nothing while the last one is at hand.
             self._robot.saw_scan(self._readiness.scan, executor)
         _log.info("running")
+
+    def _enable(self) -> None:
+        """Let the safety layer leave standby, unless somebody wants it there."""
+        self._safety.enable()
+        if self._orders.is_halt_coming:
+            # Its own word to the layer may have come just before this one.
+            self._safety.disable()
 
     def _end(self, reason: str, then: State) -> None:
         """Bring the robot to rest; `then` follows once the motors have let go."""
@@ -279,7 +290,7 @@ class Conductor:
     def _fault(self, problem: str) -> None:
         _log.error("%s", problem)
         self._end(problem, State.FAULT if self._stays_after_fault else State.OVER)
-        self.problem = problem
+        self.problem = f"{self.problem}; {problem}" if self.problem else problem
 
     def look(self, now_s: float) -> None:
         """At the end of a turn: whether the state becomes another."""
@@ -295,7 +306,8 @@ class Conductor:
         self._orders.settle(Until.STARTED, "" if self.state is State.RUNNING else self.problem or "it was stopped")
         match self.state:
             case State.STARTING if self._look_for_devices() and self._starts_itself:
-                self._begin()
+                if not self._orders.is_waiting(Until.RESET):
+                    self._begin()
             case State.STOPPING if not self._readiness.has_torque or now_s >= self._stop_end_s:
                 self._come_to_rest()
             case State.FAULT if self._is_drive_lost and self._readiness.is_drive_there:
@@ -352,7 +364,9 @@ class Conductor:
         if why:
             _log.error("the robot cannot go on: %s", why)
         elif self.state is State.RUNNING:
-            self._safety.enable()
+            # What was wanted meanwhile does not move it either.
+            self._robot.stop("the operator had stopped the robot")
+            self._enable()
         return why
 
     def turn_failed(self, reason: str) -> None:

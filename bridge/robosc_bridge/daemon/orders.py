@@ -42,9 +42,15 @@ class Orders:
             self._halting.popleft()
 
     @property
-    def is_stop_coming(self) -> bool:
-        """Whether somebody has ordered a stop that the loop has not taken up yet: it wins over what came before it."""
+    def is_halt_coming(self) -> bool:
+        """Whether an order that stops is not taken up by the loop yet: it wins over what came before it."""
         return bool(self._halting)
+
+    @property
+    def is_stop_coming(self) -> bool:
+        """Whether one of these is an operator's stop, which holds until an operator ends it."""
+        # Another thread may append meanwhile.
+        return any(order.command is Command.STOP for order in tuple(self._halting))
 
     def wait(self, until: Until, order: Order) -> None:
         """An order is answered later."""

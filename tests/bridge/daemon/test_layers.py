@@ -126,6 +126,23 @@ def test_what_is_allowed_moves_the_wheels_and_what_is_not_is_told_to_who_asked(
     assert without_sensors(program.say(Requested, "/cmd_vel", ZERO)) == []
 
 
+def test_what_was_asked_for_during_an_operators_stop_does_not_move_it_afterwards() -> None:
+    careless = MODEL.replace(" and Eyes.calm", "").replace("    requirement {spin, turn, face} needs Eyes.calm\n", "")
+    scene = Scene(text=CONFIGURATION.replace("0.4", "0"), model=careless, is_layer=True, stays=True)
+    scene.up()
+    program = Connected(scene, "an operator")
+    scene.daemon.post(Command.STOP)
+    scene.live(0.1, 2.0)
+    program.say(Requested, "/cmd_vel", FORWARD)
+    scene.live(0.3, 2.0)
+    scene.daemon.post(Command.RESUME)
+    scene.live(0.5, 2.0)
+    assert scene.out == STANDSTILL
+    program.say(Requested, "/cmd_vel", FORWARD)
+    scene.live(0.5, 2.0)
+    assert scene.out.linear_m_s == 0.1
+
+
 def test_sensors_are_passed_on_after_the_supervisor_has_seen_them(scene: Scene, program: Connected) -> None:
     silent = Connected(scene, "a viewer", may_request=False)
     silent.turn()

@@ -6,6 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from robosc_bridge.daemon.conductor import RESET_LIMIT_S, STOP_LIMIT_S
+from robosc_bridge.daemon.loop import Key
 from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, ResetDone
 from robosc_bridge.daemon.states import Command, Order, State
 from robosc_bridge.devices.interface import STANDSTILL
@@ -13,6 +14,7 @@ from robosc_bridge.safety import Reason
 from support.daemons import Scene
 
 DONE = ""
+RESET_THEN_STANDBY = (Command.RESET, Command.STANDBY)
 
 
 class Operated(Scene):
@@ -190,7 +192,9 @@ def test_a_stop_wins_over_what_was_ordered_before_it(command: Command, before: C
         scene.live(0.02, 2.0)
         moved.append(scene.out)
     assert set(moved) == {STANDSTILL}
-    assert (len(answers), answers != [DONE]) == (1, before is not Command.RESET or command is not Command.STANDBY)
+    # Who may go on, or is reset, may be put to rest as well; only an operator's stop says otherwise.
+    is_done = command is not Command.STOP if before is Command.RESUME else (before, command) == RESET_THEN_STANDBY
+    assert (len(answers), answers == [DONE]) == (1, is_done)
 
 
 def test_an_operators_stop_and_resume_are_told_to_the_model() -> None:
@@ -395,6 +399,103 @@ def test_a_stop_in_the_middle_of_a_reset_holds(command: Command, monkeypatch: py
     assert answers == [str(Reason.OPERATOR_STOP)]
     assert Reason.OPERATOR_STOP in scene.safety.output(scene.clock.monotonic()).reasons
     assert scene.out == STANDSTILL
+
+
+@pytest.mark.parametrize("how", ["button", "key"])
+def test_a_stop_at_the_robot_while_a_reset_waits_for_the_standstill_holds(how: str) -> None:
+    scene = running()
+    answers = scene.order(Command.RESET)
+    scene.daemon.turn()
+    assert scene.daemon.state is State.STOPPING
+    if how == "key":
+        scene.daemon.post(Key("space"))
+    else:
+        scene.buttons["button_1"] = True
+    scene.exchange()
+    scene.daemon.turn()
+    scene.buttons["button_1"] = False
+    scene.live(1.0, 2.0)
+    assert answers == [str(Reason.OPERATOR_STOP)]
+    assert scene.ask(Command.START, 0.1) == [LATCHED]
+
+
+@pytest.mark.parametrize("command", [Command.RESUME, Command.RESET])
+def test_a_standby_in_the_middle_of_a_reset_is_no_operators_stop(
+    command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = stopped()
+    if command is Command.RESET:
+        scene.order(Command.STANDBY)
+        scene.live(0.3, 2.0)
+    reset = scene.safety.reset
+
+    def overtaken() -> tuple[Reason, ...]:
+        remaining = reset()
+        scene.order(Command.STANDBY)
+        return remaining
+
+    monkeypatch.setattr(scene.safety, "reset", overtaken)
+    assert scene.ask(command, 0.3) == [DONE]
+    assert (scene.daemon.state, scene.out) == (State.STANDBY, STANDSTILL)
+    assert scene.safety.output(scene.clock.monotonic()).reasons == (Reason.STANDBY,)
+    monkeypatch.undo()
+    assert scene.ask(Command.START, 1.0) == [DONE]
+    assert scene.out.linear_m_s == 0.1
+
+
+def test_a_standby_in_the_middle_of_a_start_is_not_undone(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = standby()
+    enable = scene.safety.enable
+
+    def overtaken() -> None:
+        scene.order(Command.STANDBY)
+        enable()
+
+    monkeypatch.setattr(scene.safety, "enable", overtaken)
+    scene.order(Command.START)
+    scene.daemon.turn()
+    assert Reason.STANDBY in scene.safety.output(scene.clock.monotonic()).reasons
+    scene.live(0.3, 2.0)
+    assert (scene.daemon.state, scene.out) == (State.STANDBY, STANDSTILL)
+
+
+def test_nothing_starts_by_itself_while_a_reset_is_under_way() -> None:
+    scene = Operated(stays=True)
+    scene.answers_reset = False
+    scene.daemon.post(DeviceUp(Device.DRIVE))
+    scene.live(0.1)
+    answers = scene.order(Command.RESET)
+    scene.daemon.turn()
+    scene.daemon.post(DeviceUp(Device.SCANNER))
+    scene.live(0.3, 2.0)
+    assert (answers, scene.daemon.state, scene.out) == ([], State.STANDBY, STANDSTILL)
+    scene.daemon.post(ResetDone())
+    scene.live(0.1, 2.0)
+    assert answers == [DONE]
+    assert scene.ask(Command.START, 1.0) == [DONE]
+
+
+def test_a_fault_outlives_a_drive_that_is_lost_and_back() -> None:
+    scene = running()
+    executor = scene.daemon._execution.executor
+    assert executor is not None
+    executor.stop("broken", is_fault=True)
+    scene.daemon.turn()
+    assert scene.daemon.state is State.STOPPING
+    scene.daemon.post(DeviceDown(Device.DRIVE, "no answer", 0.25, True))
+    scene.daemon.turn()
+    scene.daemon.post(DeviceUp(Device.DRIVE))
+    scene.live(0.3, 2.0)
+    assert scene.daemon.state is State.FAULT
+    assert scene.daemon.problem.endswith("; the drive base is lost: no answer")
+    assert scene.ask(Command.RESET, 0.2) == [DONE]
+    assert (scene.daemon.state, scene.daemon.problem) == (State.STANDBY, "")
+
+
+def test_an_end_that_is_ordered_in_a_fault_is_an_orderly_one() -> None:
+    scene = fault()
+    assert scene.ask(Command.QUIT, 0.1) == [DONE]
+    assert (scene.daemon.state, scene.daemon.problem) == (State.OVER, "")
 
 
 def test_a_loop_that_breaks_answers_what_is_open(monkeypatch: pytest.MonkeyPatch) -> None:

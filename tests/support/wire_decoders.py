@@ -14,6 +14,7 @@ from robosc_bridge.protocol import lds01, lds02, lds03, opencr, servo
 from robosc_bridge.protocol.dynamixel import MAX_DEVICE, PacketHandler, status_of
 from robosc_bridge.protocol.framing import FrameDecoder
 from robosc_bridge.protocol.mavlink import Codec, Decoder
+from robosc_bridge.protocol.mavlink_messages import vehicle_message
 from robosc_bridge.protocol.turns import Points, TurnBuilder, nearest_by_degree
 from support import peer
 from support.lidar_frames import lds01_frame, lds02_frame, lds03_frame
@@ -108,7 +109,7 @@ def on_lds03(data: bytes) -> None:
 
 def on_mavlink(data: bytes) -> None:
     """Any bytes from a vehicle."""
-    decoder = Decoder(Codec(255, 190))
+    decoder = Decoder(Codec(255, 190), vehicle_message)
     _fed(decoder, data, 280)
     found = decoder.feed(_HEARTBEAT * (_HIDDEN + 2))
     _require(len(found) >= 2, "it is not understood after what a false header may hide")

@@ -10,6 +10,7 @@ from typing import assert_never
 from robosc.execution.clock import Clock
 from robosc_bridge.daemon.execution import Execution
 from robosc_bridge.daemon.jobs import Job
+from robosc_bridge.daemon.latches import Latches
 from robosc_bridge.daemon.motion import Motion
 from robosc_bridge.daemon.orders import Orders, Until, answer
 from robosc_bridge.daemon.readiness import Readiness
@@ -17,7 +18,7 @@ from robosc_bridge.daemon.reports import Device, DeviceDown, SafetyNotice
 from robosc_bridge.daemon.robot import Robot
 from robosc_bridge.daemon.states import Command, Order, State
 from robosc_bridge.daemon.stop_switch import STOP_HELD, StopSwitch
-from robosc_bridge.safety import LATCHING, Reason, SafetyLayer
+from robosc_bridge.safety import Reason, SafetyLayer
 
 _log = logging.getLogger(__name__)
 
@@ -31,8 +32,6 @@ OVER = "the bridge has ended"
 
 # They end by themselves, and belong to every start and stop.
 _ORDINARY = frozenset({Reason.STANDBY, Reason.TORQUE_AWAITED, Reason.COMMAND_SILENT})
-# An operator's stop is no fault; what is wrong with the supervisor is told by itself.
-_GRAVE = frozenset(LATCHING) - {Reason.OPERATOR_STOP, Reason.SUPERVISOR_FAULT}
 
 
 class Conductor:
@@ -48,13 +47,12 @@ class Conductor:
     Attributes:
         state: What the bridge is doing.
         problem: The fault that has stopped it; empty: none.
-        notice: What the safety layer says.
     """
 
     def __init__(self, job: Job, safety: SafetyLayer, readiness: Readiness, orders: Orders, clock: Clock) -> None:
         self.state = State.STARTING
         self.problem = ""
-        self.notice = SafetyNotice((), ())
+        self._latches = Latches(safety, orders)
         self._stays_after_fault = job.stays_after_fault
         self._starts_itself = job.starts_itself
         self._safety = safety
@@ -78,6 +76,11 @@ class Conductor:
         self._motion = motion
         self._switch = switch
         self._note = note
+
+    @property
+    def notice(self) -> SafetyNotice:
+        """What the safety layer says."""
+        return self._latches.notice
 
     def connect(
         self, hurry: Callable[[], None], reset_drive: Callable[[], None], are_alive: Callable[[], bool]
@@ -115,7 +118,7 @@ class Conductor:
 
     def heed(self, notice: SafetyNotice) -> None:
         """Tell a person why nothing moves; what only a person can end ends the run."""
-        known, self.notice = self.notice.warnings, notice
+        known, self._latches.notice = self.notice.warnings, notice
         for warning in notice.warnings:
             if warning not in known:
                 _log.warning("%s", warning)
@@ -123,7 +126,7 @@ class Conductor:
             # Before the start, nothing has told anything yet.
             is_news = self.state is State.RUNNING and reason not in _ORDINARY
             _log.log(logging.WARNING if is_news else logging.DEBUG, "%s", reason)
-        grave = [reason for reason in notice.reasons if reason in _GRAVE]
+        grave = self._latches.grave
         if grave and self.state is State.RUNNING:
             self._fault(" ".join(grave))
 
@@ -143,9 +146,8 @@ class Conductor:
             case Command.START:
                 self._order_start(order)
             case Command.STOP:
-                if self.state is State.STOPPING:
-                    # A reset that waits for the standstill would forget this stop, which came after it.
-                    self._orders.settle(Until.RESET, str(Reason.OPERATOR_STOP))
+                # A reset that is under way would forget this stop, which came after it.
+                self._orders.settle(Until.RESET, str(Reason.OPERATOR_STOP))
                 self._switch.stop(self._execution.executor)
                 self._settle()
                 answer(order, "")
@@ -191,20 +193,13 @@ class Conductor:
             return "it was told to stop meanwhile"
         if self._orders.is_waiting(Until.RESET):
             return "the motors are being reset"
-        latched = self._latched()
+        latched = self._latches.held(is_stopped=self._switch.is_stopped)
         if latched:
             return f"{latched} Resume or reset it first."
         return "" if self.state is State.RUNNING else self._readiness.missing() or self._dead_thread()
 
     def _dead_thread(self) -> str:
         return "" if self._are_alive() else "a device's thread has ended; the bridge must be started anew"
-
-    def _latched(self) -> str:
-        """What holds until somebody says otherwise."""
-        reasons = [reason for reason in self.notice.reasons if reason in LATCHING]
-        if self._switch.is_stopped and Reason.OPERATOR_STOP not in reasons:
-            reasons.append(Reason.OPERATOR_STOP)
-        return " ".join(reasons)
 
     def _order_standby(self, order: Order) -> None:
         match self.state:
@@ -233,39 +228,26 @@ class Conductor:
             self._reset()
 
     def _reset(self) -> None:
-        """Forget what has latched, and let the drive base reset its motors."""
+        """Let the drive base reset its motors: the fault of one that has switched itself off ends with that alone."""
         why = "" if self._readiness.is_drive_there else "the drive base is not there"
-        why = why or (STOP_HELD if self._switch.is_held else "") or self._release_safety()
+        why = why or (STOP_HELD if self._switch.is_held else "")
         if why:
             _log.error("reset: %s", why)
             self._orders.settle(Until.RESET, why)
             return
-        self._switch.reset()
         self._reset_end_s = self._clock.monotonic() + RESET_LIMIT_S
         self._reset_drive()
 
     def reset_done(self, problem: str) -> None:
-        """The drive base has reset its motors; empty: without a problem."""
+        """The drive base has reset its motors, and told how they are; forget what has latched if nothing is wrong."""
+        if self._orders.is_waiting(Until.RESET):
+            problem = problem or self._latches.release()
+            if not problem:
+                self._switch.reset()
+            if not problem and self.state is State.FAULT:
+                self.state, self.problem = State.STANDBY, ""
         _log.log(logging.ERROR if problem else logging.INFO, "reset: %s", problem or "done")
-        if self.state is State.FAULT and not problem and self._orders.is_waiting(Until.RESET):
-            self.state, self.problem = State.STANDBY, ""
         self._orders.settle(Until.RESET, problem)
-
-    def _release_safety(self) -> str:
-        """Let the safety layer forget what has latched; why it does not."""
-        if self._orders.is_stop_coming:
-            return str(Reason.OPERATOR_STOP)
-        remaining = self._safety.reset()
-        if remaining:
-            return " ".join(remaining)
-        if self._orders.is_stop_coming:
-            # It came between the two, and may have been forgotten with the others.
-            self._safety.operator_stop()
-            return str(Reason.OPERATOR_STOP)
-        self.notice = SafetyNotice(
-            tuple(reason for reason in self.notice.reasons if reason not in LATCHING), self.notice.warnings
-        )
-        return ""
 
     # Runs.
 
@@ -353,6 +335,7 @@ class Conductor:
 
     def operator_stop(self) -> None:
         """The operator stops the robot."""
+        self._orders.settle(Until.RESET, str(Reason.OPERATOR_STOP))
         self._safety.operator_stop()
         self._hurry()
         # What was wanted before does not move the robot afterwards.
@@ -364,8 +347,8 @@ class Conductor:
             return "the robot is being stopped"
         if self.state is State.FAULT:
             return f"the robot is in fault: {self.problem}; reset it first"
-        others = [reason for reason in self.notice.reasons if reason in _GRAVE]
-        why = f"{' '.join(others)} Reset it first." if others else self._release_safety()
+        grave = self._latches.grave
+        why = f"{' '.join(grave)} Reset it first." if grave else self._latches.release()
         if why:
             _log.error("the robot cannot go on: %s", why)
         elif self.state is State.RUNNING:

@@ -107,6 +107,8 @@ class Daemon:
         self._snapshots = Snapshots(feed, self._execution, self._readiness, clock)
         conductor.lead(self._execution, self._robot, self._motion, self._switch, self._snapshots.note)
         self._wish = Velocity()
+        # Taken out of the inbox, and not taken up to its end.
+        self._in_hand: tuple[Item, ...] = ()
         self._hurry: Callable[[], None] = lambda: None
 
     @property
@@ -166,6 +168,8 @@ class Daemon:
 
     def _close(self) -> None:
         """Nothing is done any more: whoever waits for something is told so."""
+        for item in self._in_hand:
+            _refuse(item)
         self._drain()
         self._orders.close(OVER)
 
@@ -175,13 +179,13 @@ class Daemon:
                 item = self._inbox.get_nowait()
             except queue.Empty:
                 break
-            if isinstance(item, Order):
-                answer(item, "" if item.command is Command.QUIT else OVER)
+            _refuse(item)
 
     def turn(self, *items: Item) -> None:
         """Handle what has come, and decide if it is time."""
-        now_s = self._clock.monotonic()
-        self._safety.loop_turned(now_s)
+        self._in_hand = items
+        self._safety.loop_turned(self._clock.monotonic())
+        self._in_hand = ()
         for item in items:
             self._handle(item)
         # Not what comes meanwhile: nobody can keep the loop from its turn.
@@ -231,7 +235,9 @@ class Daemon:
                 if executor is not None:
                     self._robot.saw_key(key, executor)
             case Order():
+                self._in_hand = (item,)
                 self._conductor.obey(item)
+                self._in_hand = ()
             case _Woken():
                 pass  # What they have sent is taken up in any turn.
             case _:
@@ -245,3 +251,9 @@ class Daemon:
         # On its way, a turn has another speed after each exchange; the next one is soon enough for it.
         if not self._motion.is_turning or velocity == STANDSTILL:
             self._hurry()
+
+
+def _refuse(item: Item) -> None:
+    """Nobody takes it up any more."""
+    if isinstance(item, Order):
+        answer(item, "" if item.command is Command.QUIT else OVER)

@@ -57,7 +57,7 @@ class Operations:
         """Want something; a stop takes effect before this returns.
 
         Returns:
-            Why it cannot be, one sentence, or nothing ("") once it is done; it may never come if the daemon ends.
+            Why it cannot be, one sentence, or nothing ("") once it is done; it comes also when the daemon ends.
         """
         answer: Future[str] = Future()
         self._post(Order(command, by, answer.set_result))

@@ -34,8 +34,8 @@ class Order:
     Attributes:
         command: What is wanted.
         by: Who wants it, for the log.
-        answer: Called once, by the loop's thread: with why it cannot be, one sentence, or with nothing ("") once it is
-            done. It neither waits nor raises.
+        answer: Called once, by the loop's thread, or after its end by that of who orders: with why it cannot be, one
+            sentence, or with nothing ("") once it is done. It neither waits nor raises.
     """
 
     command: Command

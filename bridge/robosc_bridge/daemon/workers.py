@@ -166,7 +166,8 @@ class DriveWorker:
         self._report(DeviceUp(Device.DRIVE))
 
     def _exchange(self, now_s: float) -> None:
-        if self._is_reset_wanted:
+        is_reset = self._is_reset_wanted
+        if is_reset:
             self._is_reset_wanted = False
             self._reset()
         command = self._ask(now_s)
@@ -182,6 +183,9 @@ class DriveWorker:
             self._told |= news
         self._gate.saw_drive(reading)
         self._report(reading)
+        if is_reset:
+            # Now it is known how the motors are.
+            self._report(ResetDone())
         # One that came early, because it was hurried, is no reason for a long pause.
         self._due_s = min(self._due_s, now_s) + self._period_s
         if self._due_s <= now_s:
@@ -205,7 +209,6 @@ class DriveWorker:
         except BridgeError as error:
             self._report(ResetDone(str(error)))
             raise
-        self._report(ResetDone())
 
     def _failed(self, problem: str) -> float:
         self._is_open = self._has_torque = False

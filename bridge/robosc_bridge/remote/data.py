@@ -9,7 +9,7 @@ from typing import Any
 
 from google.protobuf.struct_pb2 import NULL_VALUE, ListValue, Struct, Value
 
-MAXIMUM_DEPTH = 32
+MAXIMUM_DEPTH = 20
 MAXIMUM_VALUES = 20_000
 MAXIMUM_NAME = 255
 """Bytes of the name of a field."""

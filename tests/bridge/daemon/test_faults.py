@@ -8,6 +8,8 @@ stand in docs/bridge-safety.md ("Every fault, measured at the motors"), whose ta
 import errno
 import os
 import re
+import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +30,8 @@ TABLE = PAGE.partition("## Every fault, measured at the motors")[2]
 STATED_S = {name: float(time_s) for name, time_s in re.findall(r"^\| ([^|]+?) \| ([0-9.]+) s \|", TABLE, re.MULTILINE)}
 BASES = ("opencr", "dynamixel")
 SCAN_TIMEOUTS_S = {"lds01": 0.6, "lds02": 0.5, "lds03": 0.3}
+# A section `remote`; nothing listens there, the test itself is who can be told.
+REACHABLE = "{grpc_address: '127.0.0.1:1'}"
 # Enough for anything that goes on by itself to show.
 WHILE_S = 0.3
 
@@ -253,10 +257,87 @@ def test_an_operators_stop_holds_until_somebody_lets_it_go_on(base: str, how: Co
     with driven(base) as bridge:
         bridge.stopped_after(lambda: bridge.machine.daemon.post(how), STATED_S["an operator stops it"])
         bridge.stays(WHILE_S)
-        bridge.machine.daemon.post(Command.RESET)
-        bridge.until(lambda: bridge.state is State.STANDBY, "the standby after the reset")
+        assert _ordered(bridge, Command.RESET) == ""
+        assert bridge.state is State.STANDBY
         bridge.stays(WHILE_S)
-        bridge.machine.daemon.post(Command.START)
+        assert _ordered(bridge, Command.START) == ""
+        bridge.moves()
+
+
+def test_an_operator_who_is_lost_stops_the_wheels_until_he_is_back() -> None:
+    with driven("opencr", remote=REACHABLE, safety="{operator_link_timeout_s: 0.3}") as bridge:
+        is_there = threading.Event()
+        is_there.set()
+
+        def sees() -> None:
+            while bridge.state is not State.OVER:
+                if is_there.is_set():
+                    bridge.machine.operations.operator_seen()
+                time.sleep(0.02)
+
+        operator = threading.Thread(target=sees)
+        operator.start()
+        try:
+            bridge.stopped_after(is_there.clear, STATED_S["the operator is lost"])
+            bridge.was_told("The link to the operator is lost.")
+            bridge.stays(WHILE_S)
+            assert bridge.state is State.RUNNING
+            is_there.set()
+            bridge.moves()
+        finally:
+            bridge.machine.quit()
+            operator.join(LIMIT_S)
+
+
+# Where somebody can be told of it, the bridge stays; nothing moves before somebody says so.
+
+
+def _ordered(bridge: Driven, command: Command) -> str:
+    """Why it cannot be, or nothing."""
+    return bridge.machine.operations.order(command, "test").result(2 * LIMIT_S)
+
+
+@pytest.mark.parametrize("base", BASES)
+def test_a_base_that_is_plugged_in_again_moves_when_somebody_says_so(base: str) -> None:
+    with driven(base, remote=REACHABLE) as bridge:
+        line = bridge.robot.base_line
+        bridge.stopped_after(line.disconnect, STATED_S["the base is unplugged"])
+        bridge.until(lambda: bridge.state is State.FAULT, "the fault")
+        assert "the drive base is lost" in bridge.machine.daemon.problem
+        line.reconnect()
+        bridge.until(lambda: bridge.state is State.STANDBY, "the standby with the base back")
+        bridge.stays(2 * WHILE_S)
+        assert _ordered(bridge, Command.START) == ""
+        bridge.moves()
+
+
+@pytest.mark.parametrize("fault", [fault for fault in GRAVE if fault.is_line], ids=lambda fault: fault.row)
+def test_a_line_that_is_sound_again_moves_nothing_by_itself(fault: Fault) -> None:
+    with driven(fault.bases[0], remote=REACHABLE, options="{}") as bridge:
+        bridge.steady()
+        fault.cause(bridge)
+        bridge.until(lambda: bridge.state is State.FAULT, "the fault")
+        bridge.robot.base_line.reconnect()
+        bridge.robot.base_faults.clear()
+        _answer_as(bridge.robot, None)
+        for servo in (bridge.robot.left, bridge.robot.right):
+            servo.brown_out(12.0)
+        if bridge.robot.bus is not None:
+            _speak(bridge, 3)
+        bridge.until(lambda: bridge.state is State.STANDBY, "the standby with the base back")
+        bridge.stays(WHILE_S)
+
+
+def test_a_motor_that_is_overloaded_is_restarted_by_a_reset_and_moves_after_a_start() -> None:
+    with driven("dynamixel", remote=REACHABLE) as bridge:
+        bridge.stopped_after(bridge.robot.left.overload, STATED_S["a motor is overloaded"])
+        bridge.until(lambda: bridge.state is State.FAULT, "the fault")
+        assert _ordered(bridge, Command.START) != ""
+        bridge.stays(WHILE_S)
+        assert _ordered(bridge, Command.RESET) == ""
+        assert bridge.state is State.STANDBY
+        bridge.stays(WHILE_S)
+        assert _ordered(bridge, Command.START) == ""
         bridge.moves()
 
 

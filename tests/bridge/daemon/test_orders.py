@@ -375,6 +375,59 @@ def test_all_that_waits_is_answered_at_the_end_and_after_it() -> None:
     assert scene.order(Command.START) == [ENDED]
 
 
+@pytest.mark.parametrize("command", [Command.RESUME, Command.RESET])
+def test_a_stop_in_the_middle_of_a_reset_holds(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = stopped()
+    if command is Command.RESET:
+        scene.order(Command.STANDBY)
+        scene.live(0.3, 2.0)
+    reset = scene.safety.reset
+
+    def overtaken() -> tuple[Reason, ...]:
+        # From another thread, when the loop has looked whether a stop is coming, and nothing of it is left then.
+        scene.order(Command.STOP)
+        scene.exchange()
+        return reset()
+
+    monkeypatch.setattr(scene.safety, "reset", overtaken)
+    answers = scene.order(command)
+    scene.live(0.3, 2.0)
+    assert answers == [str(Reason.OPERATOR_STOP)]
+    assert Reason.OPERATOR_STOP in scene.safety.output(scene.clock.monotonic()).reasons
+    assert scene.out == STANDSTILL
+
+
+def test_a_loop_that_breaks_answers_what_is_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = supervisor_fault()
+    scene.answers_reset = False
+    waiting = scene.order(Command.RESET)
+    scene.live(0.1)
+
+    def broken(now_s: float) -> None:
+        raise RuntimeError(now_s)
+
+    monkeypatch.setattr(scene.safety, "loop_turned", broken)
+    late = scene.order(Command.START)
+    with pytest.raises(RuntimeError):
+        scene.daemon.run()
+    assert waiting == [ENDED]
+    # It had been taken out of the inbox when the loop broke.
+    assert (late, scene.order(Command.START)) == ([ENDED], [ENDED])
+
+
+def test_an_order_that_breaks_the_loop_is_answered(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = standby()
+
+    def broken() -> None:
+        raise RuntimeError
+
+    monkeypatch.setattr(scene.safety, "enable", broken)
+    answers = scene.order(Command.START)
+    with pytest.raises(RuntimeError):
+        scene.daemon.run()
+    assert answers == [ENDED]
+
+
 def test_an_answer_that_raises_harms_nobody() -> None:
     scene = running()
 

@@ -289,7 +289,9 @@ def test_a_reset_is_done_once_before_the_next_exchange(scene: Scene) -> None:
     scene.worker.reset()
     scene.step()
     assert scene.taken() == ["reset", ("torque", True), ("exchange", STANDSTILL)]
-    assert scene.reports[0] == ResetDone()
+    # When it is told, it is known how the motors are.
+    assert scene.reports[0] == scene.gate.readings[-1]
+    assert scene.reports[1] == ResetDone()
     scene.step()
     assert scene.taken() == [("exchange", STANDSTILL)]
 

@@ -110,6 +110,23 @@ def test_time_goes_on_across_restarts(key_file: Path) -> None:
     assert stamps == sorted(set(stamps))
 
 
+def test_the_time_of_packets_follows_the_clock_and_is_kept_ahead(
+    key_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_s = 1_700_000_000.0
+    monkeypatch.setattr("time.time", lambda: now_s)
+    _, session = _session(_signed(key_file))
+    kept = key_file.with_name("key.timestamp")
+    now_s += 3600.0
+    session.step(BEGIN_S + 1.0)
+    stamp = (1_700_003_600 - 1_420_070_400) * 100_000
+    assert stamp <= session._codec.timestamp < stamp + 100
+    # Whoever is killed now has used nothing beyond it.
+    assert session._codec.timestamp < int(kept.read_text()) <= stamp + 1_000_100
+    session.end(BEGIN_S + 2.0)
+    assert int(kept.read_text()) == session._codec.timestamp
+
+
 def test_a_forged_stop_from_the_future_shuts_nobody_out(key_file: Path) -> None:
     daemon, session = _session(_signed(key_file))
     station = _fresh(Station(KEY), key_file)

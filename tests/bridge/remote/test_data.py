@@ -78,7 +78,7 @@ def nested(levels: int) -> Value:
 
 def test_nesting_is_bounded() -> None:
     plain_of(nested(MAXIMUM_DEPTH))
-    with pytest.raises(DataError, match="nested deeper than 32 levels"):
+    with pytest.raises(DataError, match="nested deeper than 20 levels"):
         plain_of(nested(MAXIMUM_DEPTH + 1))
 
 

@@ -13,11 +13,12 @@ from pathlib import Path
 
 import pytest
 
+from robosc_api.v1 import bridge_pb2 as pb
 from robosc_bridge.simulated import SimulatedTurtleBot3
-from support.models import EXAMPLES
-from support.remote import eventually
+from support.real_time import preferred
+from support.remote import Attachment, connected, eventually
+from support.terminals import Terminal
 
-MODEL = EXAMPLES / "maze_solver" / "maze_solver.rscd"
 START_LIMIT_S, LIMIT_S = 90.0, 30.0
 
 
@@ -26,24 +27,57 @@ def command(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(line, capture_output=True, text=True, check=False, timeout=LIMIT_S)
 
 
-def configured(folder: Path, robot: SimulatedTurtleBot3) -> Path:
-    made = command("init", "--model", str(MODEL), "--drive", "opencr", "--scanner", "lds01")
-    assert made.returncode == 0, made.stderr
-    ports = iter((robot.base_path, robot.scanner_path))
-    text = re.sub(r"^  port: .*$", lambda _: f"  port: {next(ports)}", made.stdout, flags=re.MULTILINE)
-    text = re.sub(r"^  (overrun_s|motor_timeout_s|scan_timeout_s): .*$", r"  \1: 1.0", text, flags=re.MULTILINE)
-    text = re.sub(r"^  grpc_address: .*$", "  grpc_address: 127.0.0.1:0", text, flags=re.MULTILINE)
-    file = folder / "bridge.yaml"
-    file.write_text(text)
+RUNNER = """robot Runner {
+    interface twist use Twist from geometry_msgs
+    datatype object Vector { x: double z: double }
+    datatype object Twist { linear: Vector angular: Vector }
+    component Wheels {
+        incoming message drive with identifier: "/cmd_vel", type: Twist links twist
+        behaviour { initial marked state ready { on request to drive } }
+    }
+    provide drive with { linear: { x: 0.1 } }
+}
+"""
+CART = """robot Cart {
+    interface twist use Twist from geometry_msgs
+    datatype object Vector { x: double z: double }
+    datatype object Twist { linear: Vector angular: Vector }
+    component Gate {
+        outgoing message open with identifier: "/gate/open", type: none
+        outgoing message shut with identifier: "/gate/shut", type: none
+        behaviour {
+            initial marked state closed { on response from open goto opened }
+            marked state opened { on response from shut goto closed }
+        }
+    }
+    component Wheels {
+        incoming message drive with identifier: "/cmd_vel", type: Twist links twist
+    }
+    requirement drive needs Gate.opened
+}
+"""
+
+
+def configured(folder: Path, robot: SimulatedTurtleBot3, model: str, *grpc: str, operator: str = "null") -> Path:
+    """A configuration with its model beside it; the wheels are on `/cmd_vel`."""
+    (folder / "robot.rscd").write_text(model)
+    file = folder / "robot.yaml"
+    file.write_text(
+        f"robot: burger\ndrive: {{driver: opencr, port: {robot.base_path}}}\n"
+        # A machine on which tests run is not one for robots.
+        f"safety: {{overrun_s: 1.0, motor_timeout_s: 1.0, operator_link_timeout_s: {operator}}}\n"
+        "remote: {grpc_address: '127.0.0.1:0'}\n"
+        "channels:\n  /cmd_vel: {channel: drive}\n" + "".join(f"  {name}: {{channel: grpc}}\n" for name in grpc)
+    )
     return file
 
 
 class Running:
     """The program, and what it has written."""
 
-    def __init__(self, configuration: Path) -> None:
-        line = [sys.executable, "-m", "robosc_bridge.main", "run", "--standby"]
-        line += ["--model", str(MODEL), "--config", str(configuration)]
+    def __init__(self, configuration: Path, *options: str) -> None:
+        line = [sys.executable, "-m", "robosc_bridge.main", "run", "--standby", *options]
+        line += ["--model", str(configuration.with_suffix(".rscd")), "--config", str(configuration)]
         self.process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True)
         self.written = ""
         self._thread = threading.Thread(target=self._read)
@@ -56,8 +90,12 @@ class Running:
 
     def address(self) -> str:
         """Where its face listens."""
-        found = eventually(lambda: re.search(r"the remote face listens on (\S+)\n", self.written), START_LIMIT_S)
-        return found[1]
+
+        def look() -> re.Match[str] | None:
+            assert self.process.poll() is None, self.written
+            return re.search(r"the remote face listens on (\S+)\n", self.written)
+
+        return eventually(look, START_LIMIT_S)[1]
 
     def end(self) -> None:
         self.process.kill()
@@ -69,7 +107,7 @@ class Running:
 
 @contextmanager
 def running(folder: Path, robot: SimulatedTurtleBot3) -> Iterator[Running]:
-    bridge = Running(configured(folder, robot))
+    bridge = Running(configured(folder, robot, RUNNER))
     try:
         yield bridge
     finally:
@@ -85,13 +123,19 @@ def becomes(look: Callable[[], bool]) -> None:
     eventually(look, LIMIT_S)
 
 
+def moves(robot: SimulatedTurtleBot3) -> bool:
+    # A look takes the world's lock, which the robot needs as well.
+    time.sleep(0.02)
+    return speeds(robot) != (0.0, 0.0)
+
+
 def state(address: str) -> str:
     return str(json.loads(command("status", "--json", "--address", address).stdout)["state"])
 
 
 @pytest.fixture
 def robot() -> Iterator[SimulatedTurtleBot3]:
-    with SimulatedTurtleBot3("burger", "opencr", "lds01") as made:
+    with preferred(), SimulatedTurtleBot3("burger", "opencr", "lds01") as made:
         yield made
 
 
@@ -108,17 +152,17 @@ def test_a_robot_is_started_watched_stopped_and_let_go_on_from_elsewhere(
             assert "= standby" in watcher.stdout.readline()
             started = command("start", "--address", address)
             assert (started.returncode, started.stdout) == (0, "start: done\n"), started.stderr
-            becomes(lambda: speeds(robot) != (0.0, 0.0))
+            becomes(lambda: moves(robot))
 
             stopped = command("stop", "--address", address)
             assert (stopped.returncode, stopped.stderr) == (0, "")
-            becomes(lambda: speeds(robot) == (0.0, 0.0))
+            becomes(lambda: not moves(robot))
             told = command("status", "--address", address)
             assert "nothing moves: An operator has stopped the robot. (until reset)" in told.stdout
 
             resumed = command("resume", "--address", address)
             assert (resumed.returncode, resumed.stderr) == (0, "")
-            becomes(lambda: speeds(robot) != (0.0, 0.0))
+            becomes(lambda: moves(robot))
 
             assert command("standby", "--address", address).returncode == 0
             assert state(address) == "BRIDGE_STATE_STANDBY"
@@ -143,7 +187,7 @@ def test_a_stop_reaches_the_motors_at_once(
         eventually(lambda: state(address) == "BRIDGE_STATE_STANDBY", START_LIMIT_S)
         with BridgeClient(address, Credentials()) as client:
             client.want(Wish.START)
-            becomes(lambda: speeds(robot) != (0.0, 0.0))
+            becomes(lambda: moves(robot))
             client.status()
             begin_s = time.monotonic()
             client.stop()
@@ -171,7 +215,7 @@ def test_a_stop_reaches_the_motors_at_once(
 
 
 def test_an_address_that_cannot_be_used_is_one_line(robot: SimulatedTurtleBot3, tmp_path: Path) -> None:
-    file = configured(tmp_path, robot)
+    file = configured(tmp_path, robot, RUNNER)
     file.write_text(file.read_text().replace("127.0.0.1:0", "0.0.0.0:0"))
     bridge = Running(file)
     try:
@@ -180,3 +224,48 @@ def test_an_address_that_cannot_be_used_is_one_line(robot: SimulatedTurtleBot3, 
         assert "Traceback" not in bridge.written
     finally:
         bridge.end()
+
+
+def test_a_robot_is_driven_by_keys_as_far_as_the_layer_lets_it(tmp_path: Path) -> None:
+    with preferred(), SimulatedTurtleBot3("burger", "opencr", "lds01") as robot:
+        configuration = configured(tmp_path, robot, CART, "/gate/open", "/gate/shut", operator="2.0")
+        bridge = Running(configuration, "--deployment", "layer")
+        try:
+            address = bridge.address()
+            eventually(lambda: state(address) == "BRIDGE_STATE_STANDBY", START_LIMIT_S)
+            with connected(address) as stub:
+                gate = Attachment(stub, name="gate")
+                gate.receive()
+                assert command("start", "--address", address).returncode == 0
+                terminal = Terminal(address)
+                try:
+                    eventually(lambda: "w/s or up/down" in terminal.seen)
+                    terminal.type("wwwww")
+                    eventually(lambda: "BLOCKED /cmd_vel" in terminal.seen)
+                    assert speeds(robot) == (0.0, 0.0)
+                    gate.send(give=pb.Message(identifier="/gate/open"))
+                    becomes(lambda: moves(robot) and min(speeds(robot)) > 1.0)
+                    gate.send(give=pb.Message(identifier="/gate/shut"))
+                    becomes(lambda: not moves(robot))
+                    gate.send(give=pb.Message(identifier="/gate/open"))
+                    becomes(lambda: moves(robot) and min(speeds(robot)) > 1.0)
+                    # Nobody says goodbye.
+                    terminal.process.kill()
+                    becomes(lambda: not moves(robot))
+                    becomes(
+                        lambda: (
+                            "the link to the operator is lost" in command("status", "--address", address).stdout.lower()
+                        )
+                    )
+                finally:
+                    terminal.close()
+                gate.send(give=pb.Message(identifier="/nowhere"))
+                while not (told := gate.receive()).HasField("refused"):
+                    pass
+                assert "/nowhere" in told.refused.why
+                gate.end()
+            bridge.process.send_signal(signal.SIGTERM)
+            assert bridge.process.wait(LIMIT_S) == 0
+            assert "Traceback" not in bridge.written
+        finally:
+            bridge.end()

@@ -1,10 +1,7 @@
 """Driving by keys: the command as a program on a real pseudo-terminal."""
 
-import os
-import pty
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,6 +13,7 @@ from robosc_bridge.daemon import programs
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.terminal.teleop import ANGULAR_RAD_S, LINEAR_M_S, Wished, keys_of
 from support.remote import PATIENCE_S, FakeDaemon, eventually, served
+from support.terminals import Terminal
 
 
 class TestKeys:
@@ -64,39 +62,6 @@ class TestKeys:
 
     def test_arrows_are_letters(self) -> None:
         assert keys_of("\x1b[Aa\x1b[B\x1b[C\x1b[Dx\x1b") == ["w", "a", "s", "d", "a", "x", "\x1b"]
-
-
-class Terminal:
-    """The command on a pseudo-terminal."""
-
-    def __init__(self, address: str) -> None:
-        self._number, inner = pty.openpty()
-        command = [sys.executable, "-m", "robosc_bridge.command", "teleop", "--address", address]
-        self.process = subprocess.Popen(command, stdin=inner, stdout=inner, stderr=inner)
-        os.close(inner)
-        self._seen = b""
-        self._thread = threading.Thread(target=self._read)
-        self._thread.start()
-
-    def _read(self) -> None:
-        while True:
-            try:
-                self._seen += os.read(self._number, 4096)
-            except OSError:
-                return
-
-    @property
-    def seen(self) -> str:
-        return self._seen.decode()
-
-    def type(self, keys: str) -> None:
-        os.write(self._number, keys.encode())
-
-    def close(self) -> None:
-        self.process.kill()
-        self.process.wait()
-        self._thread.join(PATIENCE_S)
-        os.close(self._number)
 
 
 @pytest.fixture

@@ -84,7 +84,7 @@ def simulated(*arguments: str) -> Iterator[Simulator]:
 
 def configuration(robot: Simulator, base: str, lidar: str, period_s: float, channels: str) -> str:
     """A configuration for a simulated Burger, whose time-outs bear with a machine that has other work, too."""
-    options = "answer_limit_s: 0.5" + (", watchdog_s: 2.5" if base == "dynamixel" else "")
+    options = "answer_limit_s: 0.1" + (", watchdog_s: 2.5" if base == "dynamixel" else "")
     return f"""
 robot: burger
 drive: {{driver: {base}, port: {robot.base_path}, options: {{{options}}}}}

@@ -8,6 +8,8 @@ import pytest
 
 from robosc.cli.main import make_parser
 from robosc.supervisor import MadeStatus, make_supervisor
+from robosc_bridge import main as bridge
+from robosc_bridge.simulated import __main__ as simulated
 from robosc_client.main import make_parser as client_parser
 from support.models import bundle_of
 
@@ -15,6 +17,9 @@ ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```\n(.*?)```", README, re.DOTALL)
 COMMANDS = [line.partition("#")[0].rstrip(" &") for block in BLOCKS for line in block.splitlines()]
+
+BRIDGE = (ROOT / "bridge" / "README.md").read_text(encoding="utf-8")
+SHOWN = [line.removeprefix("$ ").partition("#")[0] for line in BRIDGE.splitlines()]
 
 
 def test_the_model_has_no_findings_and_a_supervisor() -> None:
@@ -30,6 +35,19 @@ def test_the_commands_are_understood(command: str) -> None:
     parsed = parser.parse_args(arguments)
     for place in (getattr(parsed, "model", None), *getattr(parsed, "paths", ())):
         assert place is None or (ROOT / place).exists()
+
+
+@pytest.mark.parametrize(
+    "command", [line for line in SHOWN if re.match(r"robosc-bridge \w|python -m robosc_bridge", line)]
+)
+def test_the_bridges_commands_are_understood(command: str) -> None:
+    words = shlex.split(command)
+    parser, arguments = (
+        (bridge._parser(), words[1:]) if words[0] == "robosc-bridge" else (simulated._parser(), words[3:])
+    )
+    parsed = parser.parse_args(arguments)
+    model = getattr(parsed, "model", None)
+    assert model is None or (ROOT / model).exists() or "/" not in str(model)
 
 
 @pytest.mark.parametrize("command", [line for line in COMMANDS if line.startswith("make ")])

@@ -50,6 +50,7 @@ def test_public_names() -> None:
     assert set(robosc_client.__all__) == {
         "Client",
         "ClientError",
+        "CredentialsError",
         "DeadlineError",
         "Generation",
         "Progress",

@@ -1,10 +1,12 @@
 """Programs of the model and operators of a layer, over real sockets."""
 
 import math
+import os
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 from typing import Any
 
 import grpc
@@ -297,7 +299,8 @@ class TestHostilePrograms:
             "    program.receive(); program.receive()\n"
         )
         with served(daemon) as face:
-            process = subprocess.Popen([sys.executable, "-c", text, face.address])
+            environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+            process = subprocess.Popen([sys.executable, "-c", text, face.address], env=environment)
             try:
                 daemon.program()
                 process.send_signal(signal.SIGSTOP)

@@ -26,6 +26,8 @@ WRONG_USE: dict[str, list[str]] = {
     "explain-synthesis": ["none.rscd"],
     "explain": ["nothing-like-it"],
     "doc": ["none.rscd"],
+    "key": ["no/such/folder/lab"],
+    "sign": ["none.rsup", "--key", "none.key"],
 }
 """For each command arguments that its parser takes, but that are wrong."""
 

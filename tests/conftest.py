@@ -32,6 +32,7 @@ _IN_REAL_TIME = (
     "tests/bridge/daemon/test_follow_line.py",
     "tests/bridge/daemon/test_run.py",
     "tests/bridge/daemon/test_simulated_scanner.py",
+    "tests/bridge/devices/test_drive_bases.py",
     "tests/bridge/ground/test_ground_run.py",
     "tests/bridge/remote/test_whole.py",
     "tests/bridge/terminal/test_teleop.py",

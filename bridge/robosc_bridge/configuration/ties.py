@@ -52,6 +52,12 @@ class Ties:
             given["release_identifiers"] = tuple(dict.fromkeys(acting))
         return settings_from(given)
 
+    def never_released(self, settings: Settings) -> tuple[str, ...]:
+        """Identifiers tied to the drive whose last message acts until another one comes, whoever has sent it."""
+        released = settings.release_identifiers or ()
+        driven = dict.fromkeys(item.identifier for item, _ in self.tied_to(DriveChannel))
+        return tuple(identifier for identifier in driven if identifier not in released)
+
 
 def tie(model: Model, configuration: Configuration, document: Document | None = None) -> Ties:
     """Tie every communication of a model.

@@ -115,6 +115,11 @@ def check_settings(configuration: Configuration, ties: Ties, deployment: Deploym
     problems = sight_problems(configuration.skills.line, ties, settings)
     if problems:
         raise AssemblyError("; ".join(problems))
+    kept = ties.never_released(settings) if deployment is Deployment.LAYER else ()
+    if kept:
+        # A velocity would outlive the program that asked for it.
+        names = ", ".join(f"'{identifier}'" for identifier in kept)
+        raise AssemblyError(f"execution.release_identifiers must name {names} in a supervision layer")
     try:
         require_settings_of(settings, str(deployment))
     except SettingsError as error:

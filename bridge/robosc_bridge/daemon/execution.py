@@ -81,6 +81,8 @@ class Execution:
     def decide(self, now_s: float, *, is_running: bool) -> None:
         """A period has passed; decisions that come too late by whole periods are left out."""
         if self.executor is not None:
+            if self.layer is not None:
+                self._requesters.release_silent(self.layer)
             self.executor.tick()
             self._robot.settle(self.executor)
             self._robot.report_turn(self.executor)

@@ -101,7 +101,14 @@ class Daemon:
             job.settings.service_timeout_s,
             clock.monotonic,
         )
-        requesters = Requesters(job.supervisor.model, job.ties, roster, self._robot.abandon)
+        requesters = Requesters(
+            job.supervisor.model,
+            job.ties,
+            roster,
+            self._robot.abandon,
+            job.settings.command_timeout_s,
+            clock.monotonic,
+        )
         self._execution = Execution(job, self._robot, requesters, clock, WatchedLog(log, feed))
         self._programs = ProgramsSide(roster, exchange, requesters, self._execution, self._robot, is_layer=job.is_layer)
         self._snapshots = Snapshots(feed, self._execution, self._readiness, clock)

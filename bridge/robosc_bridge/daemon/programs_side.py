@@ -86,7 +86,7 @@ class ProgramsSide:
             case Overflowed(lost=lost):
                 self._roster.refuse(program, f"this program sends too much at once: {lost} of it were not looked at")
                 if layer is not None:
-                    self._requesters.silence(program, layer)
+                    self._requesters.overflow(program, layer)
             case Told():
                 self._exchange.hear(item, executor)
             case Replied() | CallFailed() | GoalAccepted() | FeedbackGiven() | GoalEnded():

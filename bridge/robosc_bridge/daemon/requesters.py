@@ -1,12 +1,15 @@
 """The caller's side of a supervision layer: programs that may ask for what the layer lets through or holds back.
 
 Ids of calls and goals are each program's own. What a program asked for ends with its connection: goals are cancelled,
-and what its messages and calls keep moving stands still at once, without waiting for `command_timeout_s`.
+and what its messages and calls keep moving stands still at once, without waiting for `command_timeout_s`. The layer
+knows one caller only, and takes whatever comes on an identifier for a sign of its life. Here there are several: each
+program's own signs count for what it keeps moving, and no others.
 """
 
 import logging
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 from robosc.execution.layer import Layer
@@ -43,6 +46,20 @@ Asked = Requested | Called | GoalSent | CancelWanted
 
 _Id = tuple[Program, str]
 _GONE = "the program that asked for it is gone"
+_TOO_MUCH = "the program that asked for it sends too much at once"
+
+
+@dataclass
+class _Sender:
+    """Whose message went through last on an identifier.
+
+    Attributes:
+        program: That sent it.
+        heard_s: When something came last from it there, whether it went through or not.
+    """
+
+    program: Program
+    heard_s: float
 
 
 class Requesters:
@@ -53,13 +70,26 @@ class Requesters:
         ties: What each communication is tied to.
         roster: Programs that are there.
         abandon: Ends a turn that a communication asked for, with the reason.
+        command_timeout_s: After how long without a message of it a program's last one on an identifier is released;
+            0: never.
+        clock: What the time is, in seconds.
     """
 
-    def __init__(self, model: Model, ties: Ties, roster: Roster, abandon: Callable[[str, str], None]) -> None:
+    def __init__(
+        self,
+        model: Model,
+        ties: Ties,
+        roster: Roster,
+        abandon: Callable[[str, str], None],
+        command_timeout_s: float,
+        clock: Callable[[], float],
+    ) -> None:
         self._model = model
         self._channels = ties.channels
         self._roster = roster
         self._abandon = abandon
+        self._timeout_s = command_timeout_s or math.inf
+        self._clock = clock
         self._messages: dict[str, list[Communication]] = {}
         self._others: dict[tuple[CommunicationKind, str], Communication] = {}
         for item in ties.communications:
@@ -73,8 +103,8 @@ class Requesters:
             self._shapes[item.name] = accepted(model, item.request, shape)
         self._asker: Program | None = None
         self._was_blocked = False
-        # Whose message went through last, by identifier; calls and goals under way.
-        self._senders: dict[str, Program] = {}
+        # By identifier; then calls and goals under way.
+        self._senders: dict[str, _Sender] = {}
         self._calls: dict[_Id, str] = {}
         self._goals: dict[_Id, str] = {}
 
@@ -89,26 +119,37 @@ class Requesters:
         self._goals.clear()
 
     def detach(self, program: Program, layer: Layer | None) -> None:
-        """A program is gone: what it asked for ends."""
+        """A program is gone: what it asked for ends, and it is told nothing of that."""
         if layer is not None:
-            self.silence(program, layer)
-            for (owner, goal_id), action in tuple(self._goals.items()):
-                if owner is program:
-                    layer.on_cancel(action, (program, goal_id))
-            for (owner, _), service in tuple(self._calls.items()):
-                if owner is program:
-                    self._abandon(service, _GONE)
+            self._end(program, layer, _GONE)
         self._calls = {item: name for item, name in self._calls.items() if item[0] is not program}
         self._goals = {item: name for item, name in self._goals.items() if item[0] is not program}
 
-    def silence(self, program: Program, layer: Layer) -> None:
-        """What a program's messages keep moving stands still."""
+    def overflow(self, program: Program, layer: Layer) -> None:
+        """Some of what a program sent was lost, maybe what ends something: all that it asked for ends."""
+        self._end(program, layer, _TOO_MUCH)
+
+    def _end(self, program: Program, layer: Layer, reason: str) -> None:
+        """What a program's messages keep moving stands still, its goals are cancelled, its turns end."""
         for identifier, sender in tuple(self._senders.items()):
-            if sender is program:
+            if sender.program is program:
                 del self._senders[identifier]
                 layer.on_silent(identifier)
                 for item in self._messages[identifier]:
-                    self._abandon(item.name, _GONE)
+                    self._abandon(item.name, reason)
+        for (owner, goal_id), action in tuple(self._goals.items()):
+            if owner is program:
+                layer.on_cancel(action, (program, goal_id))
+        for (owner, _), service in tuple(self._calls.items()):
+            if owner is program:
+                self._abandon(service, reason)
+
+    def release_silent(self, layer: Layer) -> None:
+        """Release the last message of each program that has fallen silent where that message may still act."""
+        now_s = self._clock()
+        for identifier, sender in self._senders.items():
+            if now_s >= sender.heard_s + self._timeout_s:
+                layer.on_silent(identifier)
 
     # What programs ask for.
 
@@ -130,9 +171,12 @@ class Requesters:
             case Requested(program=program, identifier=identifier, data=data):
                 for message in self._messages[identifier]:
                     data = completed(self._model, message.request, data)
+                now_s, sender = self._clock(), self._senders.get(identifier)
                 layer.on_request(identifier, data)
                 if not self._was_blocked:
-                    self._senders[identifier] = program
+                    self._senders[identifier] = _Sender(program, now_s)
+                elif sender is not None and sender.program is program:
+                    sender.heard_s = now_s
             case Called(program=program, service=service, call_id=call_id, data=data):
                 self._calls[program, call_id] = service
                 layer.on_call(service, (program, call_id), self._completed(CommunicationKind.SERVICE, service, data))

@@ -54,6 +54,18 @@ def test_what_needs_a_remote_face_is_refused_without_one(
     assert why in str(raised.value)
 
 
+@pytest.mark.parametrize("chosen", ["[]", "[/turn]"])
+def test_a_layer_releases_what_drives(chosen: str, supervisor: Supervisor) -> None:
+    text = CONFIGURATION.replace("execution: {", f"execution: {{release_identifiers: {chosen}, ")
+    configuration = parse(f"{text}\nremote: {{grpc_address: '127.0.0.1:0'}}\n".encode(), "test.yaml").configuration
+    ties = tie(supervisor.model, configuration)
+    with pytest.raises(AssemblyError) as raised:
+        check_settings(configuration, ties, Deployment.LAYER)
+    assert str(raised.value) == "execution.release_identifiers must name '/cmd_vel' in a supervision layer"
+    # A controller knows what it has asked for.
+    assert check_settings(configuration, ties, Deployment.CONTROLLER)
+
+
 def test_nobody_waits_in_standby_for_somebody_who_cannot_come(supervisor: Supervisor) -> None:
     with pytest.raises(AssemblyError, match="to wait in standby, the bridge needs "):
         machine(supervisor, CONFIGURATION, starts_itself=False)

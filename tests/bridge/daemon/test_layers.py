@@ -170,6 +170,44 @@ def test_a_caller_that_falls_silent_is_released_though_the_loop_repeats_what_it_
         assert scene.out.linear_m_s == 0.1
 
 
+@pytest.mark.parametrize("data", [{"linear": {"x": math.nan}}, {"linear": {"x": 0.2}}])
+def test_a_silent_caller_is_released_whatever_is_held_back_from_others(data: Any) -> None:
+    walk = next(line for line in MODEL.splitlines(keepends=True) if "message walk" in line)
+    run = walk.replace("walk", "run").replace("!= 0.0", "> 0.15")
+    never = "    requirement run needs Eyes.stopped\n    requirement {spin"
+    scene = driven(MODEL.replace(walk, run + walk).replace("    requirement {spin", never))
+    program, other = Connected(scene, "an operator"), Connected(scene, "another")
+    program.say(Requested, "/cmd_vel", FORWARD)
+    scene.live(0.1, 2.0)
+    for _ in range(3):
+        assert Blocked("/cmd_vel") in other.say(Requested, "/cmd_vel", data)
+        scene.live(0.1, 2.0)
+        assert scene.out.linear_m_s == 0.1
+    assert Blocked("/cmd_vel") in other.say(Requested, "/cmd_vel", data)
+    scene.live(0.14, 2.0)
+    assert scene.out == STANDSTILL
+    # Its own are signs of its life, whether they go through or not.
+    program.say(Requested, "/cmd_vel", FORWARD)
+    for _ in range(8):
+        scene.live(0.2, 2.0)
+        assert scene.out.linear_m_s == 0.1
+        assert Blocked("/cmd_vel") in program.say(Requested, "/cmd_vel", data)
+
+
+def test_whose_message_went_through_last_is_who_keeps_it_acting(scene: Scene, program: Connected) -> None:
+    other = Connected(scene, "another")
+    program.say(Requested, "/cmd_vel", FORWARD)
+    scene.live(0.3, 2.0)
+    other.say(Requested, "/cmd_vel", {"linear": {"x": 0.05}})
+    scene.live(0.3, 2.0)
+    assert scene.out.linear_m_s == 0.05
+    program.leave()
+    scene.live(0.04, 2.0)
+    assert scene.out.linear_m_s == 0.05
+    scene.live(0.1, 2.0)
+    assert scene.out == STANDSTILL
+
+
 def test_a_caller_that_leaves_stands_still_at_once(scene: Scene, program: Connected) -> None:
     other = Connected(scene, "another")
     program.say(Requested, "/cmd_vel", FORWARD)
@@ -375,6 +413,34 @@ def test_who_sends_too_much_is_stopped(scene: Scene, program: Connected) -> None
         program.turn()
         scene.exchange()
     assert scene.out == STANDSTILL
+
+
+@pytest.mark.parametrize(
+    ("make", "arguments"),
+    [(GoalSent, ("face", "g", {"angle": 340})), (Called, ("turn", "c", {"angle": 340})), (Requested, ("/spin", 340))],
+)
+def test_what_who_sends_too_much_has_asked_for_ends(
+    make: Any, arguments: tuple[Any, ...], scene: Scene, program: Connected
+) -> None:
+    program.say(make, *arguments)
+    scene.live(0.3, 2.0)
+    assert scene.out.angular_rad_s > 0.0
+    for _ in range(260):
+        scene.daemon.post(Requested(program.program, "/nowhere", None))
+    # It may have been this one that is lost.
+    scene.daemon.post(CancelWanted(program.program, "face", "g"))
+    program.told.clear()
+    scene.live(0.3, 2.0)
+    assert scene.out == STANDSTILL
+    assert any("too much at once" in why for why in refused(program.told))
+    if make is GoalSent:
+        assert program.of(GoalOver) == [GoalOver("g", "cancelled", None)]
+    if make is Called:
+        assert program.of(Answered) == [Answered("c", None, is_default=True)]
+    # It may go on.
+    program.say(Requested, "/cmd_vel", FORWARD)
+    scene.live(0.3, 2.0)
+    assert scene.out.linear_m_s == 0.1
 
 
 def test_a_lost_drive_base_ends_a_layers_run(scene: Scene, program: Connected) -> None:

@@ -71,6 +71,9 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--server", metavar="HOST:PORT", help="a synthesis server that makes the supervisor of the model")
     run.add_argument("--keep", metavar="FOLDER", type=Path, help="folder for what the server made last")
     run.add_argument(
+        "--allow-livelock", action="store_true", help="execute it even if its silent steps can go on for ever"
+    )
+    run.add_argument(
         "--standby", action="store_true", help="wait for an operator to start it; needs a remote face (section remote)"
     )
     run.add_argument("--verbose", action="store_true", help="tell more")
@@ -184,7 +187,8 @@ def _run(arguments: argparse.Namespace) -> int:
     deployment = arguments.deployment or deployment_of(arguments.model)
     trusted = trusted_keys(configuration.supervisor.trusted_keys)
     credentials = credentials_of(configuration.supervisor)
-    supervisor = obtain(Source(arguments.model, deployment, server, arguments.keep, trusted, credentials), tell)
+    source = Source(arguments.model, deployment, server, arguments.keep, trusted, credentials, arguments.allow_livelock)
+    supervisor = obtain(source, tell)
     ties = tie(supervisor.model, configuration, loaded.document)
     log: EventLog = NullLog()
     if configuration.log.folder is not None:

@@ -148,6 +148,29 @@ def test_a_signed_supervisor_is_run_without_its_model(tmp_path: Path) -> None:
         assert (refused.returncode, "has been changed" in refused.stderr) == (2, True)
 
 
+def test_silent_steps_that_never_end_are_refused_unless_they_are_allowed(tmp_path: Path) -> None:
+    model, supervisor, file = (tmp_path / name for name in ("live.rscd", "live.rsup", "bridge.yaml"))
+    model.write_text(
+        """robot Live {
+    component C {
+        incoming message go with identifier: "/go", type: none
+        behaviour { initial marked state s { transition goto t } marked state t { transition goto s } }
+    }
+}"""
+    )
+    file.write_text("robot: burger\ndrive: {driver: opencr, port: /dev/none}\nchannels: {/go: {channel: log}}\n")
+    assert robosc(["synth", str(model), "--allow-livelock", "-o", str(supervisor)]) == 0
+    for path in (model, supervisor):
+        # Where they are allowed, the next thing that is wrong is told.
+        command_line = ("run", "--standby", "--model", str(path), "--config", str(file))
+        refused, allowed = bridge(*command_line), bridge(*command_line, "--allow-livelock")
+        assert (refused.returncode, allowed.returncode) == (2, 2)
+        assert "silent steps never end (--allow-livelock overrides this)" in refused.stderr
+        assert "to wait in standby" not in refused.stderr
+        assert "its silent steps may go on for ever" in allowed.stderr
+        assert "to wait in standby" in allowed.stderr
+
+
 def test_standby_without_a_remote_face_is_refused(tmp_path: Path) -> None:
     with SimulatedTurtleBot3("burger", "opencr", "lds01") as robot:
         file = configured(tmp_path, robot, "opencr")

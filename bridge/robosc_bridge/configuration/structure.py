@@ -150,6 +150,9 @@ class Safety(_Section, frozen=True):
         Annotated[float, Meta(ge=0.1, le=3600)] | None,
         Meta(description="Seconds without the operator after which the robot stops; null: it needs none."),
     ] = None
+    torque_off_on_operator_stop: Annotated[
+        bool, Meta(description="Whether the motors let go, too, once the wheels stand still after an operator's stop.")
+    ] = False
 
 
 class Skills(_Section, frozen=True):

@@ -7,9 +7,7 @@ made last for the same texts is kept, so that the robot starts without a network
 other file. None of them is executed if its silent steps never end, unless somebody allows that.
 """
 
-import contextlib
-import os
-import tempfile
+import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,11 +34,14 @@ from robosc.supervisor.structure import PropertyResult
 from robosc.verification import DEFAULT_STATES, Limits
 from robosc_api.security import Credentials
 from robosc_bridge.configuration.structure import SupervisorSource
+from robosc_bridge.daemon.kept import is_kept, keep, state_folder
 from robosc_bridge.errors import BridgeError
 from robosc_client import Client, ClientError, ServerUnavailableError, SynthesisStatus
 
 MODEL_SUFFIX, SUPERVISOR_SUFFIX = ".rscd", ".rsup"
 _SERVER_LIMIT_S = 120.0
+
+_log = logging.getLogger(__name__)
 
 
 class NoSupervisorError(BridgeError):
@@ -55,7 +56,7 @@ class Source:
         file: The model (`.rscd`), or a supervisor (`.rsup`); that has its signature or its model's text beside it.
         deployment: Where the supervisor is to stand.
         server: HOST:PORT of a synthesis server that makes it of the model; None: it is made here.
-        kept: Folder for what a server made last.
+        kept: Folder for what a server made last; None: nothing is kept.
         trusted: Keys whose signatures of supervisor files are believed.
         credentials: How the server is reached; None: without TLS, certificate and token.
         allow_livelock: Whether silent steps may go on for ever.
@@ -99,6 +100,14 @@ def credentials_of(chosen: SupervisorSource) -> Credentials:
         key=_path(chosen.key),
         token_file=_path(chosen.token_file),
     )
+
+
+def kept_folder(argument: Path | None, chosen: SupervisorSource) -> Path | None:
+    """Where what a server made last is kept: as the command line says, else the configuration, else below the home."""
+    folder = argument or _path(chosen.keep) or state_folder()
+    if folder is None:
+        _log.warning("there is no home: what a synthesis server makes is not kept for a start without network")
+    return folder
 
 
 def _path(text: str | None) -> Path | None:
@@ -299,7 +308,7 @@ def _served(bundle: Bundle, server: str, source: Source, tell: Callable[[str], N
                 bundle, deployment=source.deployment, allow_livelock=source.allow_livelock, deadline_s=_SERVER_LIMIT_S
             )
     except (ServerUnavailableError, TimeoutError) as error:
-        if kept is None or not kept.is_file():
+        if kept is None or not is_kept(kept):
             raise NoSupervisorError(f"{error}, and none is kept of an earlier start") from error
         tell(f"{error}: what it made last is taken")
         return _checked(_bytes(kept), str(kept), bundle, source, tell)
@@ -309,29 +318,5 @@ def _served(bundle: Bundle, server: str, source: Source, tell: Callable[[str], N
         raise NoSupervisorError(f"{server}: {answer.reason or answer.diagnostics[0]}")
     supervisor = _checked(answer.supervisor, server, bundle, source, tell)
     if kept is not None:
-        try:
-            _keep(kept, answer.supervisor)
-        except OSError as error:
-            tell(f"{kept}: cannot be kept for a start without network: {error.strerror or error}")
+        keep(kept, answer.supervisor)
     return supervisor
-
-
-def _keep(file: Path, data: bytes) -> None:
-    """Replace a file at once: whoever reads it finds the old or the new one, also after a power cut."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    number, name = tempfile.mkstemp(dir=file.parent, prefix=".", suffix=SUPERVISOR_SUFFIX)
-    try:
-        with os.fdopen(number, "wb") as stream:
-            stream.write(data)
-            stream.flush()
-            os.fsync(stream.fileno())
-        Path(name).replace(file)
-        folder = os.open(file.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            Path(name).unlink()
-        raise

@@ -15,7 +15,15 @@ from robosc.signatures import PublicKey, make_key_pair, read_private_key, sign, 
 from robosc.supervisor import Supervisor, encode, make_supervisor
 from robosc_api.security import Scope, ServerSecurity, make_token
 from robosc_bridge.configuration import parse
-from robosc_bridge.daemon.supervisors import NoSupervisorError, Source, credentials_of, obtain, trusted_keys
+from robosc_bridge.configuration.structure import SupervisorSource
+from robosc_bridge.daemon.supervisors import (
+    NoSupervisorError,
+    Source,
+    credentials_of,
+    kept_folder,
+    obtain,
+    trusted_keys,
+)
 from robosc_server.settings import Settings
 from support.certificates import Authority
 from support.service import served
@@ -377,17 +385,51 @@ def test_without_a_folder_nothing_is_kept(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["carrier.rscd"]
 
 
-def test_a_disk_that_takes_nothing_does_not_prevent_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_takes_nothing_does_not_prevent_the_start(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     def full(number: int) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
     model, kept = written(tmp_path), tmp_path / "kept"
-    told: list[str] = []
     with served() as address:
-        assert obtain(Source(model, CONTROLLER, address, kept), told.append) == supervisor_of(model)
-    assert "cannot be kept" in told[-1]
+        assert obtain(Source(model, CONTROLLER, address, kept)) == supervisor_of(model)
+    assert [record.levelname for record in caplog.records if "cannot be kept" in record.message] == ["WARNING"]
     assert list(kept.iterdir()) == []
+
+
+def test_the_folder_is_that_of_the_command_line_the_configuration_or_the_user(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    given, configured, state = tmp_path / "a", tmp_path / "b", tmp_path / "state"
+    monkeypatch.setenv("XDG_STATE_HOME", str(state))
+    monkeypatch.setenv("HOME", str(tmp_path))
+    chosen = SupervisorSource(keep=str(configured))
+    assert kept_folder(given, chosen) == given
+    assert kept_folder(None, chosen) == configured
+    assert kept_folder(None, SupervisorSource()) == state / "robosc-bridge"
+    for nothing in ("", "relative/state"):
+        monkeypatch.setenv("XDG_STATE_HOME", nothing)
+        assert kept_folder(None, SupervisorSource()) == tmp_path / ".local/state/robosc-bridge"
+
+    def homeless() -> Path:
+        raise RuntimeError
+
+    monkeypatch.setattr(Path, "home", homeless)
+    assert kept_folder(None, SupervisorSource()) is None
+    assert "there is no home" in caplog.text
+
+
+def test_a_folder_that_may_not_be_looked_into_holds_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def forbidden(path: Path) -> bool:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "is_file", forbidden)
+    with served() as address:
+        pass
+    problem = refusal(Source(written(tmp_path), CONTROLLER, address, tmp_path / "kept"))
+    assert "none is kept of an earlier start" in problem
 
 
 def test_what_a_server_refuses_is_told(tmp_path: Path) -> None:

@@ -31,6 +31,7 @@ from robosc_bridge.daemon.supervisors import (
     Source,
     credentials_of,
     deployment_of,
+    kept_folder,
     obtain,
     trusted_keys,
 )
@@ -69,7 +70,16 @@ def _parser() -> argparse.ArgumentParser:
     _configuration_argument(run)
     _deployment_argument(run)
     run.add_argument("--server", metavar="HOST:PORT", help="a synthesis server that makes the supervisor of the model")
-    run.add_argument("--keep", metavar="FOLDER", type=Path, help="folder for what the server made last")
+    run.add_argument(
+        "--keep",
+        metavar="FOLDER",
+        type=Path,
+        help="folder for what the server made last, which serves for a start without network; else supervisor.keep of "
+        "the configuration, $XDG_STATE_HOME/robosc-bridge or ~/.local/state/robosc-bridge",
+    )
+    run.add_argument(
+        "--allow-livelock", action="store_true", help="execute it even if its silent steps can go on for ever"
+    )
     run.add_argument(
         "--standby", action="store_true", help="wait for an operator to start it; needs a remote face (section remote)"
     )
@@ -184,7 +194,9 @@ def _run(arguments: argparse.Namespace) -> int:
     deployment = arguments.deployment or deployment_of(arguments.model)
     trusted = trusted_keys(configuration.supervisor.trusted_keys)
     credentials = credentials_of(configuration.supervisor)
-    supervisor = obtain(Source(arguments.model, deployment, server, arguments.keep, trusted, credentials), tell)
+    kept = None if server is None else kept_folder(arguments.keep, configuration.supervisor)
+    source = Source(arguments.model, deployment, server, kept, trusted, credentials, arguments.allow_livelock)
+    supervisor = obtain(source, tell)
     ties = tie(supervisor.model, configuration, loaded.document)
     log: EventLog = NullLog()
     if configuration.log.folder is not None:

@@ -5,22 +5,25 @@ from robosc.model.places import Places
 from robosc.model.structure import Communication, CommunicationKind, Model
 
 
-def layer_findings(model: Model, places: Places) -> tuple[Diagnostic, ...]:
-    """Incoming messages on one identifier that a layer could not tell apart."""
+def confusable(model: Model) -> tuple[tuple[Communication, Communication], ...]:
+    """Incoming messages that a layer could not tell from another one on the same identifier, each with that one."""
     shared: dict[str, list[Communication]] = {}
     for item in model.communications:
         if item.kind is CommunicationKind.INCOMING_MESSAGE:
             shared.setdefault(item.identifier, []).append(item)
+    return tuple((item, items[-1]) for items in shared.values() for item in items[:-1] if item.when is None)
+
+
+def layer_findings(model: Model, places: Places) -> tuple[Diagnostic, ...]:
+    """Incoming messages on one identifier that a layer could not tell apart."""
     return tuple(
         Diagnostic(
             Severity.ERROR,
             "ambiguous-layer-topic",
-            f"a message on '{item.identifier}' may be '{item.name}' or '{items[-1].name}'",
+            f"a message on '{item.identifier}' may be '{item.name}' or '{other.name}'",
             places.communications[item.name],
             f"Say when it is '{item.name}': write 'when: CONDITION' over 'value' in its list.",
-            (RelatedPlace(f"'{items[-1].name}' is here", places.communications[items[-1].name]),),
+            (RelatedPlace(f"'{other.name}' is here", places.communications[other.name]),),
         )
-        for items in shared.values()
-        for item in items[:-1]
-        if item.when is None
+        for item, other in confusable(model)
     )

@@ -137,7 +137,7 @@ def recheck(
     checked = check(bundle)
     if checked.model is None or checked.places is None:
         return Recheck(checked.diagnostics, (), (), None)
-    if supervisor.deployment is Deployment.LAYER:
+    if (deployment or supervisor.deployment) is Deployment.LAYER:
         ambiguous = layer_findings(checked.model, checked.places)
         if ambiguous:
             return Recheck(sorted_diagnostics((*checked.diagnostics, *ambiguous)), (), (), None)

@@ -150,6 +150,9 @@ class Safety(_Section, frozen=True):
         Annotated[float, Meta(ge=0.1, le=3600)] | None,
         Meta(description="Seconds without the operator after which the robot stops; null: it needs none."),
     ] = None
+    torque_off_on_operator_stop: Annotated[
+        bool, Meta(description="Whether the motors let go, too, once the wheels stand still after an operator's stop.")
+    ] = False
 
 
 class Skills(_Section, frozen=True):
@@ -212,6 +215,13 @@ class SupervisorSource(_Section, frozen=True):
     certificate: Annotated[_Text | None, Meta(description="File with the bridge's own certificate chain (PEM).")] = None
     key: Annotated[_Text | None, Meta(description="File with its private key (PEM).")] = None
     token_file: Annotated[_Text | None, Meta(description="File with the bridge's token for the server.")] = None
+    keep: Annotated[
+        _Text | None,
+        Meta(
+            description="Folder for what the server made last, for a start without network; null: `robosc-bridge` "
+            "in the user's state folder."
+        ),
+    ] = None
     trusted_keys: Annotated[
         tuple[_Text, ...],
         Meta(description="Whose signatures are believed: public keys (`ssh-ed25519 AAAA...`), or files with them."),

@@ -88,6 +88,7 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
             battery_warn_v=chosen.battery_warning_v,
             battery_stop_v=chosen.battery_stop_v,
             min_valid_share=chosen.min_valid_share,
+            is_torque_off_on_operator_stop=chosen.torque_off_on_operator_stop,
             is_stopped_when_blind=chosen.stops_when_blind,
         )
     except ValueError as error:

@@ -4,19 +4,19 @@ It is made here, by this machine's synthesizer, or it is foreign: a file, or wha
 one is untrusted input, whatever digest it carries: it is validated, and executed only if a key that this bridge was
 given has signed the file, or else if the independent verifier passes it against the texts of the model. What a server
 made last for the same texts is kept, so that the robot starts without a network, too; it is checked again like any
-other file.
+other file. None of them is executed if its silent steps never end, unless somebody allows that.
 """
 
-import contextlib
-import os
-import tempfile
+import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from robosc.errors import LanguageError, RoboscError
 from robosc.language import load_bundle
-from robosc.model.structure import Deployment
+from robosc.model.layers import confusable
+from robosc.model.structure import CommunicationKind, Deployment
+from robosc.properties import check_controller
 from robosc.signatures import (
     MAXIMUM_KEY_BYTES,
     MAXIMUM_SIGNATURE_BYTES,
@@ -30,14 +30,18 @@ from robosc.source import Bundle
 from robosc.supervisor import Supervisor, decode, make_supervisor
 from robosc.supervisor.codec import MAXIMUM_BYTES
 from robosc.supervisor.recheck import recheck
+from robosc.supervisor.structure import PropertyResult
 from robosc.verification import DEFAULT_STATES, Limits
 from robosc_api.security import Credentials
 from robosc_bridge.configuration.structure import SupervisorSource
+from robosc_bridge.daemon.kept import is_kept, keep, state_folder
 from robosc_bridge.errors import BridgeError
 from robosc_client import Client, ClientError, ServerUnavailableError, SynthesisStatus
 
 MODEL_SUFFIX, SUPERVISOR_SUFFIX = ".rscd", ".rsup"
 _SERVER_LIMIT_S = 120.0
+
+_log = logging.getLogger(__name__)
 
 
 class NoSupervisorError(BridgeError):
@@ -52,9 +56,10 @@ class Source:
         file: The model (`.rscd`), or a supervisor (`.rsup`); that has its signature or its model's text beside it.
         deployment: Where the supervisor is to stand.
         server: HOST:PORT of a synthesis server that makes it of the model; None: it is made here.
-        kept: Folder for what a server made last.
+        kept: Folder for what a server made last; None: nothing is kept.
         trusted: Keys whose signatures of supervisor files are believed.
         credentials: How the server is reached; None: without TLS, certificate and token.
+        allow_livelock: Whether silent steps may go on for ever.
     """
 
     file: Path
@@ -63,6 +68,7 @@ class Source:
     kept: Path | None = None
     trusted: tuple[PublicKey, ...] = ()
     credentials: Credentials | None = None
+    allow_livelock: bool = False
 
 
 def trusted_keys(entries: Iterable[str]) -> tuple[PublicKey, ...]:
@@ -96,6 +102,14 @@ def credentials_of(chosen: SupervisorSource) -> Credentials:
     )
 
 
+def kept_folder(argument: Path | None, chosen: SupervisorSource) -> Path | None:
+    """Where what a server made last is kept: as the command line says, else the configuration, else below the home."""
+    folder = argument or _path(chosen.keep) or state_folder()
+    if folder is None:
+        _log.warning("there is no home: what a synthesis server makes is not kept for a start without network")
+    return folder
+
+
 def _path(text: str | None) -> Path | None:
     return None if text is None else Path(text)
 
@@ -108,7 +122,7 @@ def obtain(source: Source, tell: Callable[[str], None] = lambda text: None) -> S
         tell: Told where the work is and what is worth knowing, one line each.
 
     Raises:
-        NoSupervisorError: There is none that can be trusted.
+        NoSupervisorError: There is none that can be trusted, or its silent steps never end.
     """
     if source.file.suffix == SUPERVISOR_SUFFIX:
         return _read(source, tell)
@@ -118,7 +132,7 @@ def obtain(source: Source, tell: Callable[[str], None] = lambda text: None) -> S
         )
     bundle = _bundle(source.file)
     if source.server is None:
-        return _made(bundle, source.deployment, tell)
+        return _made(bundle, source, tell)
     return _served(bundle, source.server, source, tell)
 
 
@@ -144,11 +158,11 @@ def _read(source: Source, tell: Callable[[str], None]) -> Supervisor:
     key = _signer(file, data, source.trusted, tell)
     if key is not None:
         tell(f"{file}: signed by {key}")
-        return _signed(file, data, bundle, source.deployment)
+        return _signed(file, data, bundle, source, tell)
     if bundle is None:
         reason = "is not signed by a trusted key, and the" if source.trusted else "the"
         raise NoSupervisorError(f"{file}: {reason} model that it is checked against is missing: no {model}")
-    return _checked(data, str(file), bundle, source.deployment, tell)
+    return _checked(data, str(file), bundle, source, tell)
 
 
 def _signer(file: Path, data: bytes, trusted: tuple[PublicKey, ...], tell: Callable[[str], None]) -> PublicKey | None:
@@ -169,21 +183,62 @@ def _signer(file: Path, data: bytes, trusted: tuple[PublicKey, ...], tell: Calla
         raise NoSupervisorError(f"{place}: {error}") from error
 
 
-def _signed(file: Path, data: bytes, bundle: Bundle | None, deployment: Deployment) -> Supervisor:
-    """A supervisor that somebody vouches for: what it is for stands in it."""
+def _signed(file: Path, data: bytes, bundle: Bundle | None, source: Source, tell: Callable[[str], None]) -> Supervisor:
+    """A supervisor that somebody vouches for: what it is for, and what was found out about it, stands in it."""
     try:
         supervisor = decode(data)
     except RoboscError as error:
         raise NoSupervisorError(f"{file}: {error}") from error
-    _require_deployment(supervisor, deployment, str(file))
+    _require_deployment(supervisor, source.deployment, str(file))
     if bundle is not None and supervisor.certificate.bundle_sha256 != bundle.digest:
         raise NoSupervisorError(f"{file}: it is signed, but was made of other texts than {bundle.main.name} beside it")
+    claimed = supervisor.certificate.controller
+    outcome = _response(supervisor, str(file)) if claimed is None else claimed.finite_response
+    _require_response(outcome, str(file), source, tell)
     return supervisor
 
 
 def _require_deployment(supervisor: Supervisor, deployment: Deployment, place: str) -> None:
-    if supervisor.deployment is not deployment:
-        raise NoSupervisorError(f"{place}: made for the deployment {supervisor.deployment}, not {deployment}")
+    """Without actions both deployments are the same, but for what a layer must be able to tell apart."""
+    if supervisor.deployment is deployment:
+        return
+    model = supervisor.model
+    if any(item.kind is CommunicationKind.ACTION for item in model.communications):
+        raise NoSupervisorError(
+            f"{place}: made for the deployment {supervisor.deployment}, not {deployment}, and its model has actions"
+        )
+    if deployment is Deployment.LAYER:
+        for item, other in confusable(model):
+            raise NoSupervisorError(
+                f"{place}: made for the deployment controller; as a layer it could not tell whether a message on "
+                f"'{item.identifier}' is '{item.name}' or '{other.name}'"
+            )
+
+
+def _response(supervisor: Supervisor, place: str) -> PropertyResult:
+    """Whether silent steps end, found out here."""
+    certificate = supervisor.certificate
+    try:
+        found = check_controller(
+            supervisor.model,
+            supervisor.deployment,
+            supervisor.added,
+            is_nonblocking=certificate.nonblocking == "passed",
+            states=int(certificate.states),
+        )
+    except RoboscError as error:
+        raise NoSupervisorError(f"{place}: {error}") from error
+    return found.finite_response
+
+
+def _require_response(outcome: PropertyResult, place: str, source: Source, tell: Callable[[str], None]) -> None:
+    """Silent steps that never end stop the executor with a fault in the middle of its work."""
+    if outcome == "failed":
+        if not source.allow_livelock:
+            raise NoSupervisorError(
+                f"{place}: not executed, because its silent steps never end (--allow-livelock overrides this)"
+            )
+        tell(f"{place}: its silent steps may go on for ever; it stops with a fault then")
 
 
 def _bundle(model: Path) -> Bundle:
@@ -206,26 +261,27 @@ def _bytes(file: Path, most: int = MAXIMUM_BYTES, what: str = "a supervisor") ->
     return data
 
 
-def _made(bundle: Bundle, deployment: Deployment, tell: Callable[[str], None]) -> Supervisor:
+def _made(bundle: Bundle, source: Source, tell: Callable[[str], None]) -> Supervisor:
     tell(f"{bundle.main.name}: synthesis")
     try:
-        made = make_supervisor(bundle, deployment=deployment)
+        made = make_supervisor(bundle, deployment=source.deployment, allow_livelock=source.allow_livelock)
     except RoboscError as error:
         raise NoSupervisorError(f"{bundle.main.name}: {error}") from error
     if made.supervisor is None:
         raise NoSupervisorError(made.reason or str(made.diagnostics[0]))
+    found = made.supervisor.certificate.controller
+    if found is not None:
+        _require_response(found.finite_response, bundle.main.name, source, tell)
     return made.supervisor
 
 
-def _checked(
-    data: bytes, place: str, bundle: Bundle, deployment: Deployment, tell: Callable[[str], None]
-) -> Supervisor:
+def _checked(data: bytes, place: str, bundle: Bundle, source: Source, tell: Callable[[str], None]) -> Supervisor:
     """A foreign supervisor, if it is right."""
     tell(f"{place}: verification against {bundle.main.name}")
     try:
         supervisor = decode(data)
-        _require_deployment(supervisor, deployment, place)
-        found = recheck(supervisor, bundle, Limits.of(DEFAULT_STATES), deployment=deployment)
+        _require_deployment(supervisor, source.deployment, place)
+        found = recheck(supervisor, bundle, Limits.of(DEFAULT_STATES), deployment=source.deployment)
     except RoboscError as error:
         raise NoSupervisorError(f"{place}: {error}") from error
     if found.diagnostics:
@@ -233,6 +289,12 @@ def _checked(
     if not found.has_passed:
         why = found.faults[0].message if found.faults else f"not checked: {', '.join(found.unchecked())}"
         raise NoSupervisorError(f"{place}: not a supervisor of {bundle.main.name} that can be trusted: {why}")
+    claimed = supervisor.certificate.controller
+    outcome = "not checked" if claimed is None else claimed.finite_response
+    if outcome == "not checked":
+        # What it says, the verifier has judged; a file that says nothing of it must not get past.
+        outcome = _response(supervisor, place)
+    _require_response(outcome, place, source, tell)
     return supervisor
 
 
@@ -242,41 +304,19 @@ def _served(bundle: Bundle, server: str, source: Source, tell: Callable[[str], N
     tell(f"{bundle.main.name}: synthesis at {server}")
     try:
         with Client(server, source.credentials) as client:
-            answer = client.synthesize(bundle, deployment=source.deployment, deadline_s=_SERVER_LIMIT_S)
+            answer = client.synthesize(
+                bundle, deployment=source.deployment, allow_livelock=source.allow_livelock, deadline_s=_SERVER_LIMIT_S
+            )
     except (ServerUnavailableError, TimeoutError) as error:
-        if kept is None or not kept.is_file():
+        if kept is None or not is_kept(kept):
             raise NoSupervisorError(f"{error}, and none is kept of an earlier start") from error
         tell(f"{error}: what it made last is taken")
-        return _checked(_bytes(kept), str(kept), bundle, source.deployment, tell)
+        return _checked(_bytes(kept), str(kept), bundle, source, tell)
     except ClientError as error:
         raise NoSupervisorError(str(error)) from error
     if answer.status is not SynthesisStatus.SUPERVISOR:
         raise NoSupervisorError(f"{server}: {answer.reason or answer.diagnostics[0]}")
-    supervisor = _checked(answer.supervisor, server, bundle, source.deployment, tell)
+    supervisor = _checked(answer.supervisor, server, bundle, source, tell)
     if kept is not None:
-        try:
-            _keep(kept, answer.supervisor)
-        except OSError as error:
-            tell(f"{kept}: cannot be kept for a start without network: {error.strerror or error}")
+        keep(kept, answer.supervisor)
     return supervisor
-
-
-def _keep(file: Path, data: bytes) -> None:
-    """Replace a file at once: whoever reads it finds the old or the new one, also after a power cut."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    number, name = tempfile.mkstemp(dir=file.parent, prefix=".", suffix=SUPERVISOR_SUFFIX)
-    try:
-        with os.fdopen(number, "wb") as stream:
-            stream.write(data)
-            stream.flush()
-            os.fsync(stream.fileno())
-        Path(name).replace(file)
-        folder = os.open(file.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            Path(name).unlink()
-        raise

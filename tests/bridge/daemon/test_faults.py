@@ -264,6 +264,24 @@ def test_an_operators_stop_holds_until_somebody_lets_it_go_on(base: str, how: Co
         bridge.moves()
 
 
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize("is_off", [False, True], ids=["hold", "let go"])
+def test_a_resume_lets_it_go_on_also_where_the_motors_have_let_go(base: str, is_off: bool) -> None:
+    with driven(base, safety=f"{{torque_off_on_operator_stop: {str(is_off).lower()}}}") as bridge:
+
+        def has_torque() -> bool:
+            return any(wheel.table["torque enable"] for wheel in (bridge.robot.left, bridge.robot.right))
+
+        bridge.stopped_after(lambda: bridge.machine.daemon.post(Command.STOP), STATED_S["an operator stops it"])
+        if is_off:
+            bridge.until(lambda: not has_torque(), "the motors to let go")
+        bridge.stays(WHILE_S)
+        assert has_torque() is not is_off
+        assert bridge.state is State.RUNNING
+        assert _ordered(bridge, Command.RESUME) == ""
+        bridge.moves()
+
+
 def test_an_operator_who_is_lost_stops_the_wheels_until_he_is_back() -> None:
     with driven("opencr", remote=REACHABLE, safety="{operator_link_timeout_s: 0.3}") as bridge:
         is_there = threading.Event()

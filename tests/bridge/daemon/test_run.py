@@ -14,6 +14,7 @@ import pytest
 from robosc.cli.main import main as robosc
 from robosc_bridge.simulated import SimulatedTurtleBot3
 from support.models import EXAMPLES
+from support.service import served
 
 MODEL = EXAMPLES / "maze_solver" / "maze_solver.rscd"
 START_LIMIT_S, LIMIT_S = 90.0, 30.0
@@ -146,6 +147,48 @@ def test_a_signed_supervisor_is_run_without_its_model(tmp_path: Path) -> None:
         supervisor.write_bytes(supervisor.read_bytes() + b" ")
         refused = bridge(*command_line)
         assert (refused.returncode, "has been changed" in refused.stderr) == (2, True)
+
+
+def test_silent_steps_that_never_end_are_refused_unless_they_are_allowed(tmp_path: Path) -> None:
+    model, supervisor, file = (tmp_path / name for name in ("live.rscd", "live.rsup", "bridge.yaml"))
+    model.write_text(
+        """robot Live {
+    component C {
+        incoming message go with identifier: "/go", type: none
+        behaviour { initial marked state s { transition goto t } marked state t { transition goto s } }
+    }
+}"""
+    )
+    file.write_text("robot: burger\ndrive: {driver: opencr, port: /dev/none}\nchannels: {/go: {channel: log}}\n")
+    assert robosc(["synth", str(model), "--allow-livelock", "-o", str(supervisor)]) == 0
+    for path in (model, supervisor):
+        # Where they are allowed, the next thing that is wrong is told.
+        command_line = ("run", "--standby", "--model", str(path), "--config", str(file))
+        refused, allowed = bridge(*command_line), bridge(*command_line, "--allow-livelock")
+        assert (refused.returncode, allowed.returncode) == (2, 2)
+        assert "silent steps never end (--allow-livelock overrides this)" in refused.stderr
+        assert "to wait in standby" not in refused.stderr
+        assert "its silent steps may go on for ever" in allowed.stderr
+        assert "to wait in standby" in allowed.stderr
+
+
+def test_what_a_server_made_is_kept_without_being_told_to(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    model, file = tmp_path / "r.rscd", tmp_path / "bridge.yaml"
+    model.write_text('robot R { component C { incoming message go with identifier: "/go", type: none } }')
+    file.write_text("robot: burger\ndrive: {driver: opencr, port: /dev/none}\nchannels: {/go: {channel: log}}\n")
+    # With a supervisor, the next thing that is wrong is told.
+    command_line = ["run", "--standby", "--model", str(model), "--config", str(file), "--server"]
+    with served() as address:
+        first = bridge(*command_line, address)
+    (kept,) = (tmp_path / "state" / "robosc-bridge").iterdir()
+    assert kept.suffix == ".rsup"
+    second = bridge(*command_line, address)
+    assert "what it made last is taken" in second.stderr
+    for done in (first, second):
+        assert "to wait in standby" in done.stderr
+    kept.unlink()
+    assert "none is kept of an earlier start" in bridge(*command_line, address).stderr
 
 
 def test_standby_without_a_remote_face_is_refused(tmp_path: Path) -> None:

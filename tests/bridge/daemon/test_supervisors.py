@@ -15,7 +15,15 @@ from robosc.signatures import PublicKey, make_key_pair, read_private_key, sign, 
 from robosc.supervisor import Supervisor, encode, make_supervisor
 from robosc_api.security import Scope, ServerSecurity, make_token
 from robosc_bridge.configuration import parse
-from robosc_bridge.daemon.supervisors import NoSupervisorError, Source, credentials_of, obtain, trusted_keys
+from robosc_bridge.configuration.structure import SupervisorSource
+from robosc_bridge.daemon.supervisors import (
+    NoSupervisorError,
+    Source,
+    credentials_of,
+    kept_folder,
+    obtain,
+    trusted_keys,
+)
 from robosc_server.settings import Settings
 from support.certificates import Authority
 from support.service import served
@@ -33,6 +41,27 @@ GATE = """robot Carrier {
         incoming message drive with identifier: "/drive", type: double
     }
     requirement drive needs Gate.opened
+    provide drive with 0.2
+}
+"""
+CARRIER = """robot Carrier {
+    interface lifts use Lift from carrier_interfaces
+    component Platform {
+        action lift with identifier: "/lift", request: none, response: none, feedback: none links lifts
+        incoming message drive with identifier: "/drive", type: double
+        behaviour { initial marked state ready { } }
+    }
+    provide drive with 0.2
+}
+"""
+LIVELOCK = """robot Carrier {
+    component Platform {
+        incoming message drive with identifier: "/drive", type: double
+        behaviour {
+            initial marked state here { transition goto there }
+            marked state there { transition goto here }
+        }
+    }
     provide drive with 0.2
 }
 """
@@ -108,11 +137,92 @@ def test_what_is_no_supervisor_is_one_line(tmp_path: Path, name: str, content: s
     assert problem in refusal(Source(tmp_path / name, CONTROLLER))
 
 
-def test_a_supervisor_for_another_deployment_is_refused(tmp_path: Path) -> None:
-    model = written(tmp_path)
+def test_a_supervisor_for_another_deployment_is_refused_if_its_model_has_actions(tmp_path: Path) -> None:
     file = tmp_path / "carrier.rsup"
-    file.write_bytes(encode(supervisor_of(model, Deployment.LAYER)))
-    assert "made for the deployment layer, not controller" in refusal(Source(file, CONTROLLER))
+    for made, wanted in ((Deployment.LAYER, CONTROLLER), (CONTROLLER, Deployment.LAYER)):
+        supervisor = supervisor_of(written(tmp_path, CARRIER), made)
+        file.write_bytes(encode(supervisor))
+        assert f"made for the deployment {made}, not {wanted}, and its model has actions" in refusal(
+            Source(file, wanted)
+        )
+        # Without actions, both are the same.
+        supervisor = supervisor_of(written(tmp_path), made)
+        file.write_bytes(encode(supervisor))
+        assert obtain(Source(file, wanted)) == supervisor
+
+
+def test_a_layer_that_could_not_tell_messages_apart_is_refused_whatever_it_was_made_for(signed: "Signed") -> None:
+    second = 'incoming message crawl with identifier: "/drive", type: double'
+    text = GATE.replace("    }\n    requirement", f"        {second}\n    }}\n    requirement")
+    text = text.replace("provide drive", "provide crawl with 0.1\n    provide drive")
+    model = written(signed.file.parent, text)
+    signed.file.write_bytes(encode(supervisor_of(model)))
+    as_layer = replace(signed.source(), deployment=Deployment.LAYER)
+    problem = "it could not tell whether a message on '/drive' is"
+    assert problem in refusal(as_layer)
+    assert obtain(signed.source())
+    model.unlink()
+    signed.sign()
+    assert problem in refusal(replace(as_layer, trusted=(signed.ours,)))
+
+
+# Silent steps that never end.
+
+
+@pytest.fixture
+def endless(tmp_path: Path) -> Path:
+    """A file of a supervisor with a livelock, beside its model."""
+    file = written(tmp_path, LIVELOCK).with_suffix(".rsup")
+    made = make_supervisor(load_bundle(file.with_suffix(".rscd")), allow_livelock=True)
+    assert made.supervisor is not None
+    assert made.supervisor.certificate.controller is not None
+    assert made.supervisor.certificate.controller.finite_response == "failed"
+    file.write_bytes(encode(made.supervisor))
+    return file
+
+
+def refused_unless_allowed(source: Source) -> None:
+    problem = refusal(source)
+    assert "silent steps never end (--allow-livelock overrides this)" in problem
+    told: list[str] = []
+    assert obtain(replace(source, allow_livelock=True), told.append)
+    assert "its silent steps may go on for ever" in told[-1]
+
+
+def test_silent_steps_that_never_end_are_refused_of_a_model_and_a_file(endless: Path) -> None:
+    refused_unless_allowed(Source(endless.with_suffix(".rscd"), CONTROLLER))
+    refused_unless_allowed(Source(endless, CONTROLLER))
+
+
+@pytest.mark.parametrize("said", ["nothing", "not checked"])
+def test_a_file_that_hides_them_is_refused(endless: Path, said: str) -> None:
+    content = json.loads(endless.read_bytes())
+    certificate = content["supervisor"]["certificate"]
+    if said == "nothing":
+        del certificate["controller"]
+    else:
+        certificate["controller"]["finite_response"] = said
+    endless.write_text(json.dumps(content))
+    refused_unless_allowed(Source(endless, CONTROLLER))
+
+
+def test_they_are_refused_though_the_file_is_signed(signed: "Signed", endless: Path) -> None:
+    signed.sign()
+    refused_unless_allowed(signed.source(signed.ours))
+    endless.with_suffix(".rscd").unlink()
+    refused_unless_allowed(signed.source(signed.ours))
+    content = json.loads(endless.read_bytes())
+    del content["supervisor"]["certificate"]["controller"]
+    endless.write_text(json.dumps(content))
+    signed.sign()
+    refused_unless_allowed(signed.source(signed.ours))
+
+
+def test_they_are_refused_of_a_server_and_of_what_it_made_last(endless: Path, tmp_path: Path) -> None:
+    with served() as address:
+        source = Source(endless.with_suffix(".rscd"), CONTROLLER, address, tmp_path / "kept")
+        refused_unless_allowed(source)
+    refused_unless_allowed(source)
 
 
 def test_a_robot_without_a_supervisor_is_told_so(tmp_path: Path) -> None:
@@ -145,6 +255,10 @@ class Signed:
     def source(self, *keys: PublicKey) -> Source:
         return Source(self.file, CONTROLLER, trusted=keys)
 
+    def sign(self) -> None:
+        """With our key, whatever the file is now."""
+        self.signature.write_bytes(sign(self.file.read_bytes(), read_private_key(self.file.with_name("a.key"))))
+
 
 @pytest.fixture
 def signed(tmp_path: Path) -> Signed:
@@ -154,7 +268,7 @@ def signed(tmp_path: Path) -> Signed:
     model.unlink()
     ours, others = (make_key_pair(tmp_path / f"{name}.key", tmp_path / f"{name}.pub", name) for name in ("a", "b"))
     found = Signed(file, ours, others)
-    found.signature.write_bytes(sign(file.read_bytes(), read_private_key(tmp_path / "a.key")))
+    found.sign()
     return found
 
 
@@ -212,14 +326,17 @@ def test_a_signed_file_beside_another_model_is_refused(signed: Signed, tmp_path:
     assert obtain(signed.source(signed.ours))
 
 
-def test_a_signed_file_for_another_deployment_is_refused(signed: Signed) -> None:
-    source = replace(signed.source(signed.ours), deployment=Deployment.LAYER)
-    assert "made for the deployment controller, not layer" in refusal(source)
+def test_a_signed_file_for_another_deployment_is_refused_if_its_model_has_actions(signed: Signed) -> None:
+    as_layer = replace(signed.source(signed.ours), deployment=Deployment.LAYER)
+    assert obtain(as_layer).deployment is CONTROLLER
+    signed.file.write_bytes(encode(supervisor_of(written(signed.file.parent, CARRIER))))
+    signed.sign()
+    assert "made for the deployment controller, not layer" in refusal(as_layer)
 
 
 def test_what_is_signed_and_no_supervisor_is_refused(signed: Signed) -> None:
     signed.file.write_bytes(b"{}")
-    signed.signature.write_bytes(sign(b"{}", read_private_key(signed.file.with_name("a.key"))))
+    signed.sign()
     assert "carrier.rsup: " in refusal(signed.source(signed.ours))
 
 
@@ -268,17 +385,51 @@ def test_without_a_folder_nothing_is_kept(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["carrier.rscd"]
 
 
-def test_a_disk_that_takes_nothing_does_not_prevent_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_takes_nothing_does_not_prevent_the_start(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     def full(number: int) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
     model, kept = written(tmp_path), tmp_path / "kept"
-    told: list[str] = []
     with served() as address:
-        assert obtain(Source(model, CONTROLLER, address, kept), told.append) == supervisor_of(model)
-    assert "cannot be kept" in told[-1]
+        assert obtain(Source(model, CONTROLLER, address, kept)) == supervisor_of(model)
+    assert [record.levelname for record in caplog.records if "cannot be kept" in record.message] == ["WARNING"]
     assert list(kept.iterdir()) == []
+
+
+def test_the_folder_is_that_of_the_command_line_the_configuration_or_the_user(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    given, configured, state = tmp_path / "a", tmp_path / "b", tmp_path / "state"
+    monkeypatch.setenv("XDG_STATE_HOME", str(state))
+    monkeypatch.setenv("HOME", str(tmp_path))
+    chosen = SupervisorSource(keep=str(configured))
+    assert kept_folder(given, chosen) == given
+    assert kept_folder(None, chosen) == configured
+    assert kept_folder(None, SupervisorSource()) == state / "robosc-bridge"
+    for nothing in ("", "relative/state"):
+        monkeypatch.setenv("XDG_STATE_HOME", nothing)
+        assert kept_folder(None, SupervisorSource()) == tmp_path / ".local/state/robosc-bridge"
+
+    def homeless() -> Path:
+        raise RuntimeError
+
+    monkeypatch.setattr(Path, "home", homeless)
+    assert kept_folder(None, SupervisorSource()) is None
+    assert "there is no home" in caplog.text
+
+
+def test_a_folder_that_may_not_be_looked_into_holds_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def forbidden(path: Path) -> bool:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "is_file", forbidden)
+    with served() as address:
+        pass
+    problem = refusal(Source(written(tmp_path), CONTROLLER, address, tmp_path / "kept"))
+    assert "none is kept of an earlier start" in problem
 
 
 def test_what_a_server_refuses_is_told(tmp_path: Path) -> None:

@@ -291,3 +291,17 @@ def test_differences_end() -> None:
     assert found[:1] == ("requirement 2: in the supervisor only",)
     assert found[-1] == "and more"
     assert model_differences(model, model) == ()
+
+
+def test_one_that_is_to_be_a_layer_must_tell_messages_apart() -> None:
+    """Without actions it may be made for either; as a controller it need not."""
+    text = """robot R { component C {
+        incoming message slow with identifier: "/go", type: integer
+        incoming message fast with identifier: "/go", type: integer
+    } provide slow with 1 provide fast with 2 }"""
+    bundle = bundle_of(text)
+    supervisor = _supervisor(bundle)
+    assert _passed(recheck(supervisor, bundle, LIMITS, deployment=Deployment.CONTROLLER))
+    refused = recheck(supervisor, bundle, LIMITS, deployment=Deployment.LAYER)
+    assert [item.code for item in refused.diagnostics] == ["ambiguous-layer-topic"]
+    assert not refused.has_passed

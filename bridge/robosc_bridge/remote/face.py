@@ -1,6 +1,7 @@
 """The server of the remote face, in a thread of its own."""
 
 import asyncio
+import contextlib
 import logging
 import os
 import threading
@@ -11,7 +12,7 @@ from pathlib import Path
 os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 
 import grpc.aio
-from grpc_health.v1 import health, health_pb2, health_pb2_grpc
+from grpc_health.v1 import health, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection
 
 from robosc_api.malformed import MalformedRequests
@@ -20,6 +21,10 @@ from robosc_bridge.configuration.structure import Configuration
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.remote import convert
+from robosc_bridge.remote.condition import Condition
+from robosc_bridge.remote.connections import Places
+from robosc_bridge.remote.ending import EndingCalls
+from robosc_bridge.remote.prompt import PromptRequests
 from robosc_bridge.remote.service import RULES, BridgeService
 
 _log = logging.getLogger(__name__)
@@ -27,7 +32,13 @@ _log = logging.getLogger(__name__)
 MAXIMUM_REQUEST_BYTES = 256 * 1024
 MAXIMUM_METADATA_BYTES = 8 * 1024
 MAXIMUM_CONNECTIONS = 256
-"""More than watchers, programs and commands: one is left for a stop."""
+"""At the same time. More than watchers, programs and commands; but whoever reaches the port may take them all."""
+
+IDLE_S = 3.0
+"""A connection on which nothing is called for so long is ended, so that a place is free again."""
+
+MAXIMUM_CALLS = 200
+"""On one connection; more than watchers, programs and commands, so that one is left for a stop."""
 
 PING_S, PING_LIMIT_S = 5.0, 3.0
 """After so long without a word a caller is asked whether it is there, and taken for gone if it does not answer."""
@@ -35,6 +46,7 @@ PING_S, PING_LIMIT_S = 5.0, 3.0
 _HANDSHAKE_LIMIT_S = 3.0
 _START_LIMIT_S, _STOP_LIMIT_S = 10.0, 5.0
 _GRACE_S = 0.5
+_LOOK_S = 1.0
 
 
 class RemoteError(BridgeError):
@@ -141,23 +153,27 @@ class RemoteFace:
             None if security.tokens is None else TokenFile(security.tokens),
             has_client_certificates=security.client_ca is not None,
         )
-        server = grpc.aio.server(interceptors=[guard, MalformedRequests(convert.SERVICE_NAME)], options=_options())
+        ending = EndingCalls()
+        interceptors = [ending, PromptRequests(), guard, MalformedRequests(convert.SERVICE_NAME)]
+        server = grpc.aio.server(interceptors=interceptors, options=_options())
         service = BridgeService(self._operations, settings.operator_timeout_s)
         convert.add_service(service, server)  # type: ignore[no-untyped-call]  # generated
-        condition = health.aio.HealthServicer()
-        health_pb2_grpc.add_HealthServicer_to_server(condition, server)
+        health_pb2_grpc.add_HealthServicer_to_server(Condition(self._operations.feed), server)
         names = (convert.SERVICE_NAME, health.SERVICE_NAME, reflection.SERVICE_NAME)
         reflection.enable_server_reflection(names, server)
-        for name in ("", convert.SERVICE_NAME):
-            await condition.set(name, health_pb2.HealthCheckResponse.SERVING)
         self.address = add_port(server, settings.address, security)
         await server.start()
         self._is_ready.set()
+        places = Places(int(self.address.rpartition(":")[2]), MAXIMUM_CONNECTIONS)
         try:
-            await self._end.wait()
+            while not self._end.is_set():
+                places.look()
+                with contextlib.suppress(TimeoutError):
+                    async with asyncio.timeout(_LOOK_S):
+                        await self._end.wait()
         finally:
             service.close()
-            await condition.enter_graceful_shutdown()
+            ending.close()
             await server.stop(_GRACE_S)
 
 
@@ -169,6 +185,8 @@ def _options() -> list[tuple[str, int]]:
         ("grpc.max_metadata_size", MAXIMUM_METADATA_BYTES),
         ("grpc.absolute_max_metadata_size", MAXIMUM_METADATA_BYTES),
         ("grpc.max_allowed_incoming_connections", MAXIMUM_CONNECTIONS),
+        ("grpc.max_connection_idle_ms", int(IDLE_S * 1000)),
+        ("grpc.max_concurrent_streams", MAXIMUM_CALLS),
         ("grpc.server_handshake_timeout_ms", int(_HANDSHAKE_LIMIT_S * 1000)),
         # A caller whose cable is pulled says no goodbye.
         ("grpc.keepalive_time_ms", int(PING_S * 1000)),

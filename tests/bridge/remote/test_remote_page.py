@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from robosc_api.v1 import bridge_pb2
-from robosc_bridge.remote import data, face, service, session, watchers
+from robosc_bridge.remote import data, face, prompt, service, session, watchers
 from robosc_bridge.remote.convert import MAXIMUM_TEXT
 from robosc_bridge.terminal import teleop
 from robosc_bridge.terminal.commands import ADDRESS, NAMES
@@ -15,14 +15,16 @@ PAGE = (DOCS / "bridge-remote.md").read_text(encoding="utf-8")
 
 def test_the_limits() -> None:
     streams = f"| {service.MAXIMUM_WATCHERS}; {service.MAXIMUM_PROGRAMS}; {service.MAXIMUM_COMMANDS} |"
-    connections = f"| {face.MAXIMUM_CONNECTIONS}; {face._HANDSHAKE_LIMIT_S:g} s |"
+    connections = f"| {face.MAXIMUM_CONNECTIONS}; {face._HANDSHAKE_LIMIT_S:g} s; {face.IDLE_S:g} s |"
+    calls = f"| {face.MAXIMUM_CALLS}; {prompt.REQUEST_LIMIT_S:g} s |"
     message = f"| {face.MAXIMUM_REQUEST_BYTES // 1024} KiB; {face.MAXIMUM_METADATA_BYTES // 1024} KiB |"
     values = f"| {data.MAXIMUM_DEPTH} and {data.MAXIMUM_VALUES:,}; {data.MAXIMUM_NAME} |"
     events = f"| {watchers.MAXIMUM_EVENTS}, or {watchers.MAXIMUM_BYTES // 2**20} MiB |"
     waiting = f"wait for a program | {session.MAXIMUM_WAITING} |"
     turn = f"next snapshot | {session.MESSAGES_A_TURN} |"
     silence = f"| {face.PING_S + face.PING_LIMIT_S:g} s with a ping"
-    for text in (streams, connections, message, values, events, waiting, turn, silence, f"| {MAXIMUM_TEXT} characters"):
+    limits = (streams, connections, calls, message, values, events, waiting, turn, silence)
+    for text in (*limits, f"| {MAXIMUM_TEXT} characters"):
         assert text in PAGE, text
 
 

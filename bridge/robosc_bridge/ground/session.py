@@ -172,6 +172,7 @@ class Session:
         self._now_s = now_s
         self._bytes.pass_time(now_s)
         self._heeded.pass_time(now_s)
+        self._asking.begin()
 
     def _encoded(self, urgent: Iterable[Make], telemetry: Iterable[Make]) -> bytes:
         if self._signing:

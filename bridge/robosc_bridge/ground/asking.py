@@ -1,10 +1,11 @@
 """Commands of ground stations: each is answered once, whatever becomes of it, and none makes anybody wait.
 
-A command that is repeated because its answer was lost changes nothing a second time. Stopping takes effect before it is
-answered. What the daemon answers later is waited for without waiting; what it does not answer has failed, and is undone
-where it could still make the robot move.
+A command that is repeated because its answer was lost changes nothing a second time, and nothing at all once a stop has
+come in between. Stopping takes effect before it is answered. What the daemon answers later is waited for without
+waiting; what it does not answer has failed, and is undone where it could still make the robot move.
 """
 
+import math
 import struct
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -29,9 +30,8 @@ REPEATED_S = 10.0
 
 _MOST_PENDING = 8
 _MOST_REMEMBERED = 32
-# A stop is on its way into the next snapshot.
-_STOP_SHOWN_S = 1.0
-_SAME_STOP_S = 0.05
+# What was ordered is on its way into the next snapshot.
+_SHOWN_S = 1.0
 _UNDONE_BY = {Wish.START: Wish.STANDBY, Wish.RESUME: Wish.STOP}
 
 type Say = Callable[[Severity, str], None]
@@ -66,6 +66,7 @@ class _Pending:
     wish: Wish
     answer: "Future[str]"
     since_s: float
+    stops: int
 
 
 def acknowledgement(asked: Asked, result: Result) -> Make:
@@ -89,15 +90,26 @@ class Asking:
         self._say = say
         self._pending: dict[_Key, _Pending] = {}
         self._remembered: dict[_Key, tuple[Result, float]] = {}
-        self._stops_s: dict[Stop, float] = {}
+        # Stops since the beginning; when the last one came, of any kind and of the operator's.
+        self._stops = 0
+        self._last_stop_s = self._held_s = -math.inf
+        self._ordered: set[Stop] = set()
 
-    def stop(self, stop: Stop, by: tuple[int, int], now_s: float) -> None:
-        """Stop now."""
-        ordered_s = self._stops_s.get(stop)
-        if ordered_s is not None and 0.0 <= now_s - ordered_s < _SAME_STOP_S:
-            return  # Nothing else was ordered since: a flood of stops is one.
-        self._stops_s[stop] = now_s
-        self._operations.order(stop.wish, _name(by))
+    def begin(self) -> None:
+        """What comes from here on has not come yet when anything before it was ordered, by whomever."""
+        self._ordered.clear()
+
+    def _stop(self, stop: Stop, by: tuple[int, int], now_s: float) -> None:
+        # No command from before is answered as if it still held, nor obeyed late.
+        self._remembered.clear()
+        self._stops += 1
+        self._last_stop_s = now_s
+        if stop is Stop.OPERATOR:
+            self._held_s = now_s
+        if stop not in self._ordered:
+            # What came at the same time is one: a flood costs the loop little.
+            self._ordered.add(stop)
+            self._operations.order(stop.wish, _name(by))
 
     def take(self, asked: Asked, wanted: Meaning, now_s: float) -> list[Make]:
         """Obey a command; what goes to its sender at once.
@@ -108,15 +120,14 @@ class Asking:
             now_s: The time.
         """
         if isinstance(wanted, Stop):
-            self.stop(wanted, asked.sender, now_s)
+            self._stop(wanted, asked.sender, now_s)
             return [acknowledgement(asked, Result.ACCEPTED)]
         if asked.key in self._pending:
             return [acknowledgement(asked, Result.IN_PROGRESS)]
-        known = self._remembered.get(asked.key)
-        if isinstance(wanted, Change) and asked.is_repeated and known is not None and now_s - known[1] <= REPEATED_S:
-            return [acknowledgement(asked, known[0])]
         match wanted:
             case Change():
+                if asked.is_repeated and (result := self._again(asked, wanted, now_s)) is not None:
+                    return [acknowledgement(asked, result)]
                 return self._change(asked, wanted, now_s)
             case Checks():
                 return [acknowledgement(asked, self._checks(now_s))]
@@ -144,8 +155,30 @@ class Asking:
             else:
                 continue
             del self._pending[key]
-            found.append(self._answered(pending.asked, result, now_s))
+            if pending.stops == self._stops:
+                found.append(self._answered(pending.asked, result, now_s))
+            else:
+                found.append(acknowledgement(pending.asked, result))
         return found
+
+    def _again(self, asked: Asked, change: Change, now_s: float) -> Result | None:
+        """What a repetition is answered without being done; None: it is done, since its first sending was lost."""
+        result, told_s = self._remembered.get(asked.key, (None, -math.inf))
+        if result is not None and now_s - told_s <= REPEATED_S:
+            is_shown = now_s - told_s > _SHOWN_S
+            if result is not Result.ACCEPTED or not is_shown or self._still_holds(change.wish):
+                return result
+        elif now_s - self._last_stop_s > REPEATED_S:
+            return None
+        # Whether the stop or the first sending came later, nobody knows.
+        self._say(Severity.WARNING, f"{_NOT_DONE[change.wish]}: the robot was stopped meanwhile; send it anew.")
+        return Result.TEMPORARILY_REJECTED
+
+    def _still_holds(self, wish: Wish) -> bool:
+        snapshot = self._stream.snapshot
+        if wish is Wish.START:
+            return self._stream.is_running
+        return wish is not Wish.RESUME or (snapshot is not None and not is_held(snapshot))
 
     def _change(self, asked: Asked, change: Change, now_s: float) -> list[Make]:
         if self._stream.is_stale(now_s) or self._stream.snapshot is None:
@@ -161,15 +194,15 @@ class Asking:
             return [self._answered(asked, Result.TEMPORARILY_REJECTED, now_s)]
         if len(self._pending) >= _MOST_PENDING:
             return [acknowledgement(asked, Result.TEMPORARILY_REJECTED)]
-        self._stops_s.clear()
+        self._ordered.clear()
+        self._held_s = -math.inf
         answer = self._operations.order(change.wish, _name(asked.sender))
-        self._pending[asked.key] = _Pending(asked, change.wish, answer, now_s)
+        self._pending[asked.key] = _Pending(asked, change.wish, answer, now_s, self._stops)
         return []
 
     def _is_held(self, now_s: float) -> bool:
         snapshot = self._stream.snapshot
-        stopped_s = self._stops_s.get(Stop.OPERATOR)
-        if stopped_s is not None and now_s - stopped_s < _STOP_SHOWN_S:
+        if now_s - self._held_s < _SHOWN_S:
             return True
         return snapshot is not None and is_held(snapshot)
 

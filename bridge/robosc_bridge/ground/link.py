@@ -122,11 +122,14 @@ class GroundLink:
             # One station at a time; another may stop the robot.
             line.reply(self._session.overheard(now_s, data))
             data = b""
-        before = self._session.accepted
+        is_stranger = line.is_stranger
+        accepted, claims = self._session.accepted, self._session.claims
         found = self._session.step(now_s, data, is_datagram=True)
-        if self._session.accepted > before:
+        if self._session.claims > claims:
             self._peer_s = now_s
             line.answer_sender()
+        elif self._session.accepted > accepted and not is_stranger:
+            self._peer_s = now_s
         if found:
             line.write(found)
 

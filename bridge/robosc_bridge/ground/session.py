@@ -76,14 +76,15 @@ class Session:
         now_s: The time, by the clock that readings and scans have theirs from.
 
     Attributes:
-        accepted: How many messages have come that count.
+        accepted: How many messages of stations have come that count.
+        claims: How many of these let their sender be the station in use: its sign of life, or a command.
 
     Raises:
         SigningError: There is no key, or its time cannot be kept.
     """
 
     def __init__(self, operations: Operations, settings: GroundSettings, now_s: float) -> None:
-        self.accepted = 0
+        self.accepted = self.claims = 0
         self._operations = operations
         self._settings = settings
         self._signing = settings.signing.begin() if settings.signing else None
@@ -130,7 +131,7 @@ class Session:
         self._look()
         replies: list[Make] = []
         for heard in self._decoder.take_datagram(data) if is_datagram else self._decoder.feed(data):
-            self.accepted += self._is_trusted(heard)
+            self._count(heard)
             replies += self._take(heard)
         replies += self._asking.look(now_s)
         self._stream.bad_packets = self._decoder.counts.bad_frames
@@ -147,7 +148,7 @@ class Session:
         self._pass_time(now_s)
         replies: list[Make] = []
         for heard in self._decoder.take_datagram(data):
-            asked = self._asked(heard)
+            asked = None if self._is_own(heard) else self._asked(heard)
             if asked is not None and isinstance(wanted := _wanted(asked), Stop):
                 replies += self._asking.take(asked, wanted, now_s)
         return self._encoded(replies, ())
@@ -171,6 +172,7 @@ class Session:
         self._now_s = now_s
         self._bytes.pass_time(now_s)
         self._heeded.pass_time(now_s)
+        self._asking.begin()
 
     def _encoded(self, urgent: Iterable[Make], telemetry: Iterable[Make]) -> bytes:
         if self._signing:
@@ -228,6 +230,18 @@ class Session:
 
     # What the ground station says.
 
+    def _is_own(self, heard: Heard) -> bool:
+        """Whether it was sent by us, and sent back: our own signature says nothing of who did that."""
+        return heard.sender == (self._settings.system, self._settings.component)
+
+    def _count(self, heard: Heard) -> None:
+        if self._is_own(heard) or not self._is_trusted(heard):
+            return
+        self.accepted += 1
+        # What another vehicle with the same key has sent must not choose whoever sends it on.
+        is_station = heard.number == Incoming.HEARTBEAT and heard.told.type in GROUND_STATIONS
+        self.claims += is_station or self._asked(heard) is not None
+
     def _is_trusted(self, heard: Heard) -> bool:
         """Whether it may ask and be heard; not whether it may change anything."""
         return heard.is_signed or self._signing is None
@@ -236,8 +250,8 @@ class Session:
         return heard.is_signed or (self._signing is None and self._settings.obeys_unsigned)
 
     def _take(self, heard: Heard) -> list[Make]:
-        if heard.sender == (self._settings.system, self._settings.component):
-            return []  # Our own, sent back.
+        if self._is_own(heard):
+            return []
         asked = self._asked(heard)
         if asked is not None and isinstance(wanted := _wanted(asked), Stop):
             return self._asking.take(asked, wanted, self._now_s)

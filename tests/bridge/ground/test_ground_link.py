@@ -202,6 +202,30 @@ def test_signed(tmp_path: Path) -> None:
         assert stranger.station.heard == []
 
 
+def test_who_sends_our_own_packets_back_takes_nobodys_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(link_module, "STATION_LIMIT_S", 0.1)
+    (tmp_path / "key").write_bytes(KEY)
+    signing = Signing(tmp_path / "key")
+    with (
+        linked("udpin:127.0.0.1:0", signing=signing, obeys_unsigned=False) as (daemon, link),
+        peer(_port(link)) as thief,
+        peer(_port(link), key=KEY) as station,
+    ):
+        station.station.codec.signing.timestamp = signing.begin().timestamp()
+        station.send(station.station.heartbeat())
+        station.socket.settimeout(3.0)
+        for _ in range(3):
+            # Overheard, while the station is silent for longer than its place is kept.
+            packets = station.socket.recv(65535)
+            time.sleep(0.15)
+            thief.send(packets)
+        assert thief.receive() == []
+        daemon.answers[Command.START] = ""
+        station.send(station.station.command(400, 1.0))
+        assert station.until("COMMAND_ACK").result == 0
+        assert thief.station.heard == []
+
+
 def test_a_server_that_goes_and_comes_again_is_found() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]

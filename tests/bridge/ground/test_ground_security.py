@@ -181,6 +181,28 @@ def test_another_station_may_stop_and_nothing_more() -> None:
     assert daemon.commands == [Command.STANDBY]
 
 
+def test_only_a_station_claims_the_line(key_file: Path) -> None:
+    daemon, session = _session(_signed(key_file))
+    ours = session.step(BEGIN_S + 1.0)
+    assert ours
+    session.step(BEGIN_S + 1.0, ours, is_datagram=True)
+    assert (session.accepted, session.claims) == (0, 0)
+    # A forged stop is obeyed, and no more; so is one that looks like our own.
+    stranger = Station()
+    session.step(BEGIN_S + 1.0, stranger.heartbeat() + stranger.command(400, 0.0))
+    assert (session.accepted, session.claims) == (0, 0)
+    assert session.overheard(BEGIN_S + 1.0, Station(system=1, component=1).command(400, 0.0)) == b""
+    # Another robot with the same key is heard, and is no station.
+    robot = _fresh(Station(KEY, system=2, component=1), key_file)
+    session.step(BEGIN_S + 1.0, robot.pack(robot.codec.heartbeat_encode(10, 0, 0, 0, 4)))
+    assert (session.accepted, session.claims) == (1, 0)
+    station = _fresh(Station(KEY), key_file)
+    session.step(BEGIN_S + 1.0, station.heartbeat())
+    session.step(BEGIN_S + 1.0, station.command(410))
+    assert (session.accepted, session.claims) == (3, 2)
+    assert daemon.commands == [Command.STANDBY]
+
+
 def test_a_key_that_cannot_be_used_is_told_before_anything_starts(tmp_path: Path) -> None:
     with pytest.raises(SigningError, match="cannot be read"):
         _session(_signed(tmp_path / "none"))

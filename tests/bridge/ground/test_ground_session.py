@@ -338,6 +338,71 @@ def test_a_flood_of_stops_is_answered_each_and_ordered_seldom(talk: Talk) -> Non
     talk.ask(400, 1.0)
     talk.ask(400, 0.0)
     assert talk.daemon.commands == [Command.STANDBY, Command.START, Command.STANDBY]
+    talk.daemon.orders[1].answer("")
+    talk.say()
+    found = talk.say(b"".join(talk.station.command(400, wanted) for wanted in (0.0, 0.0, 1.0, 0.0, 0.0)))
+    assert [ack.result for ack in of_type("COMMAND_ACK", found)] == [0] * 4
+    assert talk.daemon.commands[3:] == [Command.STANDBY, Command.START, Command.STANDBY]
+
+
+@pytest.mark.parametrize(("number", "parameters"), [(400, (0.0,)), (193, (0.0,)), (185, (1.0,)), (176, (1.0, 4.0))])
+def test_every_stop_that_is_accepted_is_ordered(talk: Talk, number: int, parameters: tuple[float, ...]) -> None:
+    # Another face may have resumed or started in between, which this one has not seen.
+    for count in range(1, 4):
+        assert talk.results(number, *parameters) == [0]
+        assert len(talk.daemon.orders) == count
+        talk.now_s += 0.001
+
+
+@pytest.mark.parametrize(
+    ("change", "stop"), [((400, 1.0), (400, 0.0)), ((193, 1.0), (193, 0.0)), ((400, 1.0), (193, 0.0))]
+)
+@pytest.mark.parametrize("is_answered", [True, False])
+def test_what_was_accepted_before_a_stop_is_not_accepted_again(
+    talk: Talk, change: tuple[int, float], stop: tuple[int, float], is_answered: bool
+) -> None:
+    talk.daemon.show(reasons=(Reason.OPERATOR_STOP,))
+    assert talk.results(*change) == []
+    if is_answered:
+        talk.daemon.orders[0].answer("")
+        talk.say()
+    assert talk.results(*stop) == [0]
+    if not is_answered:
+        talk.daemon.orders[0].answer("")
+        assert [ack.result for ack in of_type("COMMAND_ACK", talk.say())] == [0]
+    orders = len(talk.daemon.orders)
+    found = talk.ask(*change, confirmation=1)
+    assert [ack.result for ack in of_type("COMMAND_ACK", found)] == [1]
+    assert any("the robot was stopped meanwhile; send it anew." in text for text in joined_texts(found))
+    assert len(talk.daemon.orders) == orders
+    # As a command of its own it is done; and so is a repetition long after the stop.
+    assert talk.results(*change) == []
+    assert len(talk.daemon.orders) == orders + 1
+    talk.daemon.orders[-1].answer("no")
+    talk.say()
+    talk.live(10.1)
+    assert talk.results(*change, confirmation=1) == []
+
+
+def test_what_others_have_stopped_is_not_accepted_again(talk: Talk) -> None:
+    talk.daemon.answers = {Command.START: "", Command.RESUME: ""}
+    assert talk.results(400, 1.0) == [0]
+    talk.daemon.show(state=State.RUNNING)
+    talk.live(1.5)
+    assert talk.results(400, 1.0, confirmation=1) == [0]
+    talk.daemon.show(state=State.STANDBY)
+    talk.live(0.1)
+    assert talk.results(400, 1.0, confirmation=2) == [1]
+    talk.daemon.show(reasons=(Reason.OPERATOR_STOP,))
+    talk.live(0.1)
+    assert talk.results(193, 1.0) == [0]
+    talk.daemon.show(reasons=())
+    talk.live(1.5)
+    assert talk.results(193, 1.0, confirmation=1) == [0]
+    talk.daemon.show(reasons=(Reason.OPERATOR_STOP,))
+    talk.live(0.1)
+    assert talk.results(193, 1.0, confirmation=1) == [1]
+    assert talk.daemon.commands == [Command.START, Command.RESUME]
 
 
 def test_a_flood_of_others_is_bounded(talk: Talk) -> None:

@@ -148,6 +148,7 @@ def _check(arguments: argparse.Namespace) -> int:
     loaded = load(arguments.config)
     deployment = arguments.deployment or Deployment.CONTROLLER
     ties = tie(_model(arguments.model, deployment), loaded.configuration, loaded.document)
+    # What `run` asks, too, by `assemble`.
     check_settings(loaded.configuration, ties, deployment)
     trusted_keys(loaded.configuration.supervisor.trusted_keys)
     sys.stdout.write(f"{arguments.config}: {len(ties.communications)} communications are tied\n")

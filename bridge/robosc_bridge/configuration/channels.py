@@ -13,6 +13,7 @@ from msgspec import Meta, Struct
 
 from robosc.model.structure import CommunicationKind
 from robosc_bridge.configuration.shapes import Array, Fields, Leaf, OneOf, Shape
+from robosc_bridge.skills.settings import TypedKey
 
 _Word = Annotated[str, Meta(min_length=1, max_length=40)]
 
@@ -82,7 +83,7 @@ class BumperChannel(_Channel, frozen=True, tag="bumper"):
 class KeyChannel(_Channel, frozen=True, tag="key"):
     """A key that is typed in the terminal of the bridge."""
 
-    key: Annotated[_Word, Meta(description="A single character, or `space`.")]
+    key: Annotated[TypedKey, Meta(description="A single character, or `space`.")]
 
 
 class EmergencyStopChannel(_Channel, frozen=True, tag="emergency_stop"):

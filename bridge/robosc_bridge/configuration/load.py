@@ -7,7 +7,7 @@ from pathlib import Path as FilePath
 from robosc_bridge.configuration.decoding import decode
 from robosc_bridge.configuration.document import Document, parse_document, read_file
 from robosc_bridge.configuration.problems import ConfigurationError, Path, Problem
-from robosc_bridge.configuration.structure import Configuration
+from robosc_bridge.configuration.structure import Configuration, Remote, Safety
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,5 +68,34 @@ def _contradictions(configuration: Configuration) -> Iterator[tuple[Path, str]]:
     for kind in ("keys", "buttons"):
         for name in sorted({*getattr(stop, f"stop_{kind}")} & {*getattr(stop, f"resume_{kind}")}):
             yield ("skills", "emergency_stop", f"resume_{kind}"), f"'{name}' stops the robot already"
+    yield from _times(configuration)
+    yield from _idle(configuration)
     if configuration.execution.priority and configuration.execution.policy != "priority":
         yield ("execution", "priority"), "means nothing unless 'policy' is priority"
+
+
+def _times(configuration: Configuration) -> Iterator[tuple[Path, str]]:
+    """A loop that does all in time must not stop the wheels again and again."""
+    overrun_s, period_s = configuration.safety.overrun_s, configuration.execution.period_s
+    if overrun_s < 2 * period_s:
+        if overrun_s == Safety().overrun_s:  # Not written, most often: what is, is the other one.
+            text = f"is {period_s:g}; it must be at most half of 'safety.overrun_s', which is {overrun_s:g}"
+            yield ("execution", "period_s"), text
+        else:
+            text = f"is {overrun_s:g}; it must be at least twice 'execution.period_s', which is {period_s:g}"
+            yield ("safety", "overrun_s"), text
+
+
+def _idle(configuration: Configuration) -> Iterator[tuple[Path, str]]:
+    """Settings that would do nothing, of which somebody expects something."""
+    remote, plain = configuration.remote, Remote()
+    needing = {
+        "grpc_address": ("tls_certificate", "tls_key", "client_ca", "tokens", "insecure_beyond_loopback"),
+        "mavlink_url": ("mavlink_key", "mavlink_unsigned_commands"),
+    }
+    for needed, names in needing.items():
+        for name in names:
+            if getattr(remote, needed) is None and getattr(remote, name) != getattr(plain, name):
+                yield ("remote", name), f"means nothing without '{needed}'"
+    if configuration.safety.stops_when_blind and configuration.scanner is None:
+        yield ("safety", "stops_when_blind"), "means nothing without the section 'scanner'"

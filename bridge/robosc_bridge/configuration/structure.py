@@ -137,10 +137,16 @@ class Safety(_Section, frozen=True):
         Meta(gt=0, le=1, description="Share of the LiDAR's frames that are damaged above which somebody is warned."),
     ] = 0.1
     motor_timeout_s: Annotated[
-        float, Meta(ge=0.02, le=10, description="Seconds without an answer of the drive after which it has failed.")
+        float, Meta(ge=0.06, le=10, description="Seconds without an answer of the drive after which it has failed.")
     ] = 0.2
     overrun_s: Annotated[
-        float, Meta(ge=0.005, le=10, description="Seconds by which a decision may be late before the wheels stop.")
+        float,
+        Meta(
+            ge=0.005,
+            le=10,
+            description="Seconds without a turn of the supervisor's loop after which the wheels stop; at least twice "
+            "`execution.period_s`.",
+        ),
     ] = 0.1
     battery_warning_v: Annotated[float, Meta(ge=0, le=100, description="Voltage below which somebody is warned.")] = (
         11.5

@@ -21,6 +21,7 @@ from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.device_thread import DeviceThread
 from robosc_bridge.daemon.faces import Face, is_remote
 from robosc_bridge.daemon.feed import Feed
+from robosc_bridge.daemon.files import file_problems
 from robosc_bridge.daemon.jobs import Job
 from robosc_bridge.daemon.loop import Daemon
 from robosc_bridge.daemon.operations import Operations
@@ -32,7 +33,6 @@ from robosc_bridge.devices.registry import make_drive_base, make_range_scanner
 from robosc_bridge.devices.robots import ROBOTS, Body, Robot
 from robosc_bridge.drivers import facts_of
 from robosc_bridge.errors import BridgeError
-from robosc_bridge.ground import ground_settings
 from robosc_bridge.remote import settings_of
 from robosc_bridge.safety import SafetyLayer, SafetyLimits
 from robosc_bridge.skills import EmergencyStop, Rotate
@@ -44,7 +44,7 @@ RESTART_S = 3.0
 """After so long without a full turn a LiDAR's motor is restarted, as its official driver does."""
 
 LONGEST_PERIOD_S = 0.9
-"""The safety layer waits for the loop for two seconds at most, and for two periods at least."""
+"""The safety layer waits for the loop for two seconds at most, and for two periods at least (`safety.overrun_s`)."""
 
 SWITCH_S = 0.0005
 """After how long a thread that computes lets others have their turn. With Python's own 5 ms, a remote face that is busy
@@ -83,7 +83,7 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
             angular_deceleration_rad_s2=max(angular, SafetyLimits.angular_deceleration_rad_s2),
             command_timeout_s=chosen.command_timeout_s,
             motor_timeout_s=chosen.motor_timeout_s,
-            loop_timeout_s=max(chosen.overrun_s, 2 * configuration.execution.period_s),
+            loop_timeout_s=chosen.overrun_s,
             operator_timeout_s=chosen.operator_link_timeout_s,
             battery_warn_v=chosen.battery_warning_v,
             battery_stop_v=chosen.battery_stop_v,
@@ -96,7 +96,7 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
 
 
 def check_settings(configuration: Configuration, ties: Ties, deployment: Deployment) -> Settings:
-    """The executor's settings; whatever else `assemble` would refuse is found as well, but for the devices.
+    """The executor's settings; whatever else `assemble` would refuse is found as well, and nothing is opened.
 
     Args:
         configuration: Of the robot.
@@ -104,16 +104,20 @@ def check_settings(configuration: Configuration, ties: Ties, deployment: Deploym
         deployment: Where the supervisor stands.
 
     Raises:
-        AssemblyError: Something does not fit; says what.
+        AssemblyError: Something does not fit, or a file is missing or wrong; says what.
         GroundSettingsError: The ground station cannot be reached as it is said.
+        UnknownDriverError: There is no such driver.
     """
     _require_faces(configuration, ties)
     if deployment is Deployment.LAYER and not is_remote(configuration):
         raise AssemblyError("a supervision layer needs 'remote.grpc_address' or 'remote.mavlink_url' for who asks it")
     limits = safety_limits(configuration)
-    ground_settings(configuration, Velocity(limits.linear_m_s, limits.angular_rad_s))
+    fastest = Velocity(limits.linear_m_s, limits.angular_rad_s)
+    drive_base(configuration)
+    if configuration.scanner is not None:
+        range_scanner(configuration.scanner)
     settings = ties.settings(configuration.execution)
-    problems = sight_problems(configuration.skills.line, ties, settings)
+    problems = [*file_problems(configuration, fastest), *sight_problems(configuration.skills.line, ties, settings)]
     if problems:
         raise AssemblyError("; ".join(problems))
     kept = ties.never_released(settings) if deployment is Deployment.LAYER else ()

@@ -33,6 +33,14 @@ class Signing:
     key_file: Path
     link: int = 0
 
+    def check(self) -> None:
+        """Read the key.
+
+        Raises:
+            SigningError: There is none.
+        """
+        _read_key(self.key_file)
+
     def begin(self) -> "SigningTime":
         """The key, and a time after all that were used.
 

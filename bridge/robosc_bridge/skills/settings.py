@@ -5,6 +5,12 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 Words = tuple[Annotated[str, Meta(min_length=1, max_length=40)], ...]
+# What a terminal gives: no blank (it is called `space`), no carriage return (it becomes a line feed), and none of the
+# characters that the terminal keeps to itself: Ctrl-C, Ctrl-Q, Ctrl-S, Ctrl-Z and Ctrl-\.
+TypedKey = Annotated[
+    str,
+    Meta(pattern=r"^(space|[^ \r\u0003\u0011\u0013\u001a\u001c])(?![\s\S])", title="space or a single character"),
+]
 
 
 class RotateSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -70,7 +76,9 @@ class LineSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 class EmergencyStopSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What the operator stops the robot with, and lets it go on with."""
 
-    stop_keys: Annotated[Words, Meta(description="Keys that stop: single characters, or `space`.")] = ("space",)
-    resume_keys: Annotated[Words, Meta(description="Keys that let it go on.")] = ("r",)
+    stop_keys: Annotated[tuple[TypedKey, ...], Meta(description="Keys that stop: single characters, or `space`.")] = (
+        "space",
+    )
+    resume_keys: Annotated[tuple[TypedKey, ...], Meta(description="Keys that let it go on.")] = ("r",)
     stop_buttons: Annotated[Words, Meta(description="Buttons of the drive that stop.")] = ()
     resume_buttons: Annotated[Words, Meta(description="Buttons of the drive that let it go on.")] = ()

@@ -14,10 +14,10 @@ from robosc_api.security.arguments import (
     server_security_of,
     written_token,
 )
-from robosc_api.security.client import Credentials, open_channel
+from robosc_api.security.client import Credentials, check_credentials, open_channel
 from robosc_api.security.errors import SecurityError
 from robosc_api.security.guard import CALLER, Guard, Rule
-from robosc_api.security.listening import ServerSecurity, add_port, check_listening
+from robosc_api.security.listening import ServerSecurity, add_port, check_files, check_listening
 from robosc_api.security.tokens import Scope, TokenFile, make_token
 
 __all__ = [
@@ -33,6 +33,8 @@ __all__ = [
     "add_port",
     "add_server_arguments",
     "add_token_arguments",
+    "check_credentials",
+    "check_files",
     "check_listening",
     "credentials_of",
     "is_loopback_host",

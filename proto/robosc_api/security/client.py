@@ -52,6 +52,17 @@ def open_channel(
     return channel if token is None else grpc.intercept_channel(channel, _Bearer(token))
 
 
+def check_credentials(credentials: Credentials) -> None:
+    """Read the files that a service would be reached with.
+
+    Raises:
+        SecurityError: One of them cannot be used.
+    """
+    _channel_credentials(credentials)
+    if credentials.token_file is not None:
+        _token(credentials.token_file)
+
+
 def _host(address: str) -> str:
     try:
         return split(address)[0]

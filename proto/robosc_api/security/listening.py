@@ -9,6 +9,7 @@ import grpc
 
 from robosc_api.security.addresses import is_loopback_host, joined, split
 from robosc_api.security.errors import SecurityError
+from robosc_api.security.tokens import TokenFile
 
 _MAXIMUM_BYTES = 1024 * 1024
 
@@ -77,6 +78,18 @@ def check_listening(address: str, security: ServerSecurity) -> None:
             f"{address} can be reached from other machines, and without TLS whoever is between reads and changes "
             "everything: give a certificate and key, or say that it is to be insecure"
         )
+
+
+def check_files(security: ServerSecurity) -> None:
+    """Read the files that a service would be secured with; a wrong one is found before it listens.
+
+    Raises:
+        SecurityError: One of them cannot be used.
+    """
+    if security.certificate is not None:
+        _checked(security)
+    if security.tokens is not None:
+        TokenFile(security.tokens)
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ from robosc_bridge.configuration.channels import (
 from robosc_bridge.configuration.decoding import decode
 from robosc_bridge.configuration.document import Document
 from robosc_bridge.configuration.structure import Execution
+from robosc_bridge.daemon.assembly import EXCHANGE_S
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.skills import RotateSettings
 
@@ -58,6 +59,7 @@ execution:
   max_age_s: {/scan: 1}
   release_identifiers: []
   service_timeout_s: null
+safety: {overrun_s: 2}
 skills: {rotate: {speed_rad_s: 1}, emergency_stop: {stop_keys: [s]}}
 remote: {grpc_address: "[::1]:50061"}
 channels:
@@ -197,10 +199,50 @@ def test_addresses_are_host_and_port(address: str) -> None:
             "skills.emergency_stop.resume_buttons: 'a' stops the robot already",
         ),
         ("execution: {priority: [a]}", "execution.priority: means nothing unless 'policy' is priority"),
+        (
+            "execution: {period_s: 0.1}",
+            "execution.period_s: is 0.1; it must be at most half of 'safety.overrun_s', which is 0.1",
+        ),
+        (
+            "safety: {overrun_s: 0.03}",
+            "safety.overrun_s: is 0.03; it must be at least twice 'execution.period_s', which is 0.02",
+        ),
+        ("safety: {stops_when_blind: true}", "safety.stops_when_blind: means nothing without the section 'scanner'"),
+        ("remote: {mavlink_key: k}", "remote.mavlink_key: means nothing without 'mavlink_url'"),
+        (
+            "remote: {mavlink_unsigned_commands: true}",
+            "remote.mavlink_unsigned_commands: means nothing without 'mavlink_url'",
+        ),
+        ("remote: {tokens: t}", "remote.tokens: means nothing without 'grpc_address'"),
     ],
 )
 def test_contradictions_are_told(text: str, expected: str) -> None:
     assert errors_of(text) == [f"c.yaml:3: {expected}"]
+
+
+@pytest.mark.parametrize("key", ["escape", "ctrl-c", "ab", "", " ", "\r", "\x03", "\x1a", "a\n"])
+def test_a_key_that_can_never_come_is_refused(key: str) -> None:
+    given = json.dumps(key)
+    for text, place in (
+        (f"skills: {{emergency_stop: {{stop_keys: [{given}]}}}}", "skills.emergency_stop.stop_keys[0]"),
+        (f"skills: {{emergency_stop: {{resume_keys: [{given}]}}}}", "skills.emergency_stop.resume_keys[0]"),
+        (f"channels: {{/k: {{channel: key, key: {given}}}}}", 'channels["/k"].key'),
+    ):
+        (line,) = errors_of(text)
+        assert line.startswith(f"c.yaml:3: {place}: is ")
+        assert "it must be a text like space or a single character" in line
+
+
+@pytest.mark.parametrize("key", ["space", "s", "é", "\t", "\n", "\x1b", "€", "-"])
+def test_a_key_that_a_terminal_gives_is_taken(key: str) -> None:
+    found = configuration(f"skills: {{emergency_stop: {{stop_keys: [{json.dumps(key)}]}}}}")
+    assert found.skills.emergency_stop.stop_keys == (key,)
+
+
+def test_a_drive_is_not_silent_before_three_exchanges() -> None:
+    (line,) = errors_of("safety: {motor_timeout_s: 0.05}")
+    assert "is 0.05; it must be a number from 0.06 to 10" in line
+    assert configuration("safety: {motor_timeout_s: 0.06}").safety.motor_timeout_s == pytest.approx(3 * EXCHANGE_S)
 
 
 def test_limits_may_be_equal_where_that_has_a_meaning() -> None:

@@ -9,10 +9,11 @@ from robosc.execution.event_log import NullLog
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor, make_supervisor
 from robosc_bridge.configuration import parse, tie
-from robosc_bridge.daemon.assembly import AssemblyError, Machine, assemble, check_settings
+from robosc_bridge.daemon.assembly import AssemblyError, Machine, assemble, check_settings, safety_limits
 from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.simulated import SimulatedTurtleBot3
+from support.certificates import Authority
 from support.daemons import CONFIGURATION, MODEL
 from support.driven import driven
 from support.models import bundle_of
@@ -64,6 +65,54 @@ def test_a_layer_releases_what_drives(chosen: str, supervisor: Supervisor) -> No
     assert str(raised.value) == "execution.release_identifiers must name '/cmd_vel' in a supervision layer"
     # A controller knows what it has asked for.
     assert check_settings(configuration, ties, Deployment.CONTROLLER)
+
+
+TLS = "{grpc_address: '127.0.0.1:1', tls_certificate: CERTIFICATE, tls_key: KEY"
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        (("driver: opencr", "driver: opncr"), "unknown drive base 'opncr'; did you mean 'opencr'?"),
+        (("driver: lds01", "driver: lds9"), "unknown range scanner 'lds9'"),
+        (("/dev/base", "/dev/base, options: {bauds: 1}"), "driver 'opencr': "),
+        (("/dev/scanner", "/dev/scanner, options: {speed: 1}"), "driver 'lds01': "),
+        (("skills:", "remote: {grpc_address: '127.0.0.1:1', tokens: NONE}\nskills:"), "remote: NONE: "),
+        (
+            ("skills:", "remote: {grpc_address: '127.0.0.1:1', tls_certificate: NONE, tls_key: NONE}\nskills:"),
+            "remote: NONE: ",
+        ),
+        (("skills:", f"remote: {TLS}, client_ca: NONE}}\nskills:"), "remote: NONE: "),
+        (
+            ("skills:", "remote: {mavlink_url: 'udpout:127.0.0.1:1', mavlink_key: NONE}\nskills:"),
+            "remote.mavlink_key: NONE: ",
+        ),
+        (("skills:", "supervisor: {ca: NONE}\nskills:"), "supervisor: NONE: "),
+        (("skills:", "supervisor: {token_file: NONE}\nskills:"), "supervisor: NONE: "),
+        (("skills:", "supervisor: {key: NONE}\nskills:"), "supervisor: a certificate and its key belong together"),
+    ],
+)
+def test_what_cannot_be_used_is_refused_without_a_start(
+    change: tuple[str, str], why: str, supervisor: Supervisor, tmp_path: Path
+) -> None:
+    certificate, key = Authority(tmp_path).sign("bridge")
+    names = {"CERTIFICATE": str(certificate), "KEY": str(key), "NONE": str(tmp_path / "none")}
+    text = CONFIGURATION.replace(*change)
+    for name, path in names.items():
+        text, why = text.replace(name, path), why.replace(name, path)
+    configuration = parse(text.encode(), "test.yaml").configuration
+    with pytest.raises(BridgeError) as raised:
+        check_settings(configuration, tie(supervisor.model, configuration), Deployment.CONTROLLER)
+    assert why in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_the_loop_may_be_late_as_long_as_is_said() -> None:
+    text = CONFIGURATION.replace("period_s: 0.02", "period_s: 0.5").replace(
+        "skills:", "safety: {overrun_s: 1}\nskills:"
+    )
+    assert safety_limits(parse(text.encode(), "test.yaml").configuration).loop_timeout_s == 1.0
+    assert safety_limits(parse(CONFIGURATION.encode(), "test.yaml").configuration).loop_timeout_s == 0.1
 
 
 def test_nobody_waits_in_standby_for_somebody_who_cannot_come(supervisor: Supervisor) -> None:

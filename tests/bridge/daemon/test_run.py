@@ -117,6 +117,28 @@ def test_what_is_not_tied_is_listed(tmp_path: Path) -> None:
         assert "Traceback" not in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        (("driver: opencr", "driver: opncr"), "unknown drive base 'opncr'"),
+        (("answer_limit_s", "answer_limt_s"), "answer_limt_s"),
+        (("token_file: null", "token_file: /nowhere/token"), "/nowhere/token: No such file"),
+        (("mavlink_key: null", "mavlink_key: key"), "means nothing without 'mavlink_url'"),
+    ],
+)
+def test_check_refuses_what_run_refuses(change: tuple[str, str], why: str, tmp_path: Path) -> None:
+    with SimulatedTurtleBot3("burger", "opencr", "lds01") as robot:
+        file = configured(tmp_path, robot, "opencr")
+        text = file.read_text()
+        assert change[0] in text
+        file.write_text(text.replace(*change, 1))
+        told = [bridge(command, "--model", str(MODEL), "--config", str(file)) for command in ("check", "run")]
+    assert [done.returncode for done in told] == [2, 2]
+    lines = [[line for line in done.stderr.splitlines() if line.startswith("robosc-bridge: ")] for done in told]
+    assert lines[0] == lines[1]
+    assert why in lines[0][0]
+
+
 def test_a_signed_supervisor_is_run_without_its_model(tmp_path: Path) -> None:
     supervisor = tmp_path / "maze.rsup"
     for command in (

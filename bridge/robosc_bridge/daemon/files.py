@@ -1,0 +1,46 @@
+"""Files that a configuration names for who reaches the bridge, or is reached by it: looked at before anything starts.
+
+They are read as they are when they are used, so that what is wrong with one is not found by a robot that is started
+and cannot be reached.
+"""
+
+from collections.abc import Callable, Iterator
+
+from robosc_api.security import SecurityError, check_credentials, check_files
+from robosc_bridge.configuration.structure import Configuration
+from robosc_bridge.daemon.supervisors import credentials_of
+from robosc_bridge.devices.interface import Velocity
+from robosc_bridge.errors import BridgeError
+from robosc_bridge.ground import ground_settings
+from robosc_bridge.remote import settings_of
+
+
+def file_problems(configuration: Configuration, fastest: Velocity) -> list[str]:
+    """What is wrong with them; empty: nothing.
+
+    Args:
+        configuration: Names them.
+        fastest: Limits of speed and turn rate.
+
+    Raises:
+        GroundSettingsError: The ground station cannot be reached as it is said.
+    """
+    found = []
+    for section, look in _looks(configuration, fastest):
+        try:
+            look()
+        except (SecurityError, BridgeError) as error:
+            found.append(f"{section}: {error}")
+    return found
+
+
+def _looks(configuration: Configuration, fastest: Velocity) -> Iterator[tuple[str, Callable[[], object]]]:
+    """By section, what reads its files."""
+    face = settings_of(configuration)
+    if face is not None:
+        security = face.security
+        yield "remote", lambda: check_files(security)
+    ground = ground_settings(configuration, fastest)
+    if ground is not None and ground.signing is not None:
+        yield "remote.mavlink_key", ground.signing.check
+    yield "supervisor", lambda: check_credentials(credentials_of(configuration.supervisor))

@@ -12,6 +12,7 @@ from typing import assert_never
 
 from robosc.execution.clock import Clock
 from robosc.execution.event_log import EventLog
+from robosc_bridge.daemon.asking import Asking
 from robosc_bridge.daemon.conductor import OVER, Conductor
 from robosc_bridge.daemon.exchange import Exchange
 from robosc_bridge.daemon.execution import Execution
@@ -38,7 +39,10 @@ from robosc_bridge.skills import EmergencyStop, Rotate
 _log = logging.getLogger(__name__)
 
 PROGRAM_SHARE = 50
-"""How much of what programs have sent is taken up in one turn."""
+"""How much of what programs have sent is taken up in one turn, at most."""
+
+PROGRAM_SHARE_S = 0.002
+"""After how long in one turn no more of it is taken up; one of it is in any case."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +87,8 @@ class Daemon:
         self._clock = clock
         feed = feed or Feed()
         self._inbox: queue.SimpleQueue[Item] = queue.SimpleQueue()
-        self._from_programs = ProgramInbox(lambda: self._inbox.put(_Woken()))
+        asking = Asking(job.supervisor.model, job.ties, is_layer=job.is_layer)
+        self._from_programs = ProgramInbox(lambda: self._inbox.put(_Woken()), asking.look)
         self._orders = Orders()
         self._readiness = Readiness(needs_scanner=job.needs_scanner, needs_camera=job.needs_camera)
         self._conductor = conductor = Conductor(job, safety, self._readiness, self._orders, clock)
@@ -102,15 +107,14 @@ class Daemon:
             clock.monotonic,
         )
         requesters = Requesters(
-            job.supervisor.model,
-            job.ties,
+            asking,
             roster,
             self._robot.abandon,
             job.settings.command_timeout_s,
             clock.monotonic,
         )
         self._execution = Execution(job, self._robot, requesters, clock, WatchedLog(log, feed))
-        self._programs = ProgramsSide(roster, exchange, requesters, self._execution, self._robot, is_layer=job.is_layer)
+        self._programs = ProgramsSide(roster, exchange, requesters, self._execution, self._robot)
         self._snapshots = Snapshots(feed, self._execution, self._readiness, clock)
         conductor.lead(self._execution, self._robot, self._motion, self._switch, self._snapshots.note)
         self._wish = Velocity()
@@ -198,8 +202,7 @@ class Daemon:
         # Not what comes meanwhile: nobody can keep the loop from its turn.
         for _ in range(self._inbox.qsize()):
             self._handle(self._inbox.get_nowait())
-        for arrived in self._from_programs.take(PROGRAM_SHARE):
-            self._programs.take(arrived)
+        self._take_from_programs()
         now_s = self._clock.monotonic()
         if now_s >= self._execution.due_s:
             self._execution.decide(now_s, is_running=self.state is State.RUNNING)
@@ -212,6 +215,17 @@ class Daemon:
         self._snapshots.look(self.state, self.problem, self._conductor.notice)
         if self.state is State.OVER:
             self._close()
+
+    def _take_from_programs(self) -> None:
+        """Take up some of what programs have sent: what the model makes of large data takes its time."""
+        end_s = self._clock.monotonic() + PROGRAM_SHARE_S
+        for _ in range(PROGRAM_SHARE):
+            arrived = self._from_programs.take()
+            if arrived is None:
+                break
+            self._programs.take(arrived)
+            if self._clock.monotonic() >= end_s:
+                break
 
     def _handle(self, item: Item) -> None:
         executor = self._execution.executor

@@ -1,8 +1,8 @@
 """What programs tell the loop on its way there: bounded for each of them, so that none can hold up the others.
 
 The loop takes some at each of its turns, from each program in turn. Who sends faster than they are taken loses what is
-beyond the limit, is told so in its place in the order, and whatever it keeps moving stops then: what was lost may have
-been the message that stops it.
+beyond the limits, and all that follows until it is told so, in its place in the order. Whatever it asked for ends then:
+what was lost may have been the message that ends it.
 """
 
 import threading
@@ -10,16 +10,20 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from robosc_bridge.daemon.plain_data import why_not_plain
+from robosc_bridge.daemon.asking import UnfitError
+from robosc_bridge.daemon.plain_data import weight_bytes, why_not_plain
 from robosc_bridge.daemon.programs import Attached, Detached, FromProgram, Program
 
 MAXIMUM_WAITING = 200
 """Of one program."""
 
+MAXIMUM_WAITING_BYTES = 2_000_000
+"""Of memory, for the data of one program; one message may wait whatever its size."""
+
 
 @dataclass(frozen=True)
 class Unreadable:
-    """What a program sent is no plain data of a reasonable size.
+    """What a program sent is no plain data of a reasonable size, or asks for what makes no sense.
 
     Attributes:
         program: That sent it.
@@ -48,10 +52,20 @@ Arrived = FromProgram | Unreadable | Overflowed
 
 @dataclass
 class _Waiting:
-    """Of one program."""
+    """Of one program, each with the memory that its data takes."""
 
-    items: deque[Arrived] = field(default_factory=deque)
+    items: deque[tuple[Arrived, int]] = field(default_factory=deque)
+    weight_bytes: int = 0
     overflow: Overflowed | None = None
+
+    def has_room(self, weight_bytes: int) -> bool:
+        if len(self.items) >= MAXIMUM_WAITING:
+            return False
+        return not self.items or self.weight_bytes + weight_bytes <= MAXIMUM_WAITING_BYTES
+
+    def append(self, item: Arrived, weight_bytes: int) -> None:
+        self.items.append((item, weight_bytes))
+        self.weight_bytes += weight_bytes
 
 
 class ProgramInbox:
@@ -59,50 +73,61 @@ class ProgramInbox:
 
     Args:
         wake: Called when something waits where nothing did.
+        look: What the loop gets of what was sent; raises `UnfitError` if it makes no sense. From any thread.
     """
 
-    def __init__(self, wake: Callable[[], None]) -> None:
+    def __init__(self, wake: Callable[[], None], look: Callable[[FromProgram], FromProgram]) -> None:
         self._wake = wake
+        self._look = look
         self._lock = threading.Lock()
         # In the order in which they are asked next.
         self._waiting: dict[Program, _Waiting] = {}
 
     def put(self, item: FromProgram) -> None:
         """Tell the loop something; waits for nobody but another `put` or `take`."""
-        arrived: Arrived = item
-        if not isinstance(item, Attached | Detached):
-            # Here and not in the loop: looking through it takes time.
-            why = why_not_plain(getattr(item, "data", None))
-            arrived = Unreadable(item.program, why) if why else item
+        # Here and not in the loop: looking through data takes time.
+        is_always_taken = isinstance(item, Attached | Detached)
+        arrived, weight = (item, 0) if is_always_taken else self._looked_through(item)
         with self._lock:
             was_empty = not self._waiting
             waiting = self._waiting.setdefault(item.program, _Waiting())
-            if len(waiting.items) < MAXIMUM_WAITING or isinstance(item, Attached | Detached):
-                waiting.items.append(arrived)
+            if is_always_taken or (waiting.overflow is None and waiting.has_room(weight)):
+                waiting.append(arrived, weight)
             elif waiting.overflow is None:
                 waiting.overflow = Overflowed(item.program)
-                waiting.items.append(waiting.overflow)
+                waiting.append(waiting.overflow, 0)
             else:
                 waiting.overflow.lost += 1
         if was_empty:
             self._wake()
+
+    def _looked_through(self, item: FromProgram) -> tuple[Arrived, int]:
+        """What the loop gets, and the memory that its data takes."""
+        why = why_not_plain(getattr(item, "data", None))
+        if why:
+            return Unreadable(item.program, why), 0
+        try:
+            looked = self._look(item)
+        except UnfitError as error:
+            return Unreadable(item.program, str(error)), 0
+        return looked, weight_bytes(getattr(looked, "data", None))
 
     @property
     def is_empty(self) -> bool:
         """Whether nothing waits."""
         return not self._waiting
 
-    def take(self, limit: int) -> list[Arrived]:
-        """What waits, at most so much of it, one of each program in turn."""
-        found: list[Arrived] = []
+    def take(self) -> Arrived | None:
+        """The next of what waits, one of each program in turn; None: nothing does."""
         with self._lock:
-            while self._waiting and len(found) < limit:
-                program, waiting = next(iter(self._waiting.items()))
-                del self._waiting[program]
-                item = waiting.items.popleft()
-                if item is waiting.overflow:
-                    waiting.overflow = None
-                found.append(item)
-                if waiting.items:
-                    self._waiting[program] = waiting
-        return found
+            if not self._waiting:
+                return None
+            program, waiting = next(iter(self._waiting.items()))
+            del self._waiting[program]
+            item, weight = waiting.items.popleft()
+            waiting.weight_bytes -= weight
+            if item is waiting.overflow:
+                waiting.overflow = None
+            if waiting.items:
+                self._waiting[program] = waiting
+        return item

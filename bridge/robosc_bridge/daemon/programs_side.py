@@ -34,7 +34,6 @@ class ProgramsSide:
         requesters: The caller's side of a layer.
         execution: The supervisor at work.
         robot: Tells the executor what has become of its requests.
-        is_layer: Whether programs may ask for anything.
     """
 
     def __init__(
@@ -44,15 +43,12 @@ class ProgramsSide:
         requesters: Requesters,
         execution: Execution,
         robot: Robot,
-        *,
-        is_layer: bool,
     ) -> None:
         self._roster = roster
         self._exchange = exchange
         self._requesters = requesters
         self._execution = execution
         self._robot = robot
-        self._is_layer = is_layer
 
     def take(self, item: Arrived) -> None:
         """Do what a program wants, or tell it why that makes no sense."""
@@ -92,9 +88,6 @@ class ProgramsSide:
             case Replied() | CallFailed() | GoalAccepted() | FeedbackGiven() | GoalEnded():
                 self._exchange.take(item, executor)
             case Requested() | Called() | GoalSent() | CancelWanted():
-                if self._is_layer:
-                    self._requesters.take(item, layer)
-                else:
-                    self._roster.refuse(program, "the supervisor is a controller: it lets nobody ask for anything")
+                self._requesters.take(item, layer)
             case _:
                 assert_never(item)

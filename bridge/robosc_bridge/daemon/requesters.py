@@ -8,16 +8,13 @@ program's own signs count for what it keeps moving, and no others.
 
 import logging
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from robosc.execution.layer import Layer
-from robosc.model.structure import Communication, CommunicationKind, Model
-from robosc_bridge.configuration.channels import CHANNELS, Channel, RotateChannel, channel_name
-from robosc_bridge.configuration.shapes import Shape
-from robosc_bridge.configuration.ties import Ties
-from robosc_bridge.daemon.plain_data import accepted, completed, is_number, why_not_shaped, why_not_typed
+from robosc.model.structure import CommunicationKind
+from robosc_bridge.daemon.asking import Asked, Asking
 from robosc_bridge.daemon.programs import (
     Answered,
     Blocked,
@@ -33,16 +30,8 @@ from robosc_bridge.daemon.programs import (
     Requested,
 )
 from robosc_bridge.daemon.roster import Roster
-from robosc_bridge.daemon.wheel_messages import angle_of
-from robosc_bridge.skills.rotate import MAXIMUM_ANGLE_RAD
 
 _log = logging.getLogger(__name__)
-
-MAXIMUM_ID = 255
-"""Characters of an id of a program's own."""
-
-Asked = Requested | Called | GoalSent | CancelWanted
-"""What a program asks for."""
 
 _Id = tuple[Program, str]
 _GONE = "the program that asked for it is gone"
@@ -66,8 +55,7 @@ class Requesters:
     """What programs ask a supervision layer for, and what they are told of it.
 
     Args:
-        model: Of the supervisor.
-        ties: What each communication is tied to.
+        asking: What may be asked for.
         roster: Programs that are there.
         abandon: Ends a turn that a communication asked for, with the reason.
         command_timeout_s: After how long without a message of it a program's last one on an identifier is released;
@@ -77,30 +65,17 @@ class Requesters:
 
     def __init__(
         self,
-        model: Model,
-        ties: Ties,
+        asking: Asking,
         roster: Roster,
         abandon: Callable[[str, str], None],
         command_timeout_s: float,
         clock: Callable[[], float],
     ) -> None:
-        self._model = model
-        self._channels = ties.channels
+        self._asking = asking
         self._roster = roster
         self._abandon = abandon
         self._timeout_s = command_timeout_s or math.inf
         self._clock = clock
-        self._messages: dict[str, list[Communication]] = {}
-        self._others: dict[tuple[CommunicationKind, str], Communication] = {}
-        for item in ties.communications:
-            if item.kind is CommunicationKind.INCOMING_MESSAGE:
-                self._messages.setdefault(item.identifier, []).append(item)
-            elif item.kind is not CommunicationKind.OUTGOING_MESSAGE:
-                self._others[item.kind, item.name] = item
-        self._shapes: dict[str, Shape] = {}
-        for item in (*(item for found in self._messages.values() for item in found), *self._others.values()):
-            shape = CHANNELS[type(ties.channels[item.name])].uses[item.kind].request
-            self._shapes[item.name] = accepted(model, item.request, shape)
         self._asker: Program | None = None
         self._was_blocked = False
         # By identifier; then calls and goals under way.
@@ -135,7 +110,7 @@ class Requesters:
             if sender.program is program:
                 del self._senders[identifier]
                 layer.on_silent(identifier)
-                for item in self._messages[identifier]:
+                for item in self._asking.messages[identifier]:
                     self._abandon(item.name, reason)
         for (owner, goal_id), action in tuple(self._goals.items()):
             if owner is program:
@@ -169,8 +144,6 @@ class Requesters:
     def _pass(self, item: Asked, layer: Layer) -> None:
         match item:
             case Requested(program=program, identifier=identifier, data=data):
-                for message in self._messages[identifier]:
-                    data = completed(self._model, message.request, data)
                 now_s, sender = self._clock(), self._senders.get(identifier)
                 layer.on_request(identifier, data)
                 if not self._was_blocked:
@@ -179,15 +152,12 @@ class Requesters:
                     sender.heard_s = now_s
             case Called(program=program, service=service, call_id=call_id, data=data):
                 self._calls[program, call_id] = service
-                layer.on_call(service, (program, call_id), self._completed(CommunicationKind.SERVICE, service, data))
+                layer.on_call(service, (program, call_id), data)
             case GoalSent(program=program, action=action, goal_id=goal_id, data=data):
                 self._goals[program, goal_id] = action
-                layer.on_goal(action, (program, goal_id), self._completed(CommunicationKind.ACTION, action, data))
+                layer.on_goal(action, (program, goal_id), data)
             case CancelWanted(program=program, action=action, goal_id=goal_id):
                 layer.on_cancel(action, (program, goal_id))
-
-    def _completed(self, kind: CommunicationKind, name: str, data: Any) -> Any:
-        return completed(self._model, self._others[kind, name].request, data)
 
     def _hold_back(self, item: Asked) -> None:
         """Nothing is executed: everything is held back."""
@@ -196,54 +166,21 @@ class Requesters:
                 self._roster.tell(program, Blocked(identifier))
             case Called(program=program, service=service, call_id=call_id):
                 self._roster.tell(program, Answered(call_id, None, is_default=True))
-                self._roster.tell(program, Blocked(self._others[CommunicationKind.SERVICE, service].identifier))
+                self._roster.tell(program, Blocked(self._asking.identifier(CommunicationKind.SERVICE, service)))
             case GoalSent(program=program, action=action, goal_id=goal_id):
                 self._roster.tell(program, GoalRejected(goal_id))
-                self._roster.tell(program, Blocked(self._others[CommunicationKind.ACTION, action].identifier))
-
-    # Whether it makes sense.
+                self._roster.tell(program, Blocked(self._asking.identifier(CommunicationKind.ACTION, action)))
 
     def _why_refused(self, item: Asked) -> str:
-        """Why what a program asks for makes no sense, one sentence; empty: it does."""
-        if not item.program.may_request:
-            return "this program may not ask for anything"
+        """Why what a program asks for makes no sense now, one sentence; empty: it does."""
         match item:
-            case Requested(identifier=identifier, data=data):
-                meant = self._messages.get(identifier)
-                if meant is None:
-                    return f"the model has no message to the robot on '{identifier:.255}'"
-                # Which of them it is, the layer finds out: it must fit any.
-                return next(filter(None, (self._why_unfit(message, data) for message in meant)), "")
-            case Called(program=program, service=service, call_id=call_id, data=data):
-                return self._why_no_start(CommunicationKind.SERVICE, service, (program, call_id), data)
-            case GoalSent(program=program, action=action, goal_id=goal_id, data=data):
-                return self._why_no_start(CommunicationKind.ACTION, action, (program, goal_id), data)
+            case Called(program=program, call_id=own_id) | GoalSent(program=program, goal_id=own_id):
+                own = program, own_id
+                return f"the id '{own_id}' is in use" if own in self._calls or own in self._goals else ""
             case CancelWanted(program=program, action=action, goal_id=goal_id):
                 is_own = self._goals.get((program, goal_id)) == action
                 return "" if is_own else f"'{goal_id:.255}' is no goal of '{action:.255}' that is under way"
-
-    def _why_no_start(self, kind: CommunicationKind, name: str, own: _Id, data: Any) -> str:
-        asked = self._others.get((kind, name))
-        if asked is None:
-            return f"the model has no {kind} '{name:.255}'"
-        if not 1 <= len(own[1]) <= MAXIMUM_ID:
-            return f"an id has 1 to {MAXIMUM_ID} characters"
-        if own in self._calls or own in self._goals:
-            return f"the id '{own[1]}' is in use"
-        return self._why_unfit(asked, data)
-
-    def _why_unfit(self, communication: Communication, data: Any) -> str:
-        """Why data is nothing that the channel and the model take."""
-        channel = self._channels[communication.name]
-        info = CHANNELS[type(channel)]
-        why = why_not_shaped(self._shapes[communication.name], data)
-        why = why or why_not_typed(self._model, communication.request, data)
-        if why:
-            return f"'{communication.name}': {why}"
-        for path, value in _leaves(data, ""):
-            if info.heeded and path not in info.heeded and value:
-                return f"'{communication.name}': '{path}' must be 0: '{channel_name(channel)}' does not go by it"
-        return _why_not_turned(communication, channel, data)
+        return ""
 
     # What the layer tells.
 
@@ -284,22 +221,3 @@ class Requesters:
         """An accepted goal has ended for its caller."""
         self._goals.pop(goal_id, None)
         self._roster.tell(goal_id[0], GoalOver(goal_id[1], outcome, data))
-
-
-def _why_not_turned(communication: Communication, channel: Channel, data: Any) -> str:
-    """Why no turn can be made of an angle; one that is not finite is held back by the layer."""
-    if isinstance(channel, RotateChannel):
-        angle = angle_of(data)
-        rad = math.radians(angle) if channel.unit == "degrees" else angle
-        if math.isfinite(rad) and abs(rad) > MAXIMUM_ANGLE_RAD:
-            return f"'{communication.name}': an angle of {angle:g} {channel.unit} is beyond a hundred turns"
-    return ""
-
-
-def _leaves(data: Any, path: str) -> Iterator[tuple[str, float]]:
-    """Numbers of plain data, by where they stand in it."""
-    if isinstance(data, dict):
-        for name, part in data.items():
-            yield from _leaves(part, f"{path}.{name}" if path else name)
-    elif is_number(data):
-        yield path, data

@@ -1,25 +1,30 @@
 """A supervision layer in the daemon: what programs ask for is let through or held back, and ends with who asked."""
 
 import math
+import threading
 from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robosc_bridge.daemon import asking
 from robosc_bridge.daemon.programs import (
     Answered,
+    Attached,
     Blocked,
     Called,
     CallMade,
     CancelWanted,
     Detached,
     FeedbackPassed,
+    FromProgram,
     GoalOver,
     GoalRejected,
     GoalSent,
     GoalTaken,
     PassedOn,
+    Program,
     Refused,
     Replied,
     Requested,
@@ -441,6 +446,69 @@ def test_what_who_sends_too_much_has_asked_for_ends(
     program.say(Requested, "/cmd_vel", FORWARD)
     scene.live(0.3, 2.0)
     assert scene.out.linear_m_s == 0.1
+
+
+def test_what_is_costly_to_take_up_is_spread_over_turns(scene: Scene) -> None:
+    taken: list[str] = []
+
+    def take_time(item: Any) -> None:
+        if isinstance(item, Blocked):
+            taken.append(item.identifier)
+            scene.clock.advance(0.0015)
+
+    slow = Program("slow", take_time, may_request=True)
+    scene.daemon.post(Attached(slow))
+    scene.daemon.turn()
+    other = Connected(scene, "another")
+    other.turn()
+    for _ in range(50):
+        scene.daemon.post(Requested(slow, "/cmd_vel", {"linear": {"x": math.nan}}))
+    # Its first is taken up in the first turn, and so is that of the other one.
+    assert Blocked("/cmd_vel") in other.say(Requested, "/cmd_vel", {"linear": {"x": math.nan}})
+    for turns in range(1, 20):
+        assert len(taken) <= 2 * turns
+        scene.daemon.turn()
+    while len(taken) < 50:
+        before = len(taken)
+        scene.daemon.turn()
+        assert len(taken) > before
+
+
+def test_data_is_looked_through_in_the_thread_of_who_sends_it(
+    scene: Scene, program: Connected, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looked: list[int] = []
+
+    def noting(function: Any) -> Any:
+        def noted(*arguments: Any) -> Any:
+            looked.append(threading.get_ident())
+            return function(*arguments)
+
+        return noted
+
+    for name in ("why_not_shaped", "why_not_typed", "completed", "_leaves"):
+        monkeypatch.setattr(asking, name, noting(getattr(asking, name)))
+    program.turn()
+    items: list[FromProgram] = [
+        Requested(program.program, "/cmd_vel", FORWARD),
+        Called(program.program, "turn", "1", {"angle": 20}),
+        GoalSent(program.program, "face", "g", {"angle": "wide"}),
+    ]
+
+    def send() -> None:
+        for item in items:
+            scene.daemon.post(item)
+
+    sender = threading.Thread(target=send)
+    sender.start()
+    sender.join()
+    assert len(looked) > 6
+    assert threading.get_ident() not in looked
+    looked.clear()
+    assert refused(program.turn()) == ["'face': 'angle' must be number"]
+    scene.live(0.3, 2.0)
+    assert scene.out.angular_rad_s > 0.0
+    assert looked == []
 
 
 def test_a_lost_drive_base_ends_a_layers_run(scene: Scene, program: Connected) -> None:

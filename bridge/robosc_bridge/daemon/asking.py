@@ -1,0 +1,138 @@
+"""What programs may ask a supervision layer for, and whether what they ask makes sense.
+
+All of it follows from the model and the configuration alone, so it is looked at in the thread of who asks: large data
+takes its time, which the loop does not have.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+from robosc.model.structure import Communication, CommunicationKind, Model
+from robosc_bridge.configuration.channels import CHANNELS, Channel, RotateChannel, channel_name
+from robosc_bridge.configuration.shapes import Shape
+from robosc_bridge.configuration.ties import Ties
+from robosc_bridge.daemon.plain_data import accepted, completed, is_number, why_not_shaped, why_not_typed
+from robosc_bridge.daemon.programs import Called, CancelWanted, FromProgram, GoalSent, Requested
+from robosc_bridge.daemon.wheel_messages import angle_of
+from robosc_bridge.skills.rotate import MAXIMUM_ANGLE_RAD
+
+MAXIMUM_ID = 255
+"""Characters of an id of a program's own."""
+
+Asked = Requested | Called | GoalSent | CancelWanted
+"""What a program asks for."""
+
+
+class UnfitError(ValueError):
+    """What a program asks for makes no sense; one sentence for it."""
+
+
+class Asking:
+    """What may be asked for; used by all threads.
+
+    Args:
+        model: Of the supervisor.
+        ties: What each communication is tied to.
+        is_layer: Whether programs may ask for anything.
+
+    Attributes:
+        messages: By identifier, the messages that programs may send to the robot.
+    """
+
+    def __init__(self, model: Model, ties: Ties, *, is_layer: bool) -> None:
+        self._model = model
+        self._channels = ties.channels
+        self._is_layer = is_layer
+        messages: dict[str, list[Communication]] = {}
+        self._others: dict[tuple[CommunicationKind, str], Communication] = {}
+        for item in ties.communications:
+            if item.kind is CommunicationKind.INCOMING_MESSAGE:
+                messages.setdefault(item.identifier, []).append(item)
+            elif item.kind is not CommunicationKind.OUTGOING_MESSAGE:
+                self._others[item.kind, item.name] = item
+        self.messages: Mapping[str, list[Communication]] = messages
+        self._shapes: dict[str, Shape] = {}
+        for item in (*(item for found in messages.values() for item in found), *self._others.values()):
+            shape = CHANNELS[type(ties.channels[item.name])].uses[item.kind].request
+            self._shapes[item.name] = accepted(model, item.request, shape)
+
+    def identifier(self, kind: CommunicationKind, name: str) -> str:
+        """Of a service or action that the model has."""
+        return self._others[kind, name].identifier
+
+    def look(self, item: FromProgram) -> FromProgram:
+        """What the layer gets of what a program sends: what the data leaves out is zero, false, empty.
+
+        Raises:
+            UnfitError: It asks for something, and that makes no sense whatever the layer does.
+        """
+        if not isinstance(item, Asked):
+            return item
+        if not self._is_layer:
+            raise UnfitError("the supervisor is a controller: it lets nobody ask for anything")
+        if not item.program.may_request:
+            raise UnfitError("this program may not ask for anything")
+        match item:
+            case Requested(identifier=identifier, data=data):
+                meant = self.messages.get(identifier)
+                if meant is None:
+                    raise UnfitError(f"the model has no message to the robot on '{identifier:.255}'")
+                # Which of them it is, the layer finds out: it must fit any.
+                for message in meant:
+                    self._require_fit(message, data)
+                for message in meant:
+                    data = completed(self._model, message.request, data)
+                return replace(item, data=data)
+            case Called(service=service, call_id=call_id, data=data):
+                return replace(item, data=self._started(CommunicationKind.SERVICE, service, call_id, data))
+            case GoalSent(action=action, goal_id=goal_id, data=data):
+                return replace(item, data=self._started(CommunicationKind.ACTION, action, goal_id, data))
+        return item
+
+    def _started(self, kind: CommunicationKind, name: str, own_id: str, data: Any) -> Any:
+        asked = self._others.get((kind, name))
+        if asked is None:
+            raise UnfitError(f"the model has no {kind} '{name:.255}'")
+        if not 1 <= len(own_id) <= MAXIMUM_ID:
+            raise UnfitError(f"an id has 1 to {MAXIMUM_ID} characters")
+        self._require_fit(asked, data)
+        return completed(self._model, asked.request, data)
+
+    def _require_fit(self, communication: Communication, data: Any) -> None:
+        """Do nothing if data is what the channel and the model take.
+
+        Raises:
+            UnfitError: It is not.
+        """
+        channel = self._channels[communication.name]
+        heeded = CHANNELS[type(channel)].heeded
+        why = why_not_shaped(self._shapes[communication.name], data)
+        why = why or why_not_typed(self._model, communication.request, data)
+        if why:
+            raise UnfitError(f"'{communication.name}': {why}")
+        for path, value in _leaves(data, "") if heeded else ():
+            if path not in heeded and value:
+                raise UnfitError(
+                    f"'{communication.name}': '{path}' must be 0: '{channel_name(channel)}' does not go by it"
+                )
+        _require_turn(communication, channel, data)
+
+
+def _require_turn(communication: Communication, channel: Channel, data: Any) -> None:
+    """Do nothing if a turn can be made of an angle; one that is not finite is held back by the layer."""
+    if isinstance(channel, RotateChannel):
+        angle = angle_of(data)
+        rad = math.radians(angle) if channel.unit == "degrees" else angle
+        if math.isfinite(rad) and abs(rad) > MAXIMUM_ANGLE_RAD:
+            raise UnfitError(f"'{communication.name}': an angle of {angle:g} {channel.unit} is beyond a hundred turns")
+
+
+def _leaves(data: Any, path: str) -> Iterator[tuple[str, float]]:
+    """Numbers of plain data, by where they stand in it."""
+    if isinstance(data, dict):
+        for name, part in data.items():
+            yield from _leaves(part, f"{path}.{name}" if path else name)
+    elif is_number(data):
+        yield path, data

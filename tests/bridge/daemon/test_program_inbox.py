@@ -1,0 +1,114 @@
+"""What waits for the loop of each program is bounded, in number and in memory."""
+
+import random
+import tracemalloc
+from typing import Any
+
+import pytest
+
+from robosc_bridge.daemon.asking import UnfitError
+from robosc_bridge.daemon.plain_data import weight_bytes
+from robosc_bridge.daemon.program_inbox import (
+    MAXIMUM_WAITING,
+    MAXIMUM_WAITING_BYTES,
+    Arrived,
+    Overflowed,
+    ProgramInbox,
+    Unreadable,
+)
+from robosc_bridge.daemon.programs import Detached, FromProgram, Program, Told
+
+
+def program(name: str = "a program") -> Program:
+    return Program(name, lambda item: None)
+
+
+def as_it_is(item: FromProgram) -> FromProgram:
+    return item
+
+
+def inbox() -> ProgramInbox:
+    return ProgramInbox(lambda: None, as_it_is)
+
+
+def numbers(count: int = 19_990) -> list[float]:
+    return [random.random() for _ in range(count)]
+
+
+def taken(box: ProgramInbox) -> list[Arrived]:
+    found = []
+    while (item := box.take()) is not None:
+        found.append(item)
+    assert box.is_empty
+    return found
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        lambda: numbers(),
+        lambda: {"a": [[random.random()] for _ in range(6000)]},
+        lambda: ["x" * 60_000 + str(number) for number in range(30)],
+        lambda: {f"{number:060}": {} for number in range(9000)},
+    ],
+)
+def test_the_memory_of_what_waits_is_bounded(data: Any) -> None:
+    box, sender = inbox(), program()
+    tracemalloc.start()
+    try:
+        for _ in range(20):
+            box.put(Told(sender, "/mood", data()))
+        assert tracemalloc.get_traced_memory()[0] < 1.3 * MAXIMUM_WAITING_BYTES
+    finally:
+        tracemalloc.stop()
+    *kept, last = taken(box)
+    assert 1 <= len(kept) < 20
+    assert last == Overflowed(sender, lost=20 - len(kept))
+    # There is room again.
+    box.put(Told(sender, "/mood", data()))
+    assert isinstance(box.take(), Told)
+
+
+def test_data_weighs_what_it_takes() -> None:
+    tracemalloc.start()
+    try:
+        data = {f"name {number}": [random.random(), "text" * number] for number in range(100, 400)}
+        grown = tracemalloc.get_traced_memory()[0]
+    finally:
+        tracemalloc.stop()
+    assert abs(weight_bytes(data) - grown) < 0.15 * grown
+
+
+def test_one_message_waits_whatever_its_size() -> None:
+    box, sender = inbox(), program()
+    large = Told(sender, "/mood", ["x" * 60_000] * 50)
+    assert weight_bytes(large.data) > MAXIMUM_WAITING_BYTES
+    box.put(large)
+    box.put(Told(sender, "/mood", None))
+    assert taken(box) == [large, Overflowed(sender)]
+
+
+def test_after_something_is_lost_nothing_is_kept_before_that_is_told() -> None:
+    # Else a motion could come after the word that all has ended, and the stop that follows it be lost.
+    box, sender, other = inbox(), program(), program("another")
+    for number in range(MAXIMUM_WAITING + 1):
+        box.put(Told(sender, "/mood", number))
+    for _ in range(5):
+        box.take()
+    box.put(Told(sender, "/mood", "go"))
+    box.put(Told(other, "/mood", "fine"))
+    box.put(Detached(sender))
+    found = [item for item in taken(box) if not (isinstance(item, Told) and item.program is sender)]
+    assert found == [Told(other, "/mood", "fine"), Overflowed(sender, lost=2), Detached(sender)]
+    box.put(Told(sender, "/mood", "go"))
+    assert taken(box) == [Told(sender, "/mood", "go")]
+
+
+def test_what_makes_no_sense_takes_no_room() -> None:
+    def look(item: FromProgram) -> FromProgram:
+        raise UnfitError("no")
+
+    box, sender = ProgramInbox(lambda: None, look), program()
+    for _ in range(MAXIMUM_WAITING):
+        box.put(Told(sender, "/mood", numbers(2000)))
+    assert taken(box) == [Unreadable(sender, "no")] * MAXIMUM_WAITING

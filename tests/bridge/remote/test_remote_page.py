@@ -36,8 +36,10 @@ def test_the_calls() -> None:
 def test_the_commands() -> None:
     assert all(name in PAGE for name in NAMES)
     assert ADDRESS in PAGE
-    assert f"{teleop.STEP_M_S:g} m/s" in PAGE
-    assert f"{teleop.STEP_RAD_S:g} rad/s" in PAGE
+    words = " ".join(PAGE.split())
+    assert f"{teleop.STEP_M_S:g} m/s" in words
+    assert f"{teleop.STEP_RAD_S:g} rad/s" in words
+    assert f"lapses {teleop.LAPSE_S:g} s after" in words
 
 
 def test_the_page_is_listed() -> None:

@@ -461,6 +461,18 @@ class TestFace:
         assert again.address == face.address
         again.stop()
 
+    def test_its_death_is_seen(self, daemon: FakeDaemon) -> None:
+        face = RemoteFace(daemon.operations, RemoteSettings("127.0.0.1:0"))
+        assert not face.is_alive
+        face.start()
+        try:
+            assert face.is_alive
+            assert face._loop is not None
+            face._loop.call_soon_threadsafe(face._loop.stop)
+            eventually(lambda: not face.is_alive)
+        finally:
+            face.stop()
+
     def test_the_configuration_says_where_and_how(self) -> None:
         text = """
         robot: burger

@@ -17,6 +17,7 @@ from robosc_api.security import CALLER, Rule, Scope
 from robosc_bridge.daemon import states
 from robosc_bridge.daemon.operations import UNDONE_BY, Operations
 from robosc_bridge.remote import convert
+from robosc_bridge.remote.pace import FloodError
 from robosc_bridge.remote.session import Session, TooSlowError
 from robosc_bridge.remote.watchers import Watchers
 
@@ -241,7 +242,7 @@ class BridgeService(convert.BridgeServiceServicer):
             yield
         except convert.RequestError as error:
             await context.abort(grpc.StatusCode.INVALID_ARGUMENT, str(error))
-        except TooSlowError as error:
+        except (TooSlowError, FloodError) as error:
             await context.abort(grpc.StatusCode.RESOURCE_EXHAUSTED, str(error))
         except _ClosingError:
             await context.abort(grpc.StatusCode.UNAVAILABLE, "the bridge ends")

@@ -4,15 +4,26 @@ import os
 import pty
 import subprocess
 import sys
+import termios
 import threading
 
 from support.remote import PATIENCE_S
 
 
 class Terminal:
-    """The command on a pseudo-terminal."""
+    """The command on a pseudo-terminal.
+
+    Args:
+        address: Of the bridge.
+
+    Attributes:
+        answers: Whether it tells that it is there when it is asked (DSR 5), as real ones do.
+        asked: How often it was asked.
+    """
 
     def __init__(self, address: str) -> None:
+        self.answers = True
+        self.asked = 0
         self._number, inner = pty.openpty()
         command = [sys.executable, "-m", "robosc_bridge.command", "teleop", "--address", address]
         self.process = subprocess.Popen(command, stdin=inner, stdout=inner, stderr=inner)
@@ -24,9 +35,14 @@ class Terminal:
     def _read(self) -> None:
         while True:
             try:
-                self._seen += os.read(self._number, 4096)
+                text = os.read(self._number, 4096)
+                if b"\x1b[5n" in text:
+                    self.asked += 1
+                    if self.answers:
+                        os.write(self._number, b"\x1b[0n")
             except OSError:
                 return
+            self._seen += text
 
     @property
     def seen(self) -> str:
@@ -34,6 +50,11 @@ class Terminal:
 
     def type(self, keys: str) -> None:
         os.write(self._number, keys.encode())
+
+    @property
+    def is_raw(self) -> bool:
+        """Whether keys are given one by one and not shown."""
+        return not termios.tcgetattr(self._number)[3] & (termios.ICANON | termios.ECHO)
 
     def close(self) -> None:
         self.process.kill()

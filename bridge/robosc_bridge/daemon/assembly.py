@@ -19,7 +19,7 @@ from robosc_bridge.configuration.channels import GrpcChannel
 from robosc_bridge.configuration.structure import Configuration, Scanner
 from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.device_thread import DeviceThread
-from robosc_bridge.daemon.faces import Face, is_remote
+from robosc_bridge.daemon.faces import Face, Living, is_remote
 from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.files import file_problems
 from robosc_bridge.daemon.jobs import Job
@@ -173,6 +173,7 @@ class Machine:
         scanner: The LiDAR's; None: there is none.
         camera: The camera's; None: nothing is tied to what it shows.
         operations: The daemon as remote faces see it.
+        living: What must not end by itself.
     """
 
     daemon: Daemon
@@ -180,6 +181,7 @@ class Machine:
     scanner: DeviceThread | None
     camera: DeviceThread | None
     operations: Operations
+    living: Living
 
     def run(self, faces: Sequence[Face] = ()) -> bool:
         """Start the remote faces and the threads, run the loop to its end, and stop them.
@@ -197,6 +199,7 @@ class Machine:
             for face in faces:
                 stack.callback(face.stop)
                 face.start()
+                self.living.watch(face)
             for thread in threads:
                 thread.start()
             try:
@@ -296,8 +299,9 @@ def assemble(
     if job.needs_camera:
         camera = DeviceThread(camera_worker(configuration.skills.line, daemon.post, clock.monotonic), clock.monotonic)
     threads = [thread for thread in (drive, scanner, camera) if thread]
-    daemon.connect(drive.hurry, worker.reset, lambda: all(thread.is_alive for thread in threads))
+    living = Living(threads)
+    daemon.connect(drive.hurry, worker.reset, living.are_alive)
     operations = Operations(
         supervisor.model, ties, feed, daemon.post, lambda: safety.operator_seen(clock.monotonic()), is_layer=is_layer
     )
-    return Machine(daemon, drive, scanner, camera, operations)
+    return Machine(daemon, drive, scanner, camera, operations, living)

@@ -1,17 +1,30 @@
 """How the daemon is reached from elsewhere: its remote faces, as the program starts and stops them."""
 
+import logging
+from collections.abc import Sequence
 from typing import Protocol
 
 from robosc_bridge.configuration.structure import Configuration
+from robosc_bridge.daemon.device_thread import DeviceThread
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.devices.interface import Velocity
 from robosc_bridge.ground import GroundLink, ground_settings
 from robosc_bridge.remote import RemoteFace, settings_of
 from robosc_bridge.safety import SafetyLimits
 
+_log = logging.getLogger(__name__)
+
 
 class Face(Protocol):
     """Serves operators or ground stations, in threads of its own."""
+
+    @property
+    def name(self) -> str:
+        """For the log."""
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether it serves: from `start` until `stop`, unless it has failed."""
 
     def start(self) -> None:
         """Begin to serve; nothing moves yet.
@@ -22,6 +35,32 @@ class Face(Protocol):
 
     def stop(self) -> None:
         """End what is under way and every thread within some seconds; never raises, may be called again."""
+
+
+class Living:
+    """What must not end by itself while the robot runs.
+
+    Args:
+        threads: Of devices; what becomes of them is the drivers' to tell.
+    """
+
+    def __init__(self, threads: Sequence[DeviceThread]) -> None:
+        self._threads = tuple(threads)
+        self._faces: tuple[Face, ...] = ()
+        self._told: set[str] = set()
+
+    def watch(self, face: Face) -> None:
+        """From now on this one, too: who cannot be reached cannot be told to stop."""
+        self._faces = (*self._faces, face)
+
+    def are_alive(self) -> bool:
+        """Whether none has ended; tells once of each face that has."""
+        ended = [face.name for face in self._faces if not face.is_alive]
+        for name in ended:
+            if name not in self._told:
+                self._told.add(name)
+                _log.critical("the %s has ended by itself: the robot stops, and the bridge must be started anew", name)
+        return not ended and all(thread.is_alive for thread in self._threads)
 
 
 def is_remote(configuration: Configuration) -> bool:

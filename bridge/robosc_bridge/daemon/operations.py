@@ -1,6 +1,6 @@
 """What a remote face may do with the daemon, from any thread, without waiting for it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from typing import Protocol
 
@@ -9,6 +9,9 @@ from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.programs import FromProgram
 from robosc_bridge.daemon.states import Command, Order
+
+UNDONE_BY: Mapping[Command, Command] = {Command.START: Command.STANDBY, Command.RESUME: Command.STOP}
+"""What lets the robot move, and what takes it back: what a person was told has failed does not happen later."""
 
 
 class Inbox(Protocol):

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
 
-from robosc_bridge.daemon.operations import Operations
+from robosc_bridge.daemon.operations import UNDONE_BY, Operations
 from robosc_bridge.daemon.states import Command as Wish
 from robosc_bridge.ground.commands import Change, Checks, Interval, Meaning, Once, Parameters, Refusal, Stop
 from robosc_bridge.ground.notices import standing
@@ -32,7 +32,6 @@ _MOST_PENDING = 8
 _MOST_REMEMBERED = 32
 # What was ordered is on its way into the next snapshot.
 _SHOWN_S = 1.0
-_UNDONE_BY = {Wish.START: Wish.STANDBY, Wish.RESUME: Wish.STOP}
 
 type Say = Callable[[Severity, str], None]
 type _Key = tuple[tuple[int, int], int, bytes]
@@ -214,7 +213,7 @@ class Asking:
         return Result.TEMPORARILY_REJECTED
 
     def _unanswered(self, pending: _Pending) -> Result:
-        undone_by = _UNDONE_BY.get(pending.wish)
+        undone_by = UNDONE_BY.get(pending.wish)
         if undone_by is not None:
             # What a person was told has failed does not happen later.
             self._operations.order(undone_by, _name(pending.asked.sender))

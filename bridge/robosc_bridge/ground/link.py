@@ -65,6 +65,16 @@ class GroundLink:
         with self._guard:
             return self._line.port if isinstance(self._line, NetworkLine) else None
 
+    @property
+    def name(self) -> str:
+        """For the log."""
+        return self._thread.name
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether it serves, be the station there or not."""
+        return self._thread.is_alive()
+
     def start(self) -> None:
         """Begin; whether the station is there is nobody's concern."""
         self._thread.start()

@@ -108,6 +108,16 @@ class RemoteFace:
         self._end = asyncio.Event()
         self._thread = threading.Thread(target=self._run, name="remote face", daemon=True)
 
+    @property
+    def name(self) -> str:
+        """For the log."""
+        return self._thread.name
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether it serves."""
+        return self._thread.is_alive() and self._failure is None
+
     def start(self) -> None:
         """Listen.
 

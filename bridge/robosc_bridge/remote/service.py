@@ -15,8 +15,9 @@ import grpc.aio
 from robosc_api.malformed import MalformedError
 from robosc_api.security import CALLER, Rule, Scope
 from robosc_bridge.daemon import states
-from robosc_bridge.daemon.operations import Operations
+from robosc_bridge.daemon.operations import UNDONE_BY, Operations
 from robosc_bridge.remote import convert
+from robosc_bridge.remote.pace import FloodError
 from robosc_bridge.remote.session import Session, TooSlowError
 from robosc_bridge.remote.watchers import Watchers
 
@@ -119,7 +120,7 @@ class BridgeService(convert.BridgeServiceServicer):
         raise AssertionError("unreachable: a failed call is aborted")
 
     async def _order(self, command: states.Command, by: str) -> str:
-        """Why it cannot be; empty: it is done.
+        """Why it cannot be; empty: it is done. Without an answer, or with nobody to hear it, it is taken back.
 
         Raises:
             TimeoutError: The loop does not answer.
@@ -139,12 +140,21 @@ class BridgeService(convert.BridgeServiceServicer):
         try:
             async with asyncio.timeout(COMMAND_LIMIT_S):
                 await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
+        except (TimeoutError, asyncio.CancelledError):
+            self._take_back(command, by)
+            raise
         finally:
             for wait in waits:
                 wait.cancel()
         if not future.done():
             raise _ClosingError
         return future.result()
+
+    def _take_back(self, command: states.Command, by: str) -> None:
+        undone_by = UNDONE_BY.get(command)
+        if undone_by is not None:
+            self._operations.order(undone_by, by)
+            _log.warning("%s was not answered, or has left: %s is followed by %s", by, command, undone_by)
 
     async def Watch(  # noqa: N802
         self, request: convert.WatchRequest, context: Context
@@ -232,7 +242,7 @@ class BridgeService(convert.BridgeServiceServicer):
             yield
         except convert.RequestError as error:
             await context.abort(grpc.StatusCode.INVALID_ARGUMENT, str(error))
-        except TooSlowError as error:
+        except (TooSlowError, FloodError) as error:
             await context.abort(grpc.StatusCode.RESOURCE_EXHAUSTED, str(error))
         except _ClosingError:
             await context.abort(grpc.StatusCode.UNAVAILABLE, "the bridge ends")

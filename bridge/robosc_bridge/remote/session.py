@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.programs import Attached, Detached, Program, ToProgram
 from robosc_bridge.remote import convert
+from robosc_bridge.remote.pace import OperatorPace
 
 _log = logging.getLogger(__name__)
 
@@ -45,6 +46,7 @@ class Session:
         self._operator_timeout_s = operator_timeout_s
         self._is_operator = hello.is_operator
         self._loop = asyncio.get_running_loop()
+        self._pace = OperatorPace(self._loop.time)
         self._news = asyncio.Event()
         self._overflow = asyncio.Event()
         self._waiting: deque[ToProgram | str] = deque()
@@ -62,13 +64,15 @@ class Session:
 
         Raises:
             TooSlowError: It does not read what it is told.
+            FloodError: It is an operator, and sends far more than it can mean.
         """
         self._operations.tell(Attached(self._program))
         _log.info("%s is attached", self._program.name)
         work = (self._read(requests), self._write(write), self._fall_behind())
         tasks = [asyncio.ensure_future(item) for item in work]
         try:
-            self._see()
+            if self._is_operator:
+                self._operations.operator_seen()
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             for task in done:
                 task.result()
@@ -81,14 +85,11 @@ class Session:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
 
-    def _see(self) -> None:
-        if self._is_operator:
-            self._operations.operator_seen()
-
     async def _read(self, requests: AsyncIterator[convert.AttachRequest]) -> None:
         async for request in requests:
-            # Before it waits for its turn: the operator is there in any case.
-            self._see()
+            # Before it waits for its turn: an operator that has just sent something is there in any case.
+            if self._is_operator and self._pace.came():
+                self._operations.operator_seen()
             await self._turn()
             try:
                 item = convert.told(request, self._program)

@@ -1,16 +1,23 @@
-"""Driving by keys through a supervision layer."""
+"""Driving by keys through a supervision layer.
+
+Nobody at the keys, no motion: a wish lapses soon after the last key, as a held key is repeated by its terminal. Signs
+of life are sent while keys come or the terminal answers (ECMA-48, 8.3.35: DSR 5 is answered by CSI 0 n): a program
+whose terminal was cut off would else go on for its operator.
+"""
 
 import os
 import select
+import signal
 import sys
 import termios
 import threading
 import time
 import tty
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from typing import Any
 
-from robosc_bridge.terminal.client import BridgeClient, RefusedError, UnreachableError, Wish
+from robosc_bridge.terminal.client import BridgeClient, DriveTopic, Operator, RefusedError, UnreachableError, Wish
 from robosc_bridge.terminal.shown import printable
 
 PERIOD_S = 0.1
@@ -19,16 +26,33 @@ PERIOD_S = 0.1
 KEEP_ALIVE_S = 0.5
 """Time between signs of life while it is not."""
 
+LAPSE_S = 0.6
+"""A wish holds for so long after a key: longer than terminals wait before they repeat a held key, commonly 0.5 s."""
+
+PRESENT_S = 1.5
+"""After so long without a byte of the terminal nobody is there."""
+
 LINEAR_M_S, ANGULAR_RAD_S = 0.22, 2.0
 """Fastest wish; what the robot may do is for the bridge's own limits."""
 
 STEP_M_S, STEP_RAD_S = 0.02, 0.2
 
-HELP = "w/s or up/down: faster, slower   a/d or left/right: turn   x: halt   space: STOP   r: resume   q: end"
+HELP = (
+    "w/s or up/down: faster, slower   a/d or left/right: turn   hold k: go on like this   x: halt   space: STOP   "
+    "r: resume   q: end"
+)
 
 _ARROWS = {"\x1b[A": "w", "\x1b[B": "s", "\x1b[C": "d", "\x1b[D": "a"}
+PRESENT = "present"
+"""In place of a key: the terminal has answered."""
+
+_ASK = "\x1b[5n"
+_CODES = {**_ARROWS, "\x1b[0n": PRESENT}
+_DRIVING = frozenset("wasdk")
 _ZEROS = 3
 _BLOCKED_S = 1.0
+_ANSWER_S = 0.1
+_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
 
 
 class Wished:
@@ -42,14 +66,23 @@ class Wished:
     def __init__(self) -> None:
         self.linear_m_s = 0.0
         self.angular_rad_s = 0.0
+        self._lapse_s = 0.0
 
     @property
     def is_motion(self) -> bool:
         """Whether the robot is to move."""
         return bool(self.linear_m_s or self.angular_rad_s)
 
-    def press(self, key: str) -> None:
+    def lapse(self, now_s: float) -> None:
+        """Without a key for too long nothing is wished."""
+        if now_s >= self._lapse_s:
+            self.linear_m_s = self.angular_rad_s = 0.0
+
+    def press(self, key: str, now_s: float) -> None:
         """Heed a key; any but those of the help changes nothing."""
+        self.lapse(now_s)
+        if key in _DRIVING:
+            self._lapse_s = now_s + LAPSE_S
         match key:
             case "w" | "s":
                 step = STEP_M_S if key == "w" else -STEP_M_S
@@ -67,12 +100,12 @@ def _stepped(value: float, step: float, most: float) -> float:
 
 
 def keys_of(text: str) -> list[str]:
-    """The keys in what a terminal sent; arrows as the letters that mean the same."""
+    """The keys in what a terminal sent; arrows as the letters that mean the same, its own answer as `PRESENT`."""
     found = []
     while text:
-        arrow = next((code for code in _ARROWS if text.startswith(code)), None)
-        found.append(_ARROWS[arrow] if arrow else text[0])
-        text = text[len(arrow or " ") :]
+        code = next((code for code in _CODES if text.startswith(code)), None)
+        found.append(_CODES[code] if code else text[0])
+        text = text[len(code or " ") :]
     return found
 
 
@@ -88,46 +121,102 @@ def teleop(client: BridgeClient) -> int:
     topic = client.drive_topic()
     teller = _Teller()
     operator = client.operate(f"teleop of {os.environ.get('USER', 'somebody')}"[:100], teller.told)
-    wished, zeros_left, next_s, is_on = Wished(), 0, time.monotonic(), True
     with _raw_keys() as number:
-        sys.stdout.write(f"{HELP}\r\n")
         try:
-            while is_on:
-                for key in _read(number, max(next_s - time.monotonic(), 0.0)):
-                    is_on = is_on and key not in ("q", "\x03", "\x04")
-                    wished.press(key)
-                    # What is wished goes out with the key, not with the next period.
-                    next_s, zeros_left = time.monotonic(), _ZEROS
-                    _obey(client, key, teller)
-                if not is_on:
-                    break
-                if time.monotonic() >= next_s:
-                    if wished.is_motion or zeros_left:
-                        zeros_left = _ZEROS if wished.is_motion else zeros_left - 1
-                        operator.drive(topic, wished.linear_m_s, wished.angular_rad_s)
-                        next_s = time.monotonic() + PERIOD_S
-                    else:
-                        operator.keep_alive()
-                        next_s = time.monotonic() + KEEP_ALIVE_S
-                    teller.show(wished)
-            operator.drive(topic, 0.0, 0.0)
+            sys.stdout.write(f"{HELP}\r\n")
+            _drive(number, client, operator, topic, teller)
         finally:
+            # However it ends, also by a signal: nothing is wished any more.
+            with suppress(RefusedError, UnreachableError):
+                operator.drive(topic, 0.0, 0.0)
             operator.close()
-            sys.stdout.write("\r\n")
+            # What the terminal has still to answer is not for the shell.
+            _read(number, _ANSWER_S)
+            with suppress(OSError):
+                sys.stdout.write("\r\n")
     return 0
 
 
-def _obey(client: BridgeClient, key: str, teller: "_Teller") -> None:
+def _drive(number: int, client: BridgeClient, operator: Operator, topic: DriveTopic, teller: "_Teller") -> None:
+    """Until a key or the end of the input ends it; raises as `teleop`."""
+    wished, zeros_left, next_s, ask_s = Wished(), 0, time.monotonic(), 0.0
+    heard_s, resuming = next_s, _Resuming(client, teller)
+    while True:
+        keys = _read(number, max(next_s - time.monotonic(), 0.0))
+        now_s = time.monotonic()
+        if keys:
+            heard_s = now_s
+        for key in keys:
+            if key in ("q", "\x03", "\x04"):
+                return
+            if key == PRESENT:
+                continue
+            wished.press(key, now_s)
+            # What is wished goes out with the key, not with the next period.
+            next_s, zeros_left = now_s, _ZEROS
+            _obey(client, key, teller, resuming)
+        resuming.look()
+        now_s = time.monotonic()
+        if now_s < next_s:
+            continue
+        wished.lapse(now_s)
+        if wished.is_motion or zeros_left:
+            zeros_left = _ZEROS if wished.is_motion else zeros_left - 1
+            operator.drive(topic, wished.linear_m_s, wished.angular_rad_s)
+            next_s = now_s + PERIOD_S
+        else:
+            if now_s - heard_s < PRESENT_S:
+                operator.keep_alive()
+            next_s = now_s + KEEP_ALIVE_S
+        teller.show(wished, asks=now_s >= ask_s)
+        if now_s >= ask_s:
+            ask_s = now_s + KEEP_ALIVE_S
+
+
+def _obey(client: BridgeClient, key: str, teller: "_Teller", resuming: "_Resuming") -> None:
     """Keys that are for the bridge itself."""
-    try:
-        if key == " ":
+    if key == " ":
+        try:
             client.stop()
             teller.note = "stopped: r lets it go on"
-        elif key == "r":
-            client.want(Wish.RESUME)
-            teller.note = ""
-    except RefusedError as error:
-        teller.note = str(error)
+        except RefusedError as error:
+            teller.note = str(error)
+    elif key == "r":
+        resuming.begin()
+
+
+class _Resuming:
+    """Lets the robot go on, in a thread: until the bridge has answered, a stop must be typed as ever."""
+
+    def __init__(self, client: BridgeClient, teller: "_Teller") -> None:
+        self._client = client
+        self._teller = teller
+        self._thread: threading.Thread | None = None
+        self._failure: UnreachableError | None = None
+
+    def begin(self) -> None:
+        """Ask for it; once more while it is asked for changes nothing."""
+        if self._thread is None or not self._thread.is_alive():
+            self._thread = threading.Thread(target=self._ask, name="resume", daemon=True)
+            self._thread.start()
+
+    def look(self) -> None:
+        """Whether the bridge could be asked.
+
+        Raises:
+            UnreachableError: It could not.
+        """
+        if self._failure is not None:
+            raise self._failure
+
+    def _ask(self) -> None:
+        try:
+            self._client.want(Wish.RESUME)
+            self._teller.note = ""
+        except RefusedError as error:
+            self._teller.note = str(error)
+        except UnreachableError as error:
+            self._failure = error
 
 
 class _Teller:
@@ -150,26 +239,37 @@ class _Teller:
             else:
                 self.note = text
 
-    def show(self, wished: Wished) -> None:
-        """Write it again."""
+    def show(self, wished: Wished, *, asks: bool) -> None:
+        """Write it again, and ask the terminal whether it is there."""
         with self._lock:
             name, time_s = self._blocked
         blocked = f"   BLOCKED {name}" if name and time.monotonic() - time_s < _BLOCKED_S else ""
         text = f"{wished.linear_m_s:+.2f} m/s {wished.angular_rad_s:+.1f} rad/s{blocked}   {self.note}"
-        sys.stdout.write(f"\r\x1b[K{printable(text)}")
+        sys.stdout.write(f"\r\x1b[K{printable(text)}{_ASK if asks else ''}")
         sys.stdout.flush()
 
 
 @contextmanager
 def _raw_keys() -> Iterator[int]:
-    """The terminal's input, key by key, as long as it lasts; the number of its file."""
+    """The terminal's input, key by key, as long as it lasts; the number of its file. Signals end it in order."""
     number = sys.stdin.fileno()
     before = termios.tcgetattr(number)
-    tty.setraw(number)
+    handlers = {which: signal.signal(which, _leave) for which in _SIGNALS}
     try:
+        tty.setraw(number)
         yield number
     finally:
-        termios.tcsetattr(number, termios.TCSADRAIN, before)
+        # Not drained first: a terminal that was cut off takes no more.
+        with suppress(termios.error):
+            termios.tcsetattr(number, termios.TCSANOW, before)
+        for which, handler in handlers.items():
+            signal.signal(which, handler)
+
+
+def _leave(number: int, frame: Any) -> None:
+    for which in _SIGNALS:
+        signal.signal(which, signal.SIG_IGN)
+    sys.exit(128 + number)
 
 
 def _read(number: int, limit_s: float) -> list[str]:

@@ -1,6 +1,7 @@
 """What is refused before anything is opened, and how the parts start and stop together."""
 
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -138,6 +139,9 @@ def test_a_rover_is_driven_within_its_own_limits() -> None:
 class RecordedFace:
     """A remote face that notes when it is started and stopped."""
 
+    name = "recorded face"
+    is_alive = True
+
     def __init__(self, made: Machine, problem: str = "") -> None:
         self.made = made
         self.problem = problem
@@ -166,6 +170,34 @@ def test_faces_are_started_before_the_devices_and_stopped_after_them(supervisor:
     # While it runs, a busy face must not hold up the other threads; afterwards that is nobody's business.
     assert face.switch_s < 0.001 < before_s == sys.getswitchinterval()
     assert face.told == ["start False", f"stop False {State.OVER}"]
+
+
+class MortalFace(RecordedFace):
+    """One that ends by itself as soon as the robot runs."""
+
+    @property
+    def is_alive(self) -> bool:  # type: ignore[override]
+        return self.made.daemon.state is not State.RUNNING
+
+    def start(self) -> None:
+        self.told.append("start")
+
+
+def test_the_robot_stops_when_a_face_ends_by_itself(supervisor: Supervisor, caplog: pytest.LogCaptureFixture) -> None:
+    with SimulatedTurtleBot3("burger", "opencr", "lds01") as robot:
+        text = CONFIGURATION.replace("/dev/base", str(robot.base_path)).replace("/dev/scanner", str(robot.scanner_path))
+        made = machine(supervisor, text)
+        face = MortalFace(made)
+        end = threading.Timer(60.0, made.quit)
+        end.start()
+        try:
+            made.run([face])
+        finally:
+            end.cancel()
+            end.join()
+    assert "has ended" in made.daemon.problem
+    assert caplog.text.count("the recorded face has ended by itself: the robot stops") == 1
+    assert face.told == ["start", f"stop False {State.OVER}"]
 
 
 def test_a_face_that_cannot_start_opens_no_device_and_stops_the_others(supervisor: Supervisor, tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from robosc_bridge.daemon import programs
 from robosc_bridge.remote import RemoteFace, RemoteSettings, service, session
 from robosc_bridge.remote import face as face_module
 from robosc_bridge.remote.data import MAXIMUM_DEPTH, value_of
+from robosc_bridge.remote.pace import FLOOD_S, MESSAGES_A_S, FloodError, OperatorPace
 from support.remote import PATIENCE_S, Attachment, FakeDaemon, connected, eventually, served
 
 
@@ -210,6 +212,32 @@ class TestOperator:
         assert eventually(lambda: daemon.of(programs.Requested))
         program.end()
 
+    def test_one_that_sends_as_fast_as_it_can_is_ended(self, daemon: FakeDaemon, stub: Any) -> None:
+        program = attached(stub, is_operator=True)
+        end = threading.Event()
+
+        def flood() -> None:
+            while not end.is_set():
+                program.send(keep_alive=pb.KeepAlive())
+                end.wait(0.001)
+
+        def turn() -> Any:
+            daemon.show()
+            return daemon.of(programs.Detached)
+
+        sender = threading.Thread(target=flood)
+        sender.start()
+        try:
+            eventually(turn)
+            code, details = program.failure()
+        finally:
+            end.set()
+            sender.join()
+            program.end()
+        assert code is grpc.StatusCode.RESOURCE_EXHAUSTED
+        assert details == "an operator sends at most 200 messages a second, and these are more"
+        assert daemon.seen <= 2 + MESSAGES_A_S
+
     def test_other_programs_give_none(self, daemon: FakeDaemon, stub: Any) -> None:
         program = attached(stub)
         program.send(keep_alive=pb.KeepAlive())
@@ -217,6 +245,35 @@ class TestOperator:
         eventually(lambda: daemon.of(programs.Told))
         assert daemon.seen == 0
         program.end()
+
+
+class TestPace:
+    def test_what_waited_in_buffers_is_no_sign_of_life(self) -> None:
+        now_s = 100.0
+        pace = OperatorPace(lambda: now_s)
+        assert sum(pace.came() for _ in range(1000)) == MESSAGES_A_S
+        now_s += 1.0
+        # The rest of what waited, at whatever speed it is read.
+        assert not any(pace.came() for _ in range(50))
+        now_s += 1.0
+        assert pace.came()
+
+    def test_a_busy_operator_is_seen_with_each_message(self) -> None:
+        now_s = 100.0
+        pace = OperatorPace(lambda: now_s)
+        for _ in range(1000):
+            assert pace.came()
+            now_s += 0.01
+
+    def test_a_flood_ends_it(self) -> None:
+        now_s = 100.0
+        pace = OperatorPace(lambda: now_s)
+        for _ in range(FLOOD_S):
+            for _ in range(MESSAGES_A_S + 1):
+                pace.came()
+            now_s += 1.0
+        with pytest.raises(FloodError):
+            pace.came()
 
 
 def nested(levels: int) -> Any:

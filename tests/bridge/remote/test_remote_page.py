@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from robosc_api.v1 import bridge_pb2
-from robosc_bridge.remote import data, face, prompt, service, session, watchers
+from robosc_bridge.remote import data, face, pace, prompt, service, session, watchers
 from robosc_bridge.remote.convert import MAXIMUM_TEXT
 from robosc_bridge.terminal import teleop
 from robosc_bridge.terminal.commands import ADDRESS, NAMES
@@ -23,7 +23,8 @@ def test_the_limits() -> None:
     waiting = f"wait for a program | {session.MAXIMUM_WAITING} |"
     turn = f"next snapshot | {session.MESSAGES_A_TURN} |"
     silence = f"| {face.PING_S + face.PING_LIMIT_S:g} s with a ping"
-    limits = (streams, connections, calls, message, values, events, waiting, turn, silence)
+    operator = f"in a second | {pace.MESSAGES_A_S} | no sign of life; after {pace.FLOOD_S} such"
+    limits = (operator, streams, connections, calls, message, values, events, waiting, turn, silence)
     for text in (*limits, f"| {MAXIMUM_TEXT} characters"):
         assert text in PAGE, text
 
@@ -36,8 +37,10 @@ def test_the_calls() -> None:
 def test_the_commands() -> None:
     assert all(name in PAGE for name in NAMES)
     assert ADDRESS in PAGE
-    assert f"{teleop.STEP_M_S:g} m/s" in PAGE
-    assert f"{teleop.STEP_RAD_S:g} rad/s" in PAGE
+    words = " ".join(PAGE.split())
+    assert f"{teleop.STEP_M_S:g} m/s" in words
+    assert f"{teleop.STEP_RAD_S:g} rad/s" in words
+    assert f"lapses {teleop.LAPSE_S:g} s after" in words
 
 
 def test_the_page_is_listed() -> None:

@@ -164,6 +164,28 @@ class TestCommands:
         eventually(lambda: command(stub, pb.COMMAND_KIND_RESET) == "")
         daemon.orders[0].answer("")
 
+    @pytest.mark.parametrize(
+        ("name", "undone_by"),
+        [("START", [Command.STANDBY]), ("RESUME", [Command.STOP]), ("RESET", []), ("STANDBY", [])],
+    )
+    def test_what_has_failed_for_its_caller_does_not_happen_later(
+        self, name: str, undone_by: list[Command], daemon: FakeDaemon, stub: Any
+    ) -> None:
+        daemon.refusal = None
+        kind: Any = pb.CommandKind.Value(f"COMMAND_KIND_{name}")
+        call = stub.Command.future(pb.CommandRequest(command=kind))
+        eventually(lambda: daemon.orders)
+        call.cancel()
+        eventually(lambda: daemon.commands() == [Command[name], *undone_by])
+        daemon.refusal = ""
+        assert command(stub, pb.COMMAND_KIND_RESET) == ""
+        assert daemon.commands() == [Command[name], *undone_by, Command.RESET]
+
+    def test_a_callers_own_deadline_takes_it_back_too(self, daemon: FakeDaemon, stub: Any) -> None:
+        daemon.refusal = None
+        assert failure(lambda: command(stub, pb.COMMAND_KIND_START, 0.5))[0] is grpc.StatusCode.DEADLINE_EXCEEDED
+        eventually(lambda: daemon.commands() == [Command.START, Command.STANDBY])
+
     def test_a_loop_that_does_not_answer_is_told(
         self, daemon: FakeDaemon, stub: Any, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -172,6 +194,7 @@ class TestCommands:
         code, details = failure(lambda: command(stub, pb.COMMAND_KIND_START))
         assert code is grpc.StatusCode.DEADLINE_EXCEEDED
         assert "has not answered" in details
+        eventually(lambda: daemon.commands() == [Command.START, Command.STANDBY])
 
     def test_commands_that_wait_are_bounded_and_a_stop_is_not(self, daemon: FakeDaemon, stub: Any) -> None:
         daemon.refusal = None
@@ -437,6 +460,18 @@ class TestFace:
         again = serve(daemon.operations, RemoteSettings(face.address))
         assert again.address == face.address
         again.stop()
+
+    def test_its_death_is_seen(self, daemon: FakeDaemon) -> None:
+        face = RemoteFace(daemon.operations, RemoteSettings("127.0.0.1:0"))
+        assert not face.is_alive
+        face.start()
+        try:
+            assert face.is_alive
+            assert face._loop is not None
+            face._loop.call_soon_threadsafe(face._loop.stop)
+            eventually(lambda: not face.is_alive)
+        finally:
+            face.stop()
 
     def test_the_configuration_says_where_and_how(self) -> None:
         text = """

@@ -226,6 +226,12 @@ def test_an_address_that_cannot_be_used_is_one_line(robot: SimulatedTurtleBot3, 
         bridge.end()
 
 
+def held(terminal: Terminal) -> bool:
+    """A key that is held comes again and again."""
+    terminal.type("w")
+    return True
+
+
 def test_a_robot_is_driven_by_keys_as_far_as_the_layer_lets_it(tmp_path: Path) -> None:
     with preferred(), SimulatedTurtleBot3("burger", "opencr", "lds01") as robot:
         configuration = configured(tmp_path, robot, CART, "/gate/open", "/gate/shut", operator="2.0")
@@ -244,11 +250,14 @@ def test_a_robot_is_driven_by_keys_as_far_as_the_layer_lets_it(tmp_path: Path) -
                     eventually(lambda: "BLOCKED /cmd_vel" in terminal.seen)
                     assert speeds(robot) == (0.0, 0.0)
                     gate.send(give=pb.Message(identifier="/gate/open"))
-                    becomes(lambda: moves(robot) and min(speeds(robot)) > 1.0)
+                    becomes(lambda: held(terminal) and moves(robot) and min(speeds(robot)) > 1.0)
                     gate.send(give=pb.Message(identifier="/gate/shut"))
-                    becomes(lambda: not moves(robot))
+                    becomes(lambda: held(terminal) and not moves(robot))
                     gate.send(give=pb.Message(identifier="/gate/open"))
-                    becomes(lambda: moves(robot) and min(speeds(robot)) > 1.0)
+                    becomes(lambda: held(terminal) and moves(robot) and min(speeds(robot)) > 1.0)
+                    # Nobody holds a key.
+                    becomes(lambda: not moves(robot))
+                    becomes(lambda: held(terminal) and moves(robot) and min(speeds(robot)) > 1.0)
                     # Nobody says goodbye.
                     terminal.process.kill()
                     becomes(lambda: not moves(robot))

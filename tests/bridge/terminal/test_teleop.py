@@ -1,5 +1,6 @@
 """Driving by keys: the command as a program on a real pseudo-terminal."""
 
+import signal
 import subprocess
 import sys
 import time
@@ -11,7 +12,7 @@ import pytest
 
 from robosc_bridge.daemon import programs
 from robosc_bridge.daemon.states import Command
-from robosc_bridge.terminal.teleop import ANGULAR_RAD_S, LINEAR_M_S, Wished, keys_of
+from robosc_bridge.terminal.teleop import ANGULAR_RAD_S, LAPSE_S, LINEAR_M_S, PRESENT, Wished, keys_of
 from support.remote import PATIENCE_S, FakeDaemon, eventually, served
 from support.terminals import Terminal
 
@@ -20,19 +21,19 @@ class TestKeys:
     def test_steps_add_up_and_end_at_exactly_zero(self) -> None:
         wished = Wished()
         for _ in range(3):
-            wished.press("w")
+            wished.press("w", 0.0)
         assert wished.linear_m_s == 0.06
         for _ in range(3):
-            wished.press("s")
+            wished.press("s", 0.0)
         assert wished.linear_m_s == 0.0
         assert not wished.is_motion
 
     def test_left_is_counter_clockwise(self) -> None:
         wished = Wished()
-        wished.press("a")
+        wished.press("a", 0.0)
         assert wished.angular_rad_s == 0.2
-        wished.press("d")
-        wished.press("d")
+        wished.press("d", 0.0)
+        wished.press("d", 0.0)
         assert wished.angular_rad_s == -0.2
 
     @pytest.mark.parametrize(
@@ -42,23 +43,45 @@ class TestKeys:
     def test_wishes_are_bounded(self, key: str, linear_m_s: float, angular_rad_s: float) -> None:
         wished = Wished()
         for _ in range(100):
-            wished.press(key)
+            wished.press(key, 0.0)
         assert (wished.linear_m_s, wished.angular_rad_s) == (linear_m_s, angular_rad_s)
 
     @pytest.mark.parametrize("key", ["x", " "])
     def test_halting(self, key: str) -> None:
         wished = Wished()
-        wished.press("w")
-        wished.press("a")
-        wished.press(key)
+        wished.press("w", 0.0)
+        wished.press("a", 0.0)
+        wished.press(key, 0.0)
         assert not wished.is_motion
 
     def test_other_keys_change_nothing(self) -> None:
         wished = Wished()
-        wished.press("w")
+        wished.press("w", 0.0)
         for key in "qrWé\x1b[":
-            wished.press(key)
+            wished.press(key, 0.0)
         assert wished.linear_m_s == 0.02
+
+    def test_a_wish_lapses_after_the_last_key_that_asks_for_motion(self) -> None:
+        wished = Wished()
+        wished.press("w", 10.0)
+        wished.press("k", 10.5)
+        wished.press("?", 11.0)
+        wished.lapse(10.5 + LAPSE_S - 0.01)
+        assert wished.linear_m_s == 0.02
+        wished.lapse(10.5 + LAPSE_S)
+        assert not wished.is_motion
+
+    def test_a_key_after_that_begins_anew(self) -> None:
+        wished = Wished()
+        for _ in range(5):
+            wished.press("w", 10.0)
+        wished.press("k", 11.0)
+        assert not wished.is_motion
+        wished.press("w", 12.0)
+        assert wished.linear_m_s == 0.02
+
+    def test_the_answer_of_the_terminal_is_no_key(self) -> None:
+        assert keys_of("w\x1b[0n\x1b[A") == ["w", PRESENT, "w"]
 
     def test_arrows_are_letters(self) -> None:
         assert keys_of("\x1b[Aa\x1b[B\x1b[C\x1b[Dx\x1b") == ["w", "a", "s", "d", "a", "x", "\x1b"]
@@ -89,14 +112,72 @@ def wishes(daemon: FakeDaemon) -> list[tuple[str, float, float]]:
 def test_keys_drive_and_it_is_said_again_while_wished(daemon: FakeDaemon) -> None:
     with driving(daemon) as terminal:
         assert daemon.program().may_request
-        terminal.type("w")
-        eventually(lambda: ("/cmd_vel", 0.02, 0) in wishes(daemon))
-        terminal.type("\x1b[D")
+        terminal.type("w\x1b[D")
         eventually(lambda: ("/cmd_vel", 0.02, 0.2) in wishes(daemon))
         begin_s, count = time.monotonic(), len(wishes(daemon))
-        eventually(lambda: len(wishes(daemon)) >= count + 5)
-        assert time.monotonic() - begin_s > 0.3
+
+        def go_on() -> bool:
+            terminal.type("k")
+            time.sleep(0.05)
+            return time.monotonic() - begin_s > 2 * LAPSE_S
+
+        eventually(go_on)
+        assert len(wishes(daemon)) >= count + 5
         assert set(wishes(daemon)[count:]) == {("/cmd_vel", 0.02, 0.2)}
+
+
+def test_without_a_key_it_halts_by_itself(daemon: FakeDaemon) -> None:
+    with driving(daemon) as terminal:
+        terminal.type("www")
+        eventually(lambda: ("/cmd_vel", 0.06, 0) in wishes(daemon))
+        begin_s = time.monotonic()
+        eventually(lambda: wishes(daemon)[-1] == ("/cmd_vel", 0, 0))
+        assert time.monotonic() - begin_s < 5 * LAPSE_S
+        # The operator is there, and wishes nothing.
+        seen, count = daemon.seen, len(wishes(daemon))
+        eventually(lambda: daemon.seen >= seen + 5)
+        assert len(wishes(daemon)) <= count + 3
+        assert not daemon.of(programs.Detached)
+
+
+def test_without_a_terminal_that_answers_there_is_no_sign_of_life(daemon: FakeDaemon) -> None:
+    with driving(daemon) as terminal:
+        seen = daemon.seen
+        eventually(lambda: daemon.seen > seen)
+        terminal.answers = False
+        asked = terminal.asked
+        eventually(lambda: terminal.asked >= asked + 5)
+        seen, asked = daemon.seen, terminal.asked
+        eventually(lambda: terminal.asked >= asked + 3)
+        assert daemon.seen == seen
+        terminal.type("?")
+        eventually(lambda: daemon.seen > seen)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_it_in_order(number: int, daemon: FakeDaemon) -> None:
+    with driving(daemon) as terminal:
+        assert terminal.is_raw
+        terminal.type("w")
+        eventually(lambda: ("/cmd_vel", 0.02, 0) in wishes(daemon))
+        terminal.process.send_signal(number)
+        assert terminal.process.wait(PATIENCE_S) == 128 + number
+        assert not terminal.is_raw
+        eventually(lambda: daemon.of(programs.Detached))
+        assert wishes(daemon)[-1] == ("/cmd_vel", 0, 0)
+
+
+def test_a_resume_without_an_answer_does_not_keep_a_stop_from_being_typed(daemon: FakeDaemon) -> None:
+    daemon.refusal = None
+    with driving(daemon) as terminal:
+        terminal.type("r")
+        eventually(lambda: daemon.commands() == [Command.RESUME])
+        begin_s = time.monotonic()
+        terminal.type(" ")
+        eventually(lambda: daemon.commands() == [Command.RESUME, Command.STOP])
+        assert time.monotonic() - begin_s < 5.0
+        terminal.type("q")
+        assert terminal.process.wait(PATIENCE_S) == 0
 
 
 def test_q_ends_with_a_stop_of_the_motion(daemon: FakeDaemon) -> None:

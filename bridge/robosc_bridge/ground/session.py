@@ -14,7 +14,7 @@ from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.programs import Refused, ToProgram
 from robosc_bridge.devices.interface import STANDSTILL, Velocity
 from robosc_bridge.ground import requests
-from robosc_bridge.ground.asking import Asked, Asking
+from robosc_bridge.ground.asking import LOOP_HANGS, Asked, Asking
 from robosc_bridge.ground.commands import Change, Meaning, Refusal, Stop, meaning, mode_meaning
 from robosc_bridge.ground.driving import Driving, Unusable, drive_message, from_manual_control, from_position_target
 from robosc_bridge.ground.notices import happened, standing, written
@@ -23,7 +23,7 @@ from robosc_bridge.ground.settings import GroundSettings
 from robosc_bridge.ground.status import is_held
 from robosc_bridge.ground.stream import Stream
 from robosc_bridge.ground.telemetry import Make
-from robosc_bridge.ground.texts import Severity, Texts
+from robosc_bridge.ground.texts import Sender, Severity, Texts
 from robosc_bridge.protocol.mavlink import Codec, Decoder, is_signed
 from robosc_bridge.protocol.mavlink_messages import GROUND_STATIONS, Incoming, Result
 
@@ -205,7 +205,7 @@ class Session:
             if notice is not None:
                 self._texts.say(now_s, *notice)
         if self._stream.is_stale(now_s):
-            holding.append((Severity.CRITICAL, "The bridge's loop does not turn."))
+            holding.append((Severity.CRITICAL, LOOP_HANGS))
         elif self._stream.snapshot is not None:
             holding += standing(self._stream.snapshot)
         self._texts.stand(now_s, holding)
@@ -225,8 +225,8 @@ class Session:
             self._texts.say(self._now_s, Severity.WARNING, "No set-point any more: the robot stands.", again_s=0.0)
             _log.warning("set-points of the ground station have ended while the robot was to move")
 
-    def _answer_in_words(self, severity: Severity, text: str) -> None:
-        self._texts.say(self._now_s, severity, text, again_s=0.0)
+    def _answer_in_words(self, severity: Severity, text: str, asked_by: Sender | None) -> None:
+        self._texts.say(self._now_s, severity, text, again_s=0.0, asked_by=asked_by)
 
     # What the ground station says.
 
@@ -276,7 +276,7 @@ class Session:
     def _command(self, heard: Heard, asked: Asked, wanted: Meaning) -> list[Make]:
         is_refused = isinstance(wanted, Change) and not self._may_change(heard)
         if is_refused or not self._is_trusted(heard):
-            self._texts.say(self._now_s, Severity.WARNING, _NOT_SIGNED)
+            self._texts.say(self._now_s, Severity.WARNING, _NOT_SIGNED, asked_by=heard.sender)
             wanted = Refusal(Result.DENIED)
         return self._asking.take(asked, wanted, self._now_s)
 
@@ -326,4 +326,4 @@ class Session:
             self._driving.take(self._now_s, velocity)
         elif why and (velocity != STANDSTILL or heard.number == Incoming.SET_POSITION_TARGET):
             # A stick at rest asks for nothing.
-            self._texts.say(self._now_s, Severity.WARNING, why)
+            self._texts.say(self._now_s, Severity.WARNING, why, asked_by=heard.sender)

@@ -216,7 +216,7 @@ def test_what_happens_is_told_in_words(talk: Talk) -> None:
     talk.daemon.show(devices={Device.DRIVE: True, Device.SCANNER: True}, reasons=(Reason.COMMAND_SILENT,))
     assert joined_texts(talk.live(0.2)) == ["The scanner is there"]
     talk.daemon.show(state=State.FAULT, problem="a motor is hot", reasons=(Reason.MOTOR_FAULT,))
-    assert joined_texts(talk.live(0.5)) == ["Stopped by a fault", "a motor is hot", "A motor tells of a fault."]
+    assert joined_texts(talk.live(0.5)) == ["a motor is hot", "A motor tells of a fault.", "Stopped by a fault"]
     assert joined_texts(talk.live(19.0)) == []
     assert joined_texts(talk.live(2.0)) == ["a motor is hot", "A motor tells of a fault."]
 
@@ -232,6 +232,21 @@ def test_a_safe_stop_is_told_and_its_end_and_no_ordinary_end(talk: Talk) -> None
     assert joined_texts(talk.live(0.2)) == ["Stopping"]
     talk.daemon.write(kind="fault", what="division by zero")
     assert joined_texts(talk.live(0.2)) == ["Fault: division by zero"]
+
+
+@pytest.mark.parametrize("obeys", [True, False])
+def test_a_fault_is_told_while_somebody_sends_nonsense(obeys: bool) -> None:
+    talk = Talk(settings=GroundSettings("udpin:0.0.0.0:0", FASTEST, obeys_unsigned=obeys))
+    for tick in range(100):
+        talk.daemon.show()
+        if tick == 50:
+            talk.daemon.write(kind="fault", what="it burns")
+            talk.daemon.show(state=State.FAULT, problem="no drive")
+        nonsense = b"".join(talk.station.command(400, tick * 10 + value + 2) for value in range(4))
+        talk.say(nonsense, after_s=0.05)
+        if tick == 60:
+            # Half a second later.
+            assert {"Fault: it burns", "Stopped by a fault", "no drive"} <= set(joined_texts(talk.station.heard))
 
 
 def test_a_station_that_comes_later_is_told_what_holds(talk: Talk) -> None:

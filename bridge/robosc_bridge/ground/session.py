@@ -5,6 +5,7 @@ answered or dropped, and nothing raises.
 """
 
 import logging
+import math
 from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -31,6 +32,9 @@ _log = logging.getLogger(__name__)
 
 STATION_LIMIT_S = 5.0
 """After so long without its heartbeat a ground station is lost."""
+
+IDLE_S = 0.05
+"""After so long without a byte, what has come of a packet does not hide whole ones behind it any more."""
 
 MESSAGES_PER_S, MOST_MESSAGES = 100.0, 200.0
 """Messages that are heeded; beyond that, only those that stop."""
@@ -106,6 +110,8 @@ class Session:
         self._bytes = Bucket(settings.bytes_per_s, settings.bytes_per_s)
         self._heeded = Bucket(MESSAGES_PER_S, MOST_MESSAGES)
         self._station_s: float | None = None
+        # When bytes of a line came last; infinite: they were looked through since.
+        self._fed_s = math.inf
         self._now_s = now_s
         self._subscription = operations.feed.subscribe(lambda: None)
         short = [f"{value.name} is {value.meaning}" for value in self._stream.values if value.name != value.meaning]
@@ -130,7 +136,7 @@ class Session:
         # What is asked is judged by what is so now.
         self._look()
         replies: list[Make] = []
-        for heard in self._decoder.take_datagram(data) if is_datagram else self._decoder.feed(data):
+        for heard in self._decoder.take_datagram(data) if is_datagram else self._fed(data):
             self._count(heard)
             replies += self._take(heard)
         replies += self._asking.look(now_s)
@@ -138,6 +144,16 @@ class Session:
         # The reason of an answer comes before it.
         urgent = (*self._texts.take(now_s), *replies, *self._stream.pulse(now_s))
         return self._encoded(urgent, self._stream.due(now_s))
+
+    def _fed(self, data: bytes) -> list[Heard]:
+        if data:
+            self._fed_s = self._now_s
+            return self._decoder.feed(data)
+        if self._now_s - self._fed_s < IDLE_S:
+            return []
+        # A stop does not wait behind the beginning of a packet that was cut.
+        self._fed_s = math.inf
+        return self._decoder.idle()
 
     def overheard(self, now_s: float, data: bytes) -> bytes:
         """A datagram of somebody else than the station in use, who may stop the robot and nothing more.

@@ -420,6 +420,23 @@ def test_what_others_have_stopped_is_not_accepted_again(talk: Talk) -> None:
     assert talk.daemon.commands == [Command.START, Command.RESUME]
 
 
+def test_a_stop_does_not_wait_behind_a_packet_that_was_cut(talk: Talk) -> None:
+    long = bytes.fromhex("fd ff 00 00 05 ff be 6e 00 00")
+    for cut in (long, long * 3, b"\xfd", talk.station.command(400, 1.0)[:20]):
+        talk.daemon.orders.clear()
+        found = talk.say(cut + talk.station.command(400, 0.0)) + talk.say(after_s=0.02) + talk.say(after_s=0.04)
+        assert [ack.result for ack in of_type("COMMAND_ACK", found)] == [0]
+        assert talk.daemon.commands == [Command.STANDBY]
+
+
+def test_a_packet_that_comes_slowly_comes(talk: Talk) -> None:
+    for byte in talk.station.command(400, 0.0):
+        assert talk.daemon.orders == []
+        talk.say(bytes((byte,)))
+        talk.say(after_s=0.06)
+    assert talk.daemon.commands == [Command.STANDBY]
+
+
 def test_a_flood_of_others_is_bounded(talk: Talk) -> None:
     talk.daemon.answers[Command.START] = "no"
     found = talk.say(b"".join(talk.station.command(410) for _ in range(1000)))

@@ -32,7 +32,7 @@ class FrameDecoder[Frame](ABC):
     Holds fewer bytes than the longest frame and `look_ahead` have, whatever comes in.
 
     Attributes:
-        first_byte: What every header begins with.
+        first_byte: What every header begins with, unless `_begin` says else.
         header_length: Bytes from which the length of a frame is known.
         look_ahead: Bytes behind a frame that `_frame` wants to see.
         counts: What was met so far.
@@ -46,6 +46,10 @@ class FrameDecoder[Frame](ABC):
         self.counts = FrameCounts()
         self._waiting = b""
         self._is_aligned = False
+
+    def _begin(self, data: bytes, at: int) -> int:
+        """Where the next header may begin; -1: nowhere."""
+        return data.find(self.first_byte, at)
 
     @abstractmethod
     def _length(self, data: bytes, at: int) -> int:
@@ -67,7 +71,7 @@ class FrameDecoder[Frame](ABC):
         begin = 0
         end = len(data)
         while begin < end:
-            at = data.find(self.first_byte, begin)
+            at = self._begin(data, begin)
             if at != begin:
                 if self._is_aligned:
                     self._align(False)
@@ -105,7 +109,7 @@ class FrameDecoder[Frame](ABC):
         """
         found: list[Frame] = []
         at = 1
-        while (at := self._waiting.find(self.first_byte, at)) >= 0:
+        while (at := self._begin(self._waiting, at)) >= 0:
             frame, length = self._whole(self._waiting, at)
             if frame is None:
                 at += 1

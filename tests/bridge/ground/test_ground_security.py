@@ -54,6 +54,47 @@ def test_stopping_is_obeyed_whoever_asks(key_file: Path, number: int, parameters
         assert set(daemon.commands) <= {Command.STOP, Command.STANDBY}
 
 
+@pytest.mark.parametrize("is_datagram", [True, False])
+def test_a_station_that_speaks_mavlink_1_stops_the_robot_and_is_told(
+    key_file: Path, is_datagram: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    text = "This station speaks MAVLink 1: set it to MAVLink 2."
+    daemon, session = _session(_signed(key_file))
+    station, reader = Station(), _fresh(Station(KEY, system=9), key_file)
+    library = station.codec
+    stops = [station.old_command(number, *parameters) for number, parameters in STOPS]
+    stops.append(station.old(library.set_mode_encode(1, 1, 4)))
+    for stop in stops:
+        before = len(daemon.orders)
+        found = reader.hear(session.step(BEGIN_S, stop, is_datagram=is_datagram))
+        assert [ack.result for ack in of_type("COMMAND_ACK", found)] == [0]
+        assert len(daemon.orders) == before + 1
+    assert joined_texts(reader.heard).count(text) == 1
+    assert caplog.text.count("speaks MAVLink 1") == 1
+    data = station.old_command(400, 1.0) + station.old(library.heartbeat_encode(6, 8, 0, 0, 4))
+    found = reader.hear(session.step(BEGIN_S, data, is_datagram=is_datagram))
+    assert [ack.result for ack in of_type("COMMAND_ACK", found)] == [2]
+    assert (len(daemon.orders), daemon.seen, session.claims) == (len(stops), 0, 0)
+    found = reader.hear(session.overheard(BEGIN_S, stops[0]))
+    assert [ack.result for ack in of_type("COMMAND_ACK", found)] == [0]
+
+
+def test_without_a_key_mavlink_1_is_heard_like_mavlink_2() -> None:
+    daemon, session = _session(GroundSettings("udpin:127.0.0.1:0", FASTEST, obeys_unsigned=True))
+    station = Station()
+    beat = station.old(station.codec.heartbeat_encode(6, 8, 0, 0, 4))
+    session.step(BEGIN_S, beat + station.old_command(400, 1.0), is_datagram=True)
+    assert (daemon.commands, daemon.seen, session.claims) == ([Command.START], 1, 2)
+    stick = station.old(station.codec.manual_control_encode(1, 500, 0, 0, 0, 0))
+    session.step(BEGIN_S, stick + b"\xfe" + station.old_command(400, 0.0))
+    assert daemon.commands == [Command.START, Command.STANDBY]
+    assert session.claims == 3
+    damaged = bytearray(station.old_command(400, 0.0))
+    damaged[10] ^= 1
+    session.step(BEGIN_S, bytes(damaged))
+    assert len(daemon.orders) == 2
+
+
 @pytest.mark.parametrize(("number", "parameters"), CHANGES)
 @pytest.mark.parametrize("key", [None, bytes(32)])
 def test_without_the_key_nothing_changes(

@@ -1,5 +1,7 @@
 """Who may do what: signatures, other computers, other stations."""
 
+import re
+import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -248,9 +250,45 @@ def test_a_key_that_cannot_be_used_is_told_before_anything_starts(tmp_path: Path
     with pytest.raises(SigningError, match="cannot be read"):
         _session(_signed(tmp_path / "none"))
     short = tmp_path / "short"
-    short.write_text("abc")
-    with pytest.raises(SigningError, match="32 bytes"):
-        _session(_signed(short))
+    for data, what in (
+        (b"abc", "3 hexadecimal digits"),
+        (b"", "0 bytes"),
+        (KEY[:16].hex().encode(), "32 hexadecimal digits"),
+        (KEY[:16].hex().encode() + b"\n", "32 hexadecimal digits"),
+        (KEY.hex().encode()[:63], "63 hexadecimal digits"),
+        (KEY + b"\n", "33 bytes"),
+    ):
+        short.write_bytes(data)
+        with pytest.raises(SigningError, match=f"is 32 bytes, or 64 hexadecimal digits, not {what}$"):
+            _session(_signed(short))
+
+
+@pytest.mark.parametrize("data", [KEY, KEY.hex().encode(), KEY.hex().upper().encode() + b"\r\n", b"0" * 31 + b"g"])
+def test_keys(tmp_path: Path, data: bytes) -> None:
+    path = tmp_path / "key"
+    path.write_bytes(data)
+    assert Signing(path).begin().key == (data if len(data) == 32 else KEY)
+
+
+@pytest.mark.parametrize(
+    ("mode", "is_told"), [(0o600, False), (0o400, False), (0o640, True), (0o604, True), (0o620, True)]
+)
+def test_a_key_that_others_can_read_is_told(
+    key_file: Path, mode: int, is_told: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    key_file.chmod(mode)
+    Signing(key_file).begin()
+    assert ("others than its owner can read or change the key" in caplog.text) == is_told
+
+
+def test_the_command_of_the_page_makes_a_key(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    page = (Path(__file__).parents[3] / "docs" / "bridge-mavlink.md").read_text(encoding="utf-8")
+    (command,) = re.findall(r"^\(umask .*> /etc/robosc/mavlink\.key\)$", page, re.MULTILINE)
+    path = tmp_path / "mavlink.key"
+    subprocess.run(["sh", "-c", command.replace("/etc/robosc/mavlink.key", str(path))], check=True)
+    assert len(Signing(path).begin().key) == 32
+    assert len(path.read_bytes()) == 64
+    assert caplog.text == ""
 
 
 # What a configuration says.

@@ -174,6 +174,14 @@ class Station:
         values = (*parameters, *(0.0,) * (7 - len(parameters)))
         return self.pack(self.codec.command_long_encode(*to, number, confirmation, *values))
 
+    def old(self, message: Any) -> bytes:
+        """A message as bytes of MAVLink 1, which are never signed."""
+        return bytes(message.pack(self.codec, force_mavlink1=True))
+
+    def old_command(self, number: int, *parameters: float) -> bytes:
+        values = (*parameters, *(0.0,) * (7 - len(parameters)))
+        return self.old(self.codec.command_long_encode(1, 1, number, 0, *values))
+
     def command_int(self, number: int, *parameters: float, to: tuple[int, int] = (1, 1)) -> bytes:
         first = (*parameters, *(0.0,) * (4 - len(parameters)))
         return self.pack(self.codec.command_int_encode(*to, 0, number, 0, 0, *first, 0, 0, 0.0))

@@ -18,12 +18,14 @@ from robosc_bridge.ground.notices import standing
 from robosc_bridge.ground.status import is_held, run_mode
 from robosc_bridge.ground.stream import HEARTBEAT, Stream
 from robosc_bridge.ground.telemetry import Make
-from robosc_bridge.ground.texts import Severity
+from robosc_bridge.ground.texts import Sender, Severity
 from robosc_bridge.protocol.mavlink_messages import Result
 
 ANSWER_LIMIT_S = 5.0
 RESET_LIMIT_S = 20.0
 """How long the daemon may take for an answer."""
+
+LOOP_HANGS = "The bridge's loop does not turn."
 
 REPEATED_S = 10.0
 """For so long it is known how a command was answered, if its sender asks again."""
@@ -33,8 +35,10 @@ _MOST_REMEMBERED = 32
 # What was ordered is on its way into the next snapshot.
 _SHOWN_S = 1.0
 
-type Say = Callable[[Severity, str], None]
-type _Key = tuple[tuple[int, int], int, bytes]
+type Say = Callable[[Severity, str, Sender | None], None]
+"""Tells a text of that severity, as an answer to its sender's asking, or as news of the robot."""
+
+type _Key = tuple[Sender, int, bytes]
 
 
 @dataclass(frozen=True)
@@ -48,7 +52,7 @@ class Asked:
         is_repeated: Whether its sender says that it was sent before.
     """
 
-    sender: tuple[int, int]
+    sender: Sender
     number: int
     parameters: Parameters
     is_repeated: bool = False
@@ -98,7 +102,7 @@ class Asking:
         """What comes from here on has not come yet when anything before it was ordered, by whomever."""
         self._ordered.clear()
 
-    def _stop(self, stop: Stop, by: tuple[int, int], now_s: float) -> None:
+    def _stop(self, stop: Stop, by: Sender, now_s: float) -> None:
         # No command from before is answered as if it still held, nor obeyed late.
         self._remembered.clear()
         self._stops += 1
@@ -129,9 +133,9 @@ class Asking:
                     return [acknowledgement(asked, result)]
                 return self._change(asked, wanted, now_s)
             case Checks():
-                return [acknowledgement(asked, self._checks(now_s))]
+                return [acknowledgement(asked, self._checks(asked, now_s))]
             case Interval(message, interval_s):
-                return [acknowledgement(asked, self._interval(message, interval_s))]
+                return [acknowledgement(asked, self._interval(asked, message, interval_s))]
             case Once(message):
                 found = self._stream.once(message, now_s)
                 if found is None:
@@ -139,7 +143,7 @@ class Asking:
                 return [acknowledgement(asked, Result.ACCEPTED if found else Result.TEMPORARILY_REJECTED), *found]
             case Refusal(result, why):
                 if why:
-                    self._say(Severity.WARNING, why)
+                    self._say(Severity.WARNING, why, asked.sender)
                 return [acknowledgement(asked, result)]
 
     def look(self, now_s: float) -> list[Make]:
@@ -170,7 +174,9 @@ class Asking:
         elif now_s - self._last_stop_s > REPEATED_S:
             return None
         # Whether the stop or the first sending came later, nobody knows.
-        self._say(Severity.WARNING, f"{_NOT_DONE[change.wish]}: the robot was stopped meanwhile; send it anew.")
+        self._say(
+            Severity.WARNING, f"{_NOT_DONE[change.wish]}: the robot was stopped meanwhile; send it anew.", asked.sender
+        )
         return Result.TEMPORARILY_REJECTED
 
     def _still_holds(self, wish: Wish) -> bool:
@@ -181,15 +187,15 @@ class Asking:
 
     def _change(self, asked: Asked, change: Change, now_s: float) -> list[Make]:
         if self._stream.is_stale(now_s) or self._stream.snapshot is None:
-            self._say(Severity.WARNING, "The bridge's loop does not turn.")
+            self._say(Severity.WARNING, LOOP_HANGS, asked.sender)
             return [self._answered(asked, Result.TEMPORARILY_REJECTED, now_s)]
         own = run_mode(self._operations.is_layer)
         if change.mode is not None and change.mode is not own:
-            self._say(Severity.NOTICE, f"The supervisor runs in mode {own.name}, not {change.mode.name}.")
+            self._say(Severity.NOTICE, f"The supervisor runs in mode {own.name}, not {change.mode.name}.", asked.sender)
         if change.wish is Wish.RESUME and not self._is_held(now_s):
             return [self._answered(asked, Result.ACCEPTED, now_s)]
         if change.wish is Wish.RESET and self._stream.is_running:
-            self._say(Severity.WARNING, "The robot is armed: disarm it before it is reset.")
+            self._say(Severity.WARNING, "The robot is armed: disarm it before it is reset.", asked.sender)
             return [self._answered(asked, Result.TEMPORARILY_REJECTED, now_s)]
         if len(self._pending) >= _MOST_PENDING:
             return [acknowledgement(asked, Result.TEMPORARILY_REJECTED)]
@@ -209,7 +215,7 @@ class Asking:
         why = pending.answer.result()
         if not why:
             return Result.ACCEPTED
-        self._say(Severity.WARNING, f"{_NOT_DONE[pending.wish]}: {why}")
+        self._say(Severity.WARNING, f"{_NOT_DONE[pending.wish]}: {why}", pending.asked.sender)
         return Result.TEMPORARILY_REJECTED
 
     def _unanswered(self, pending: _Pending) -> Result:
@@ -217,7 +223,7 @@ class Asking:
         if undone_by is not None:
             # What a person was told has failed does not happen later.
             self._operations.order(undone_by, _name(pending.asked.sender))
-        self._say(Severity.ERROR, f"{_NOT_DONE[pending.wish]}: the bridge's loop does not answer.")
+        self._say(Severity.ERROR, f"{_NOT_DONE[pending.wish]}: the bridge's loop does not answer.", None)
         return Result.FAILED
 
     def _answered(self, asked: Asked, result: Result, now_s: float) -> Make:
@@ -227,19 +233,20 @@ class Asking:
         self._remembered[asked.key] = (result, now_s)
         return acknowledgement(asked, result)
 
-    def _checks(self, now_s: float) -> Result:
+    def _checks(self, asked: Asked, now_s: float) -> Result:
         snapshot = self._stream.snapshot
         if snapshot is None or self._stream.is_stale(now_s):
-            self._say(Severity.WARNING, "The bridge's loop does not turn.")
+            self._say(Severity.WARNING, LOOP_HANGS, asked.sender)
             return Result.TEMPORARILY_REJECTED
         found = [text for severity, text in standing(snapshot) if severity <= Severity.WARNING]
         for text in found:
-            self._say(Severity.WARNING, text)
+            # Each of them is to be told, and there are not more than there are.
+            self._say(Severity.WARNING, text, None)
         return Result.TEMPORARILY_REJECTED if found else Result.ACCEPTED
 
-    def _interval(self, message: int, interval_s: float | None) -> Result:
+    def _interval(self, asked: Asked, message: int, interval_s: float | None) -> Result:
         if message == HEARTBEAT:
-            self._say(Severity.WARNING, "The heartbeat comes once a second, always.")
+            self._say(Severity.WARNING, "The heartbeat comes once a second, always.", asked.sender)
             return Result.DENIED
         return Result.ACCEPTED if self._stream.schedule.change(message, interval_s) else Result.UNSUPPORTED
 
@@ -251,5 +258,5 @@ _NOT_DONE = {
 }
 
 
-def _name(sender: tuple[int, int]) -> str:
+def _name(sender: Sender) -> str:
     return f"MAVLink {sender[0]}/{sender[1]}"

@@ -72,7 +72,7 @@ class GroundLink:
 
     @property
     def is_alive(self) -> bool:
-        """Whether it serves, be the station there or not."""
+        """Whether its thread runs; it ends with `stop` alone, whatever happens to the line."""
         return self._thread.is_alive()
 
     def start(self) -> None:
@@ -89,19 +89,23 @@ class GroundLink:
             self._thread.join(_JOIN_S)
 
     def _run(self) -> None:
-        while not self._over.is_set():
-            try:
-                self._talk(self._opened())
-            except BridgeError as error:
-                self._failed(str(error))
-            except Exception:  # Nothing that a station sends or the daemon shows may end the link.
-                _log.exception("ground station")
-                self._failed("an internal error; see above")
-        with contextlib.suppress(BridgeError):
-            last = self._session.end(self._clock())
-            if self._line is not None:
-                self._line.write(last)
-        self._close()
+        try:
+            while not self._over.is_set():
+                try:
+                    self._talk(self._opened())
+                except BridgeError as error:
+                    self._failed(str(error))
+                except Exception:  # Nothing that a station sends or the daemon shows may end the link.
+                    _log.exception("ground station")
+                    self._failed("an internal error; see above")
+            with contextlib.suppress(BridgeError):
+                last = self._session.end(self._clock())
+                if self._line is not None:
+                    self._line.write(last)
+        finally:
+            # Whatever has ended the thread, nobody drives any more.
+            self._close()
+            self._session.lost()
 
     def _opened(self) -> Line:
         line = open_line(self._settings.address, self._settings.baud)

@@ -5,26 +5,26 @@ answered or dropped, and nothing raises.
 """
 
 import logging
+import math
 from collections import deque
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from typing import Any
 
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.programs import Refused, ToProgram
 from robosc_bridge.devices.interface import STANDSTILL, Velocity
 from robosc_bridge.ground import requests
-from robosc_bridge.ground.asking import Asked, Asking
-from robosc_bridge.ground.commands import Change, Meaning, Refusal, Stop, meaning, mode_meaning
+from robosc_bridge.ground.asking import LOOP_HANGS, Asked, Asking
+from robosc_bridge.ground.commands import Change, Meaning, Refusal, Stop
 from robosc_bridge.ground.driving import Driving, Unusable, drive_message, from_manual_control, from_position_target
+from robosc_bridge.ground.heard import OLD, STOPPING, Heard, asked_in, heard_of, wanted_by
 from robosc_bridge.ground.notices import happened, standing, written
 from robosc_bridge.ground.schedule import Bucket
 from robosc_bridge.ground.settings import GroundSettings
 from robosc_bridge.ground.status import is_held
 from robosc_bridge.ground.stream import Stream
 from robosc_bridge.ground.telemetry import Make
-from robosc_bridge.ground.texts import Severity, Texts
-from robosc_bridge.protocol.mavlink import Codec, Decoder, is_signed
+from robosc_bridge.ground.texts import Sender, Severity, Texts
+from robosc_bridge.protocol.mavlink import Codec, Decoder
 from robosc_bridge.protocol.mavlink_messages import GROUND_STATIONS, Incoming, Result
 
 _log = logging.getLogger(__name__)
@@ -32,39 +32,14 @@ _log = logging.getLogger(__name__)
 STATION_LIMIT_S = 5.0
 """After so long without its heartbeat a ground station is lost."""
 
+IDLE_S = 0.05
+"""After so long without a byte, what has come of a packet does not hide whole ones behind it any more."""
+
 MESSAGES_PER_S, MOST_MESSAGES = 100.0, 200.0
 """Messages that are heeded; beyond that, only those that stop."""
 
-_STOPPING = frozenset({Incoming.SET_MODE, Incoming.COMMAND_LONG, Incoming.COMMAND_INT})
+_OLD = "This station speaks MAVLink 1: set it to MAVLink 2."
 _NOT_SIGNED = "Only stopping is obeyed here without a valid signature."
-
-
-@dataclass(frozen=True)
-class Heard:
-    """A message that came.
-
-    Attributes:
-        sender: System and component.
-        number: Of the message.
-        told: The library's message.
-        is_signed: Whether it has a valid signature.
-    """
-
-    sender: tuple[int, int]
-    number: int
-    told: Any
-    is_signed: bool
-
-
-def _wanted(asked: Asked) -> Meaning:
-    # The old message for modes is answered as a command of its number, as ArduPilot does.
-    if asked.number == Incoming.SET_MODE:
-        return mode_meaning(asked.parameters[0], asked.parameters[1])
-    return meaning(asked.number, asked.parameters)
-
-
-def _heard(told: Any) -> Heard:
-    return Heard((told.get_srcSystem(), told.get_srcComponent()), told.get_msgId(), told, is_signed(told))
 
 
 class Session:
@@ -94,18 +69,21 @@ class Session:
             self._signing.key if self._signing else None,
             settings.signing.link if settings.signing else 0,
             self._signing.timestamp() if self._signing else 0,
-            _STOPPING,
+            STOPPING,
         )
-        self._decoder = Decoder(self._codec, _heard)
+        self._decoder = Decoder(self._codec, heard_of, OLD)
         self._texts = Texts()
         self._stream = Stream(operations, settings, now_s)
         self._asking = Asking(operations, self._stream, self._answer_in_words)
         message = drive_message(operations.ties) if operations.is_layer else None
         self._told: deque[ToProgram] = deque(maxlen=16)
         self._driving = Driving(operations.model, message, operations.tell, self._told.append) if message else None
+        self._knows_old = False
         self._bytes = Bucket(settings.bytes_per_s, settings.bytes_per_s)
         self._heeded = Bucket(MESSAGES_PER_S, MOST_MESSAGES)
         self._station_s: float | None = None
+        # When bytes of a line came last; infinite: they were looked through since.
+        self._fed_s = math.inf
         self._now_s = now_s
         self._subscription = operations.feed.subscribe(lambda: None)
         short = [f"{value.name} is {value.meaning}" for value in self._stream.values if value.name != value.meaning]
@@ -130,7 +108,7 @@ class Session:
         # What is asked is judged by what is so now.
         self._look()
         replies: list[Make] = []
-        for heard in self._decoder.take_datagram(data) if is_datagram else self._decoder.feed(data):
+        for heard in self._decoder.take_datagram(data) if is_datagram else self._fed(data):
             self._count(heard)
             replies += self._take(heard)
         replies += self._asking.look(now_s)
@@ -138,6 +116,16 @@ class Session:
         # The reason of an answer comes before it.
         urgent = (*self._texts.take(now_s), *replies, *self._stream.pulse(now_s))
         return self._encoded(urgent, self._stream.due(now_s))
+
+    def _fed(self, data: bytes) -> list[Heard]:
+        if data:
+            self._fed_s = self._now_s
+            return self._decoder.feed(data)
+        if self._now_s - self._fed_s < IDLE_S:
+            return []
+        # A stop does not wait behind the beginning of a packet that was cut.
+        self._fed_s = math.inf
+        return self._decoder.idle()
 
     def overheard(self, now_s: float, data: bytes) -> bytes:
         """A datagram of somebody else than the station in use, who may stop the robot and nothing more.
@@ -148,8 +136,10 @@ class Session:
         self._pass_time(now_s)
         replies: list[Make] = []
         for heard in self._decoder.take_datagram(data):
-            asked = None if self._is_own(heard) else self._asked(heard)
-            if asked is not None and isinstance(wanted := _wanted(asked), Stop):
+            if heard.is_old and not self._is_own(heard):
+                self._tell_old(heard)
+            asked = None if self._is_own(heard) else asked_in(heard, self._settings)
+            if asked is not None and isinstance(wanted := wanted_by(asked), Stop):
                 replies += self._asking.take(asked, wanted, now_s)
         return self._encoded(replies, ())
 
@@ -205,7 +195,7 @@ class Session:
             if notice is not None:
                 self._texts.say(now_s, *notice)
         if self._stream.is_stale(now_s):
-            holding.append((Severity.CRITICAL, "The bridge's loop does not turn."))
+            holding.append((Severity.CRITICAL, LOOP_HANGS))
         elif self._stream.snapshot is not None:
             holding += standing(self._stream.snapshot)
         self._texts.stand(now_s, holding)
@@ -225,8 +215,8 @@ class Session:
             self._texts.say(self._now_s, Severity.WARNING, "No set-point any more: the robot stands.", again_s=0.0)
             _log.warning("set-points of the ground station have ended while the robot was to move")
 
-    def _answer_in_words(self, severity: Severity, text: str) -> None:
-        self._texts.say(self._now_s, severity, text, again_s=0.0)
+    def _answer_in_words(self, severity: Severity, text: str, asked_by: Sender | None) -> None:
+        self._texts.say(self._now_s, severity, text, again_s=0.0, asked_by=asked_by)
 
     # What the ground station says.
 
@@ -240,7 +230,7 @@ class Session:
         self.accepted += 1
         # What another vehicle with the same key has sent must not choose whoever sends it on.
         is_station = heard.number == Incoming.HEARTBEAT and heard.told.type in GROUND_STATIONS
-        self.claims += is_station or self._asked(heard) is not None
+        self.claims += is_station or asked_in(heard, self._settings) is not None
 
     def _is_trusted(self, heard: Heard) -> bool:
         """Whether it may ask and be heard; not whether it may change anything."""
@@ -252,14 +242,16 @@ class Session:
     def _take(self, heard: Heard) -> list[Make]:
         if self._is_own(heard):
             return []
-        asked = self._asked(heard)
-        if asked is not None and isinstance(wanted := _wanted(asked), Stop):
+        if heard.is_old:
+            self._tell_old(heard)
+        asked = asked_in(heard, self._settings)
+        if asked is not None and isinstance(wanted := wanted_by(asked), Stop):
             return self._asking.take(asked, wanted, self._now_s)
         if not self._heeded.has_some:
             return []
         self._heeded.take()
         if asked is not None:
-            return self._command(heard, asked, _wanted(asked))
+            return self._command(heard, asked, wanted_by(asked))
         if not self._is_trusted(heard):
             return []
         match heard.number:
@@ -267,35 +259,24 @@ class Session:
                 self._station(heard)
             case Incoming.MANUAL_CONTROL if heard.told.target == self._settings.system:
                 self._drive(heard, lambda: from_manual_control(heard.told, self._settings.fastest))
-            case Incoming.SET_POSITION_TARGET if self._is_for_us(heard.told):
+            case Incoming.SET_POSITION_TARGET if heard.is_for(self._settings):
                 self._drive(heard, lambda: from_position_target(heard.told))
-            case _ if self._is_for_us(heard.told):
+            case _ if heard.is_for(self._settings):
                 return requests.answers(heard.number, heard.told, heard.sender, self._settings, self._now_s)
         return []
+
+    def _tell_old(self, heard: Heard) -> None:
+        if not self._knows_old:
+            self._knows_old = True
+            _log.warning("the ground station %d/%d speaks MAVLink 1, and is answered in MAVLink 2", *heard.sender)
+        self._texts.say(self._now_s, Severity.WARNING, _OLD, asked_by=heard.sender)
 
     def _command(self, heard: Heard, asked: Asked, wanted: Meaning) -> list[Make]:
         is_refused = isinstance(wanted, Change) and not self._may_change(heard)
         if is_refused or not self._is_trusted(heard):
-            self._texts.say(self._now_s, Severity.WARNING, _NOT_SIGNED)
+            self._texts.say(self._now_s, Severity.WARNING, _NOT_SIGNED, asked_by=heard.sender)
             wanted = Refusal(Result.DENIED)
         return self._asking.take(asked, wanted, self._now_s)
-
-    def _asked(self, heard: Heard) -> Asked | None:
-        """The command that a message is, if it is one and for us."""
-        told = heard.told
-        if heard.number not in _STOPPING or not self._is_for_us(told):
-            return None
-        if heard.number == Incoming.SET_MODE:
-            return Asked(heard.sender, Incoming.SET_MODE, (told.base_mode, told.custom_mode, 0, 0, 0, 0, 0))
-        first = (told.param1, told.param2, told.param3, told.param4)
-        if heard.number == Incoming.COMMAND_INT:
-            return Asked(heard.sender, told.command, (*first, float(told.x), float(told.y), told.z))
-        last = (told.param5, told.param6, told.param7)
-        return Asked(heard.sender, told.command, (*first, *last), told.confirmation > 0)
-
-    def _is_for_us(self, told: Any) -> bool:
-        system, component = getattr(told, "target_system", 0), getattr(told, "target_component", 0)
-        return system in (0, self._settings.system) and component in (0, self._settings.component)
 
     def _station(self, heard: Heard) -> None:
         if self._station_s is None:
@@ -326,4 +307,4 @@ class Session:
             self._driving.take(self._now_s, velocity)
         elif why and (velocity != STANDSTILL or heard.number == Incoming.SET_POSITION_TARGET):
             # A stick at rest asks for nothing.
-            self._texts.say(self._now_s, Severity.WARNING, why)
+            self._texts.say(self._now_s, Severity.WARNING, why, asked_by=heard.sender)

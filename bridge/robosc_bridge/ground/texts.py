@@ -1,5 +1,8 @@
 """Texts for a person at the ground station: cut into chunks, not too many a second, the same one not again and again.
 
+The grave ones go first. What answers somebody's asking goes last, and waits in one place for each sender: nobody keeps
+the news of the robot from being told by asking nonsense.
+
 Source: mavlink.io (STATUSTEXT). A text of up to 50 bytes goes as it is. A longer one goes in chunks of 50, of which one
 that is shorter is the last: so a text that fills its chunks is followed by an empty one, and a chunk that would end
 within a character is filled up with spaces.
@@ -30,6 +33,8 @@ FLAPPING_S = 2.0
 """What comes and goes is told when it comes, but not sooner than this after it was told last."""
 
 MOST_WAITING = 30
+"""Chunks that wait; the last text of them may go beyond it."""
+
 _MOST_RECENT = 200
 
 
@@ -41,6 +46,9 @@ class Severity(IntEnum):
     WARNING = 4
     NOTICE = 5
     INFO = 6
+
+
+type Sender = tuple[int, int]
 
 
 @dataclass(frozen=True)
@@ -87,31 +95,82 @@ def status_text(severity: Severity, chunk: Chunk) -> Make:
     return lambda codec: codec.statustext_encode(int(severity), chunk.data, chunk.number, chunk.place)
 
 
+@dataclass
+class _Waiting:
+    severity: Severity
+    text: str
+    pieces: deque[Chunk]
+    asked_by: Sender | None
+
+    @property
+    def rank(self) -> tuple[bool, int]:
+        """The smaller, the sooner it is told."""
+        return self.asked_by is not None, self.severity
+
+
 class Texts:
     """What is to be told, and when."""
 
     def __init__(self) -> None:
-        self._waiting: deque[tuple[Severity, Chunk]] = deque()
+        self._waiting: list[_Waiting] = []
+        # Of which a piece has gone: a station that joins pieces must get the others next.
+        self._begun: _Waiting | None = None
         self._recent: dict[str, float] = {}
         self._standing: frozenset[str] = frozenset()
         self._number = 0
         self._bucket = Bucket(RATE_PER_S, BURST)
 
-    def say(self, now_s: float, severity: Severity, text: str, *, again_s: float = REPEAT_S) -> None:
-        """Tell something, unless the same was told less than `again_s` ago."""
+    def say(
+        self,
+        now_s: float,
+        severity: Severity,
+        text: str,
+        *,
+        again_s: float = REPEAT_S,
+        asked_by: Sender | None = None,
+    ) -> None:
+        """Tell something, unless the same was told less than `again_s` ago.
+
+        Args:
+            now_s: The time.
+            severity: The graver, the sooner it is told.
+            text: Of any length.
+            again_s: Seconds.
+            asked_by: Whose asking it answers, system and component; None: it is news of the robot, which goes first.
+        """
         text = plain_text(text)
         told_s = self._recent.get(text)
         if told_s is not None and now_s - told_s < again_s:
             return
-        if len(self._waiting) >= MOST_WAITING:
+        if asked_by is not None:
+            self._waiting = [item for item in self._waiting if item.asked_by != asked_by]
+        if any(item.text == text and item.asked_by == asked_by for item in self._waiting):
             return
-        if len(self._recent) >= _MOST_RECENT:
-            self._recent = {said: time_s for said, time_s in self._recent.items() if now_s - time_s < REPEAT_S}
-            if len(self._recent) >= _MOST_RECENT:
-                return
-        self._recent[text] = now_s
         self._number = self._number % 65535 + 1
-        self._waiting.extend((severity, chunk) for chunk in chunks(text, self._number))
+        item = _Waiting(severity, text, deque(chunks(text, self._number)), asked_by)
+        if not self._find_room(item):
+            return
+        self._waiting.append(item)
+        if again_s > 0.0:
+            self._note(text, now_s)
+
+    def _find_room(self, item: _Waiting) -> bool:
+        """Whether it may wait; what is less grave makes room for it, the latest first."""
+        while sum(len(waiting.pieces) for waiting in self._waiting) >= MOST_WAITING:
+            last = max(reversed(self._waiting), key=lambda waiting: waiting.rank)
+            if last.rank <= item.rank:
+                return False
+            self._waiting.remove(last)
+            # It was not told: whoever says it again is to be heard.
+            self._recent.pop(last.text, None)
+        return True
+
+    def _note(self, text: str, now_s: float) -> None:
+        # The oldest is first.
+        self._recent.pop(text, None)
+        if len(self._recent) >= _MOST_RECENT:
+            del self._recent[next(iter(self._recent))]
+        self._recent[text] = now_s
 
     def stand(self, now_s: float, holding: Iterable[tuple[Severity, str]]) -> None:
         """What holds now: told when it begins, and again every `REPEAT_S`."""
@@ -128,7 +187,14 @@ class Texts:
         """What goes out now."""
         self._bucket.pass_time(now_s)
         found = []
-        while self._waiting and self._bucket.has_some:
+        while self._bucket.has_some and (item := self._next()) is not None:
             self._bucket.take()
-            found.append(status_text(*self._waiting.popleft()))
+            found.append(status_text(item.severity, item.pieces.popleft()))
+            self._begun = item if item.pieces else None
         return found
+
+    def _next(self) -> _Waiting | None:
+        if self._begun is None and self._waiting:
+            self._begun = min(self._waiting, key=lambda waiting: waiting.rank)
+            self._waiting.remove(self._begun)
+        return self._begun

@@ -2,7 +2,8 @@
 
 A frame counts only when its check holds. Where it does not, the search goes on one byte further, so that what looks
 like a header inside other data never takes a true frame behind it along. What is found depends on the bytes alone, not
-on how reads cut them: `feed(a) + feed(b)` is `feed(a + b)`.
+on how reads cut them: `feed(a) + feed(b)` is `feed(a + b)`. Only `idle` knows of time: whoever cannot wait until a
+header is proved false by what follows calls it when nothing more comes.
 """
 
 from abc import ABC, abstractmethod
@@ -31,7 +32,7 @@ class FrameDecoder[Frame](ABC):
     Holds fewer bytes than the longest frame and `look_ahead` have, whatever comes in.
 
     Attributes:
-        first_byte: What every header begins with.
+        first_byte: What every header begins with, unless `_begin` says else.
         header_length: Bytes from which the length of a frame is known.
         look_ahead: Bytes behind a frame that `_frame` wants to see.
         counts: What was met so far.
@@ -45,6 +46,10 @@ class FrameDecoder[Frame](ABC):
         self.counts = FrameCounts()
         self._waiting = b""
         self._is_aligned = False
+
+    def _begin(self, data: bytes, at: int) -> int:
+        """Where the next header may begin; -1: nowhere."""
+        return data.find(self.first_byte, at)
 
     @abstractmethod
     def _length(self, data: bytes, at: int) -> int:
@@ -66,7 +71,7 @@ class FrameDecoder[Frame](ABC):
         begin = 0
         end = len(data)
         while begin < end:
-            at = data.find(self.first_byte, begin)
+            at = self._begin(data, begin)
             if at != begin:
                 if self._is_aligned:
                     self._align(False)
@@ -95,6 +100,37 @@ class FrameDecoder[Frame](ABC):
         self._waiting = data[begin:]
         counts.frames += len(found)
         return found
+
+    def idle(self) -> list[Frame]:
+        """The whole frames behind a header that waits for more, when nothing has come for longer than in any frame.
+
+        That header was false, or its frame was cut. Where no whole frame is behind it, it waits on, and nothing is lost
+        of a frame that comes slowly.
+        """
+        found: list[Frame] = []
+        at = 1
+        while (at := self._begin(self._waiting, at)) >= 0:
+            frame, length = self._whole(self._waiting, at)
+            if frame is None:
+                at += 1
+                continue
+            self.counts.bad_frames += 1
+            self.counts.frames += 1
+            self.counts.skipped_bytes += at
+            rest = self._waiting[at + length :]
+            self._waiting = b""
+            self._align(True)
+            found += [frame, *self.feed(rest)]
+            at = 1
+        return found
+
+    def _whole(self, data: bytes, at: int) -> tuple[Frame | None, int]:
+        if at + self.header_length > len(data):
+            return None, 0
+        length = self._length(data, at)
+        if not length or at + length + self.look_ahead > len(data):
+            return None, 0
+        return self._frame(data, at, length), length
 
     def forget(self) -> None:
         """Begin anew: what comes next is not what followed what came last."""

@@ -1,8 +1,9 @@
-"""MAVLink 2 packets: what goes to a vehicle as bytes, what comes from it as values.
+"""MAVLink packets: what goes to a vehicle as bytes, what comes from it as values.
 
 pymavlink's generated codec packs, unpacks, checks and signs; it is made for that, and knows every message. Its search
 for packets is not used: behind a header in noise it takes whole packets along, and without `MAVLINK20=1` in the
-environment `mavutil` speaks MAVLink 1. Sources: mavlink.io (serialization, signing) and pymavlink 2.4.50.
+environment `mavutil` speaks MAVLink 1. What is sent is MAVLink 2; of MAVLink 1, whose packets cannot be signed, only
+messages that were asked for are heard. Sources: mavlink.io (serialization, signing) and pymavlink 2.4.50.
 """
 
 from collections.abc import Callable
@@ -103,19 +104,27 @@ def is_signed(found: Any) -> bool:
     return bool(found.get_signed())
 
 
+def is_old(found: Any) -> bool:
+    """Whether a message of the library came as MAVLink 1."""
+    return bytes(found.get_msgbuf()[:1]) == bytes((_OLD_MAGIC,))
+
+
 class Decoder[Content](FrameDecoder[Content]):
-    """Finds packets of MAVLink 2; those of MAVLink 1 and of messages that the dialect does not know are skipped.
+    """Finds packets of MAVLink 2; those of messages that the dialect does not know are skipped.
 
     Args:
         codec: That checks and unpacks them.
         read: What a message of the library says; a `ValueError`: what cannot be.
+        old: Numbers of the messages, without extensions, that are also heard as MAVLink 1; its others are skipped.
     """
 
     first_byte: ClassVar[int] = MAGIC
     header_length: ClassVar[int] = _HEADER
 
-    def __init__(self, codec: Codec, read: Callable[[Any], Content]) -> None:
+    def __init__(self, codec: Codec, read: Callable[[Any], Content], old: frozenset[int] = frozenset()) -> None:
         super().__init__()
+        # Nothing is cut off at the end of these: every other length is that of noise.
+        self._old_lengths = {number: int(dialect.mavlink_map[number].unpacker.size) for number in old}
         self._codec = codec
         self._read = read
 
@@ -135,7 +144,7 @@ class Decoder[Content](FrameDecoder[Content]):
                 break
             if at + length > len(data):
                 break
-            frame = self._frame(data, at, length) if data[at] == MAGIC and self._length(data, at) else None
+            frame = self._frame(data, at, length) if self._length(data, at) else None
             if frame is None:
                 self.counts.bad_frames += 1
                 self.counts.skipped_bytes += length
@@ -146,7 +155,17 @@ class Decoder[Content](FrameDecoder[Content]):
         self.counts.skipped_bytes += len(data) - at
         return found
 
+    def _begin(self, data: bytes, at: int) -> int:
+        new = super()._begin(data, at)
+        if not self._old_lengths:
+            return new
+        old = data.find(_OLD_MAGIC, at) if new < 0 else data.find(_OLD_MAGIC, at, new)
+        return new if old < 0 else old
+
     def _length(self, data: bytes, at: int) -> int:
+        if data[at] == _OLD_MAGIC:
+            is_heard = self._old_lengths.get(data[at + 5]) == data[at + 1]
+            return _OLD_HEADER + data[at + 1] + _CHECKSUM if is_heard else 0
         flags = data[at + 2]
         # Without its message's extra byte, a checksum cannot be checked.
         if flags & ~_SIGNED or int.from_bytes(data[at + 7 : at + 10], "little") not in dialect.mavlink_map:

@@ -4,6 +4,8 @@ Source: mavlink.io, "Message Signing". It says who sent a packet; it hides nothi
 and the clock.
 """
 
+import logging
+import stat
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +13,9 @@ from pathlib import Path
 from robosc_bridge.errors import DeviceError
 from robosc_bridge.protocol.mavlink import KEY_LENGTH
 
+_log = logging.getLogger(__name__)
+
+_HEXADECIMAL = frozenset(b"0123456789abcdefABCDEF")
 _EPOCH_S = 1_420_070_400  # 2015-01-01 in UTC.
 _UNITS_PER_S = 100_000
 # Whoever begins anew within this time is ahead of the clock by as much; others are heard up to a minute behind.
@@ -26,7 +31,7 @@ class Signing:
     """How packets are signed.
 
     Attributes:
-        key_file: 32 bytes, or as many as hexadecimal text. Beside it, with the ending `.timestamp`, the time is kept.
+        key_file: 32 bytes, or 64 hexadecimal digits. Beside it, with the ending `.timestamp`, the time is kept.
         link: Number of the signed stream, 0 to 255: another one for every line to the same vehicle.
     """
 
@@ -109,14 +114,20 @@ class SigningTime:
 def _read_key(path: Path) -> bytes:
     try:
         data = path.read_bytes()
+        mode = path.stat().st_mode
     except OSError as error:
         raise SigningError(f"{path}: the key of signing cannot be read: {error.strerror}") from error
-    if len(data) == KEY_LENGTH:
-        return data
-    try:
-        key = bytes.fromhex(data.decode("ascii"))
-    except ValueError:
-        key = b""
+    text = data.strip()
+    is_hexadecimal = bool(text) and set(text) <= _HEXADECIMAL
+    # As many hexadecimal digits as a key has bytes are half of one, and no key that chance would make.
+    if len(data) == KEY_LENGTH and not is_hexadecimal:
+        key = data
+    else:
+        key = bytes.fromhex(text.decode("ascii")) if is_hexadecimal and len(text) % 2 == 0 else b""
     if len(key) != KEY_LENGTH:
-        raise SigningError(f"{path}: a key of signing is {KEY_LENGTH} bytes, or as many as hexadecimal text")
+        what = f"{len(text)} hexadecimal digits" if is_hexadecimal else f"{len(data)} bytes"
+        needed = f"a key of signing is {KEY_LENGTH} bytes, or {2 * KEY_LENGTH} hexadecimal digits"
+        raise SigningError(f"{path}: {needed}, not {what}")
+    if mode & (stat.S_IRGRP | stat.S_IWGRP | stat.S_IROTH | stat.S_IWOTH):
+        _log.warning("%s: others than its owner can read or change the key of signing: chmod 600 it", path)
     return key

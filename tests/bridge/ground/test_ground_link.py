@@ -294,9 +294,12 @@ def test_it_may_be_stopped_at_any_time() -> None:
     link = GroundLink(PlayedDaemon().operations, GroundSettings("udpin:127.0.0.1:0", FASTEST))
     link.stop()
     link = GroundLink(PlayedDaemon().operations, GroundSettings("tcp:127.0.0.1:1", FASTEST))
+    assert not link.is_alive
     link.start()
+    assert link.is_alive
     began_s = time.monotonic()
     link.stop()
+    assert not link.is_alive
     link.stop()
     assert time.monotonic() - began_s < 2.0
 
@@ -308,3 +311,20 @@ def test_an_error_inside_ends_nothing(caplog: pytest.LogCaptureFixture, monkeypa
             patch.setattr(link._session, "step", lambda *_, **__: 1 / 0)
             wait_until(lambda: "ZeroDivisionError" in caplog.text, 5.0)
         station.until("HEARTBEAT")
+
+
+def test_a_thread_that_ends_unexpectedly_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Over(BaseException):
+        pass
+
+    def end(*_: Any, **__: Any) -> bytes:
+        raise Over
+
+    ended: list[Any] = []
+    monkeypatch.setattr(threading, "excepthook", ended.append)
+    link = GroundLink(PlayedDaemon().operations, GroundSettings("udpin:127.0.0.1:0", FASTEST))
+    monkeypatch.setattr(link._session, "step", end)
+    link.start()
+    wait_until(lambda: not link.is_alive, 5.0)
+    assert ended[0].exc_type is Over
+    link.stop()

@@ -34,6 +34,8 @@ def test_times_and_limits() -> None:
         f"not answered within {asking.ANSWER_LIMIT_S:g} s",
         f"Without one for {driving.SILENCE_S:g} s",
         f"Without it for {session.STATION_LIMIT_S:g} s a text",
+        f"has been idle for {session.IDLE_S * 1000:g} ms",
+        f"of more than {texts.MOST_WAITING} chunks that wait",
         f"At most {session.MESSAGES_PER_S:g} messages a second",
         f"At most {texts.RATE_PER_S:g} chunks a second",
         f"every {texts.REPEAT_S:g} s",

@@ -1,5 +1,7 @@
 """Who may do what: signatures, other computers, other stations."""
 
+import re
+import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -52,6 +54,47 @@ def test_stopping_is_obeyed_whoever_asks(key_file: Path, number: int, parameters
             session.step(BEGIN_S + before, station.command(number, *parameters))
             assert len(daemon.orders) == before + 1
         assert set(daemon.commands) <= {Command.STOP, Command.STANDBY}
+
+
+@pytest.mark.parametrize("is_datagram", [True, False])
+def test_a_station_that_speaks_mavlink_1_stops_the_robot_and_is_told(
+    key_file: Path, is_datagram: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    text = "This station speaks MAVLink 1: set it to MAVLink 2."
+    daemon, session = _session(_signed(key_file))
+    station, reader = Station(), _fresh(Station(KEY, system=9), key_file)
+    library = station.codec
+    stops = [station.old_command(number, *parameters) for number, parameters in STOPS]
+    stops.append(station.old(library.set_mode_encode(1, 1, 4)))
+    for stop in stops:
+        before = len(daemon.orders)
+        found = reader.hear(session.step(BEGIN_S, stop, is_datagram=is_datagram))
+        assert [ack.result for ack in of_type("COMMAND_ACK", found)] == [0]
+        assert len(daemon.orders) == before + 1
+    assert joined_texts(reader.heard).count(text) == 1
+    assert caplog.text.count("speaks MAVLink 1") == 1
+    data = station.old_command(400, 1.0) + station.old(library.heartbeat_encode(6, 8, 0, 0, 4))
+    found = reader.hear(session.step(BEGIN_S, data, is_datagram=is_datagram))
+    assert [ack.result for ack in of_type("COMMAND_ACK", found)] == [2]
+    assert (len(daemon.orders), daemon.seen, session.claims) == (len(stops), 0, 0)
+    found = reader.hear(session.overheard(BEGIN_S, stops[0]))
+    assert [ack.result for ack in of_type("COMMAND_ACK", found)] == [0]
+
+
+def test_without_a_key_mavlink_1_is_heard_like_mavlink_2() -> None:
+    daemon, session = _session(GroundSettings("udpin:127.0.0.1:0", FASTEST, obeys_unsigned=True))
+    station = Station()
+    beat = station.old(station.codec.heartbeat_encode(6, 8, 0, 0, 4))
+    session.step(BEGIN_S, beat + station.old_command(400, 1.0), is_datagram=True)
+    assert (daemon.commands, daemon.seen, session.claims) == ([Command.START], 1, 2)
+    stick = station.old(station.codec.manual_control_encode(1, 500, 0, 0, 0, 0))
+    session.step(BEGIN_S, stick + b"\xfe" + station.old_command(400, 0.0))
+    assert daemon.commands == [Command.START, Command.STANDBY]
+    assert session.claims == 3
+    damaged = bytearray(station.old_command(400, 0.0))
+    damaged[10] ^= 1
+    session.step(BEGIN_S, bytes(damaged))
+    assert len(daemon.orders) == 2
 
 
 @pytest.mark.parametrize(("number", "parameters"), CHANGES)
@@ -207,9 +250,45 @@ def test_a_key_that_cannot_be_used_is_told_before_anything_starts(tmp_path: Path
     with pytest.raises(SigningError, match="cannot be read"):
         _session(_signed(tmp_path / "none"))
     short = tmp_path / "short"
-    short.write_text("abc")
-    with pytest.raises(SigningError, match="32 bytes"):
-        _session(_signed(short))
+    for data, what in (
+        (b"abc", "3 hexadecimal digits"),
+        (b"", "0 bytes"),
+        (KEY[:16].hex().encode(), "32 hexadecimal digits"),
+        (KEY[:16].hex().encode() + b"\n", "32 hexadecimal digits"),
+        (KEY.hex().encode()[:63], "63 hexadecimal digits"),
+        (KEY + b"\n", "33 bytes"),
+    ):
+        short.write_bytes(data)
+        with pytest.raises(SigningError, match=f"is 32 bytes, or 64 hexadecimal digits, not {what}$"):
+            _session(_signed(short))
+
+
+@pytest.mark.parametrize("data", [KEY, KEY.hex().encode(), KEY.hex().upper().encode() + b"\r\n", b"0" * 31 + b"g"])
+def test_keys(tmp_path: Path, data: bytes) -> None:
+    path = tmp_path / "key"
+    path.write_bytes(data)
+    assert Signing(path).begin().key == (data if len(data) == 32 else KEY)
+
+
+@pytest.mark.parametrize(
+    ("mode", "is_told"), [(0o600, False), (0o400, False), (0o640, True), (0o604, True), (0o620, True)]
+)
+def test_a_key_that_others_can_read_is_told(
+    key_file: Path, mode: int, is_told: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    key_file.chmod(mode)
+    Signing(key_file).begin()
+    assert ("others than its owner can read or change the key" in caplog.text) == is_told
+
+
+def test_the_command_of_the_page_makes_a_key(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    page = (Path(__file__).parents[3] / "docs" / "bridge-mavlink.md").read_text(encoding="utf-8")
+    (command,) = re.findall(r"^\(umask .*> /etc/robosc/mavlink\.key\)$", page, re.MULTILINE)
+    path = tmp_path / "mavlink.key"
+    subprocess.run(["sh", "-c", command.replace("/etc/robosc/mavlink.key", str(path))], check=True)
+    assert len(Signing(path).begin().key) == 32
+    assert len(path.read_bytes()) == 64
+    assert caplog.text == ""
 
 
 # What a configuration says.

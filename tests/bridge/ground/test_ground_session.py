@@ -216,7 +216,7 @@ def test_what_happens_is_told_in_words(talk: Talk) -> None:
     talk.daemon.show(devices={Device.DRIVE: True, Device.SCANNER: True}, reasons=(Reason.COMMAND_SILENT,))
     assert joined_texts(talk.live(0.2)) == ["The scanner is there"]
     talk.daemon.show(state=State.FAULT, problem="a motor is hot", reasons=(Reason.MOTOR_FAULT,))
-    assert joined_texts(talk.live(0.5)) == ["Stopped by a fault", "a motor is hot", "A motor tells of a fault."]
+    assert joined_texts(talk.live(0.5)) == ["a motor is hot", "A motor tells of a fault.", "Stopped by a fault"]
     assert joined_texts(talk.live(19.0)) == []
     assert joined_texts(talk.live(2.0)) == ["a motor is hot", "A motor tells of a fault."]
 
@@ -232,6 +232,21 @@ def test_a_safe_stop_is_told_and_its_end_and_no_ordinary_end(talk: Talk) -> None
     assert joined_texts(talk.live(0.2)) == ["Stopping"]
     talk.daemon.write(kind="fault", what="division by zero")
     assert joined_texts(talk.live(0.2)) == ["Fault: division by zero"]
+
+
+@pytest.mark.parametrize("obeys", [True, False])
+def test_a_fault_is_told_while_somebody_sends_nonsense(obeys: bool) -> None:
+    talk = Talk(settings=GroundSettings("udpin:0.0.0.0:0", FASTEST, obeys_unsigned=obeys))
+    for tick in range(100):
+        talk.daemon.show()
+        if tick == 50:
+            talk.daemon.write(kind="fault", what="it burns")
+            talk.daemon.show(state=State.FAULT, problem="no drive")
+        nonsense = b"".join(talk.station.command(400, tick * 10 + value + 2) for value in range(4))
+        talk.say(nonsense, after_s=0.05)
+        if tick == 60:
+            # Half a second later.
+            assert {"Fault: it burns", "Stopped by a fault", "no drive"} <= set(joined_texts(talk.station.heard))
 
 
 def test_a_station_that_comes_later_is_told_what_holds(talk: Talk) -> None:
@@ -403,6 +418,23 @@ def test_what_others_have_stopped_is_not_accepted_again(talk: Talk) -> None:
     talk.live(0.1)
     assert talk.results(193, 1.0, confirmation=1) == [1]
     assert talk.daemon.commands == [Command.START, Command.RESUME]
+
+
+def test_a_stop_does_not_wait_behind_a_packet_that_was_cut(talk: Talk) -> None:
+    long = bytes.fromhex("fd ff 00 00 05 ff be 6e 00 00")
+    for cut in (long, long * 3, b"\xfd", talk.station.command(400, 1.0)[:20]):
+        talk.daemon.orders.clear()
+        found = talk.say(cut + talk.station.command(400, 0.0)) + talk.say(after_s=0.02) + talk.say(after_s=0.04)
+        assert [ack.result for ack in of_type("COMMAND_ACK", found)] == [0]
+        assert talk.daemon.commands == [Command.STANDBY]
+
+
+def test_a_packet_that_comes_slowly_comes(talk: Talk) -> None:
+    for byte in talk.station.command(400, 0.0):
+        assert talk.daemon.orders == []
+        talk.say(bytes((byte,)))
+        talk.say(after_s=0.06)
+    assert talk.daemon.commands == [Command.STANDBY]
 
 
 def test_a_flood_of_others_is_bounded(talk: Talk) -> None:

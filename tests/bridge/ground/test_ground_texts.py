@@ -89,8 +89,8 @@ def test_there_are_never_too_many_a_second() -> None:
         for number in range(5):
             texts.say(tick / 100, Severity.INFO, f"{tick} {number}")
         count += len(texts.take(tick / 100))
-        assert len(texts._waiting) <= MOST_WAITING + 6
-        assert len(texts._recent) <= 201
+        assert len(texts._waiting) <= MOST_WAITING
+        assert len(texts._recent) <= 200
     assert count <= BURST + 10.0 * RATE_PER_S + 1
 
 
@@ -101,3 +101,56 @@ def test_who_listens_anew_is_told_again() -> None:
     texts.forget()
     texts.stand(1.0, [(Severity.ERROR, "cold")])
     assert _told(texts, 1.0) == ["cold"]
+
+
+def test_nonsense_keeps_no_news_from_being_told() -> None:
+    texts = Texts()
+    for number in range(500):
+        texts.say(0.0, Severity.WARNING, f"A parameter cannot be {number}.", again_s=0.0, asked_by=(255, number % 250))
+    texts.say(0.0, Severity.ERROR, "Fault: hot", again_s=0.0)
+    texts.stand(0.0, [(Severity.CRITICAL, "empty")])
+    texts.say(0.0, Severity.NOTICE, "Standby")
+    assert _told(texts, 0.0)[:3] == ["empty", "Fault: hot", "Standby"]
+    assert sum(len(item.pieces) for item in texts._waiting) <= MOST_WAITING
+
+
+def test_the_grave_makes_others_wait_and_what_was_dropped_is_told_later() -> None:
+    texts = Texts()
+    for number in range(60):
+        texts.say(0.0, Severity.NOTICE, f"notice {number}")
+    for number in range(25):
+        texts.say(0.0, Severity.CRITICAL, f"critical {number}")
+    # Nothing makes room for what is not graver, and what was never told is told when it is said again.
+    texts.say(0.0, Severity.NOTICE, "too much")
+    texts.say(0.0, Severity.NOTICE, "notice 25")
+    found = []
+    for tick in range(80):
+        found += _told(texts, tick / 10)
+    assert found == [f"critical {number}" for number in range(25)] + [f"notice {number}" for number in range(5)]
+    texts.say(8.0, Severity.NOTICE, "notice 25")
+    assert _told(texts, 8.0) == ["notice 25"]
+
+
+def test_what_one_sender_is_told_has_one_place() -> None:
+    texts = Texts()
+    for text in ("first", "second", "third"):
+        texts.say(0.0, Severity.WARNING, text, again_s=0.0, asked_by=(255, 190))
+    texts.say(0.0, Severity.WARNING, "other", again_s=0.0, asked_by=(254, 190))
+    assert _told(texts, 0.0) == ["third", "other"]
+    for _ in range(3):
+        texts.say(0.0, Severity.WARNING, "the same", again_s=0.0)
+    assert _told(texts, 0.0) == ["the same"]
+
+
+def test_a_text_that_has_begun_is_told_to_its_end() -> None:
+    texts = Texts()
+    texts.say(0.0, Severity.INFO, "x" * 49)
+    for number in range(10):
+        texts.say(0.0, Severity.INFO, f"{number}")
+    texts.say(0.0, Severity.INFO, "y" * 120)
+    told = [texts.take(0.0)]
+    texts.say(0.0, Severity.CRITICAL, "grave")
+    told += [texts.take(tick / 10) for tick in range(1, 20)]
+    codec = Codec(1, 1)
+    found = joined_texts(Station().hear(b"".join(codec.encode(make) for makes in told for make in makes)))
+    assert found[-2:] == ["y" * 120, "grave"]

@@ -171,6 +171,27 @@ def test_a_false_header_takes_no_packet_along() -> None:
     assert decoder.counts.skipped_bytes == len(noise)
 
 
+@given(
+    st.lists(st.one_of(st.binary(max_size=40), st.sampled_from((0, 1, 2))), max_size=12), st.lists(st.integers(1, 60))
+)
+def test_an_idle_line_hides_no_whole_packet(parts: list[bytes | int], cuts: list[int]) -> None:
+    packets = [bytes.fromhex(packet) for packet in (HEARTBEAT, ACK, PLAIN)]
+    data = b"".join(packets[part] if isinstance(part, int) else part for part in parts)
+    decoder = _decoder()
+    found = []
+    rest = data
+    for cut in cuts:
+        found += decoder.feed(rest[:cut])
+        rest = rest[cut:]
+    found += decoder.feed(rest) + decoder.idle()
+    assert found == [_decoder().feed(packets[part])[0] for part in parts if isinstance(part, int)]
+    assert decoder.idle() == []
+    counts = decoder.counts
+    assert counts.frames == len(found)
+    length = sum(len(packets[part]) for part in parts if isinstance(part, int))
+    assert counts.skipped_bytes + len(decoder._waiting) + length == len(data)
+
+
 def test_packets_of_the_first_version_and_unknown_messages_are_skipped() -> None:
     old = dialect.MAVLink(None, 1, 1)
     data = bytes(old.heartbeat_encode(10, 3, 0, 0, 3).pack(old, force_mavlink1=True))

@@ -1,0 +1,68 @@
+"""Messages that a ground station, or anybody, has sent, and the commands that some of them are."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from robosc_bridge.ground.asking import Asked
+from robosc_bridge.ground.commands import Meaning, meaning, mode_meaning
+from robosc_bridge.ground.settings import GroundSettings
+from robosc_bridge.protocol.mavlink import is_old, is_signed
+from robosc_bridge.protocol.mavlink_messages import Incoming
+
+STOPPING = frozenset({Incoming.SET_MODE, Incoming.COMMAND_LONG, Incoming.COMMAND_INT})
+"""Messages that can stop the robot: they are heard whoever has signed them."""
+
+OLD = STOPPING | {Incoming.HEARTBEAT}
+"""Messages that are heard as MAVLink 1, too."""
+
+
+@dataclass(frozen=True)
+class Heard:
+    """A message that came.
+
+    Attributes:
+        sender: System and component.
+        number: Of the message.
+        told: The library's message.
+        is_signed: Whether it has a valid signature.
+        is_old: Whether it came as MAVLink 1.
+    """
+
+    sender: tuple[int, int]
+    number: int
+    told: Any
+    is_signed: bool
+    is_old: bool
+
+    def is_for(self, settings: GroundSettings) -> bool:
+        """Whether it is for the bridge, or for everybody."""
+        system, component = getattr(self.told, "target_system", 0), getattr(self.told, "target_component", 0)
+        return system in (0, settings.system) and component in (0, settings.component)
+
+
+def heard_of(told: Any) -> Heard:
+    """What a message of the library is."""
+    sender = (told.get_srcSystem(), told.get_srcComponent())
+    return Heard(sender, told.get_msgId(), told, is_signed(told), is_old(told))
+
+
+def asked_in(heard: Heard, settings: GroundSettings) -> Asked | None:
+    """The command that a message is, if it is one and for us."""
+    told = heard.told
+    if heard.number not in STOPPING or not heard.is_for(settings):
+        return None
+    if heard.number == Incoming.SET_MODE:
+        return Asked(heard.sender, Incoming.SET_MODE, (told.base_mode, told.custom_mode, 0, 0, 0, 0, 0))
+    first = (told.param1, told.param2, told.param3, told.param4)
+    if heard.number == Incoming.COMMAND_INT:
+        return Asked(heard.sender, told.command, (*first, float(told.x), float(told.y), told.z))
+    last = (told.param5, told.param6, told.param7)
+    return Asked(heard.sender, told.command, (*first, *last), told.confirmation > 0)
+
+
+def wanted_by(asked: Asked) -> Meaning:
+    """What a command means."""
+    # The old message for modes is answered as a command of its number, as ArduPilot does.
+    if asked.number == Incoming.SET_MODE:
+        return mode_meaning(asked.parameters[0], asked.parameters[1])
+    return meaning(asked.number, asked.parameters)

@@ -1,8 +1,19 @@
+import argparse
+import os
 from pathlib import Path
 
 import pytest
 
-from robosc_api.security import Scope, SecurityError, TokenFile, make_token
+from robosc_api.security import (
+    Credentials,
+    Scope,
+    SecurityError,
+    TokenFile,
+    add_token_arguments,
+    make_token,
+    open_channel,
+    written_token,
+)
 from robosc_api.security.tokens import MAXIMUM_BYTES, MAXIMUM_TOKEN, parse_tokens
 
 
@@ -124,3 +135,37 @@ def test_what_cannot_be_a_file_of_tokens_is_refused(tmp_path: Path) -> None:
     file.write_bytes(b"#" * (MAXIMUM_BYTES + 1))
     with pytest.raises(SecurityError, match="larger than"):
         TokenFile(file)
+
+
+def arguments(*words: str) -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    add_token_arguments(parser, (Scope.WATCH,))
+    return parser.parse_args(words)
+
+
+def test_a_token_is_written_for_its_owner_alone_and_never_over_a_file(tmp_path: Path) -> None:
+    file = tmp_path / "token"
+    before = os.umask(0)
+    try:
+        shown, told = written_token(arguments("laptop", "-o", str(file)))
+    finally:
+        os.umask(before)
+    assert shown == ""
+    assert file.stat().st_mode & 0o777 == 0o600
+    token = file.read_text().strip()
+    assert token not in told
+    assert TokenFile(written(tmp_path, told.splitlines()[-1])).find(token) is not None
+    with pytest.raises(SecurityError, match="File exists"):
+        written_token(arguments("laptop", "-o", str(file)))
+    assert file.read_text().strip() == token
+
+
+@pytest.mark.parametrize(("mode", "is_told"), [(0o600, False), (0o640, True), (0o604, True)])
+def test_a_token_that_others_may_read_is_told(
+    mode: int, is_told: bool, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    file = tmp_path / "token"
+    file.write_text(make_token("a", (Scope.WATCH,))[0])
+    file.chmod(mode)
+    with open_channel("127.0.0.1:1", Credentials(token_file=file)):
+        assert (f"{file}: others than its owner may read it" in caplog.text) is is_told

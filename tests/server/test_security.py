@@ -105,6 +105,36 @@ class TestTls:
             shutil.copy(other_key, key)
             check(address, ca=second.file)
 
+    def test_a_certificate_that_does_not_fit_is_told_once_for_each_change(
+        self, tmp_path: Path, caplog: pytest.LogCaptureFixture
+    ) -> None:
+        first = Authority(tmp_path, "first")
+        certificate, key = first.sign("server")
+        right = certificate.read_bytes()
+        with serving(ServerSecurity(certificate=certificate, key=key)) as address:
+            for number in (1, 2):
+                shutil.copy(first.sign(f"other-{number}")[0], certificate)
+                for _ in range(3):
+                    check(address, ca=first.file)
+                assert caplog.text.count("the certificate stays as it was") == number
+            certificate.unlink()
+            for _ in range(3):
+                check(address, ca=first.file)
+            assert caplog.text.count("No such file") == 1
+            certificate.write_bytes(right)
+            check(address, ca=first.file)
+        assert caplog.text.count("the certificate stays as it was") == 3
+
+    def test_a_key_that_others_may_read_is_told(self, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+        certificate, key = Authority(tmp_path).sign("server")
+        key.chmod(0o640)
+        with serving(ServerSecurity(certificate=certificate, key=key)):
+            assert caplog.text.count(f"{key}: others than its owner may read it") == 1
+        caplog.clear()
+        key.chmod(0o600)
+        with serving(ServerSecurity(certificate=certificate, key=key)):
+            assert "may read it" not in caplog.text
+
 
 class TestTokens:
     def test_only_with_a_token_that_is_for_it(

@@ -5,6 +5,7 @@ import os
 from pathlib import Path
 
 from robosc_api.security.client import Credentials
+from robosc_api.security.errors import SecurityError
 from robosc_api.security.listening import ServerSecurity
 from robosc_api.security.tokens import Scope, make_token
 
@@ -88,14 +89,29 @@ def add_token_arguments(parser: argparse.ArgumentParser, scopes: tuple[Scope, ..
         metavar="SCOPE",
         help=f"what it is for: {', '.join(Scope)}; may be given again (default: {', '.join(scopes)})",
     )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help="where the token is written, for its owner alone; a file that is there stays; default: standard output",
+    )
     parser.set_defaults(default_scopes=scopes)
 
 
 def written_token(arguments: argparse.Namespace) -> tuple[str, str]:
-    """A new token for standard output, and for people the line that lets it in.
+    """A new token for standard output, if it is not in a file, and for people the line that lets it in.
 
     Raises:
-        SecurityError: The name cannot stand in a file of tokens.
+        SecurityError: The name cannot stand in a file of tokens, or the file for the token is there or cannot be made.
     """
     token, line = make_token(arguments.name, tuple(arguments.scope or arguments.default_scopes))
-    return f"{token}\n", f"Keep the token secret; it is not shown again. The line for the file of tokens:\n{line}\n"
+    if arguments.output is None:
+        return f"{token}\n", f"Keep the token secret; it is not shown again. The line for the file of tokens:\n{line}\n"
+    try:
+        # For its owner alone from the beginning: nobody can open it before its mode is set.
+        with os.fdopen(os.open(arguments.output, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as stream:
+            stream.write(f"{token}\n")
+    except OSError as error:
+        raise SecurityError(f"{arguments.output}: {error.strerror}") from error
+    return "", f"{arguments.output}: the token; keep it secret. The line for the file of tokens:\n{line}\n"

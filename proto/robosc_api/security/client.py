@@ -8,7 +8,7 @@ import grpc
 
 from robosc_api.security.addresses import is_loopback_host, split
 from robosc_api.security.errors import SecurityError
-from robosc_api.security.listening import check_certificates, read
+from robosc_api.security.listening import check_certificates, read, read_secret
 from robosc_api.security.tokens import MAXIMUM_TOKEN
 
 
@@ -75,14 +75,14 @@ def _channel_credentials(credentials: Credentials) -> grpc.ChannelCredentials:
         raise SecurityError("a certificate and its key belong together: one of them is missing")
     return grpc.ssl_channel_credentials(
         None if credentials.ca is None else check_certificates(credentials.ca),
-        None if credentials.key is None else read(credentials.key),
+        None if credentials.key is None else read_secret(credentials.key),
         None if credentials.certificate is None else read(credentials.certificate),
     )
 
 
 def _token(path: Path) -> str:
     try:
-        token = read(path).decode("ascii").strip()
+        token = read_secret(path).decode("ascii").strip()
     except UnicodeDecodeError:
         token = ""
     if not token.isprintable() or not 0 < len(token) <= MAXIMUM_TOKEN or any(map(str.isspace, token)):

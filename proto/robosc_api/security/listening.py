@@ -1,6 +1,9 @@
 """Where a service listens, and behind which certificate."""
 
+import logging
+import os
 import ssl
+import stat
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,6 +13,8 @@ import grpc
 from robosc_api.security.addresses import is_loopback_host, joined, split
 from robosc_api.security.errors import SecurityError
 from robosc_api.security.tokens import TokenFile
+
+_log = logging.getLogger(__name__)
 
 _MAXIMUM_BYTES = 1024 * 1024
 
@@ -103,19 +108,29 @@ class _Files:
 
 def _credentials(security: ServerSecurity) -> grpc.ServerCredentials:
     latest = _checked(security)
+    told: object = None
 
     def configuration(files: _Files) -> Any:
         return grpc.ssl_server_certificate_configuration([(files.key, files.certificate)], files.client_ca)
 
     def changed() -> Any:
         """What is to be used from now on; None: what is used now. Called for each connection."""
-        nonlocal latest
+        nonlocal latest, told
+        found: object = None
         try:
-            if _read(security) == latest:
+            found = _read(security)
+            if found == latest:
+                told = None
                 return None
             latest = _checked(security)
-        except SecurityError:
-            return None  # Half written: what is used now stays.
+        except SecurityError as error:
+            # It may be half written: what is used now stays. Told once for each change, not for each connection.
+            if told != (found or str(error)):
+                _log.error("the certificate stays as it was: %s", error)
+            told = found or str(error)
+            return None
+        told = None
+        _log.info("%s: read again", security.certificate)
         return configuration(latest)
 
     return grpc.dynamic_ssl_server_credentials(
@@ -138,6 +153,8 @@ def _checked(security: ServerSecurity) -> _Files:
         raise SecurityError(f"{security.certificate} and {security.key} cannot be used: {text}") from error
     if security.client_ca is not None:
         check_certificates(security.client_ca)
+    if security.key is not None:
+        warn_of_readers(security.key)
     return files
 
 
@@ -164,6 +181,23 @@ def _read(security: ServerSecurity) -> _Files:
         raise SecurityError("a certificate and its key belong together: one of them is missing")
     client_ca = None if security.client_ca is None else read(security.client_ca)
     return _Files(read(security.certificate), read(security.key), client_ca)
+
+
+def read_secret(path: Path) -> bytes:
+    """The bytes of a file with a key or a token, as `read`; the log warns if others than its owner may read it."""
+    data = read(path)
+    warn_of_readers(path)
+    return data
+
+
+def warn_of_readers(path: Path) -> None:
+    """Tell the log if others than its owner may read a file that is to be secret."""
+    try:
+        mode = path.stat().st_mode
+    except OSError:
+        return
+    if os.name == "posix" and mode & (stat.S_IRGRP | stat.S_IROTH):
+        _log.warning("%s: others than its owner may read it: chmod go-r it", path)
 
 
 def read(path: Path) -> bytes:

@@ -8,13 +8,28 @@ texts as keys. Whatever a program sends is untrusted: what makes no sense is ans
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
+
+from robosc_bridge.daemon.plain_data import weight_bytes
+
+
+class _Weighed:
+    """What a program is told with data: the same for all that are told it."""
+
+    data: Any
+
+    @cached_property
+    def weight_bytes(self) -> int:
+        """How much memory its data takes, in bytes."""
+        return weight_bytes(self.data)
+
 
 # What the loop tells a program, as the model's other side.
 
 
 @dataclass(frozen=True)
-class MessageSent:
+class MessageSent(_Weighed):
     """The model sent a message on an identifier that is tied to `grpc`; every program is told."""
 
     name: str
@@ -23,7 +38,7 @@ class MessageSent:
 
 
 @dataclass(frozen=True)
-class CallMade:
+class CallMade(_Weighed):
     """The model calls a service that this program serves; a `Replied` or `CallFailed` with the number is awaited."""
 
     name: str
@@ -32,7 +47,7 @@ class CallMade:
 
 
 @dataclass(frozen=True)
-class GoalMade:
+class GoalMade(_Weighed):
     """The model asks for an action that this program serves; `GoalAccepted`, then a `GoalEnded` are awaited."""
 
     name: str
@@ -52,7 +67,7 @@ class CancelMade:
 
 
 @dataclass(frozen=True)
-class PassedOn:
+class PassedOn(_Weighed):
     """The robot sent a message, after the supervisor has seen it; every program is told."""
 
     identifier: str
@@ -67,7 +82,7 @@ class Blocked:
 
 
 @dataclass(frozen=True)
-class Answered:
+class Answered(_Weighed):
     """A call of this program is answered; `data` is None for the default answer of one held back or failed."""
 
     call_id: str
@@ -90,7 +105,7 @@ class GoalRejected:
 
 
 @dataclass(frozen=True)
-class FeedbackPassed:
+class FeedbackPassed(_Weighed):
     """How far a goal of this program is."""
 
     goal_id: str
@@ -98,7 +113,7 @@ class FeedbackPassed:
 
 
 @dataclass(frozen=True)
-class GoalOver:
+class GoalOver(_Weighed):
     """A goal of this program has ended: `succeeded`, `aborted` or `cancelled`."""
 
     goal_id: str

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import logging
+import threading
 from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable
 
@@ -16,8 +17,14 @@ _log = logging.getLogger(__name__)
 MAXIMUM_WAITING = 1000
 """Messages that wait for a program to read them."""
 
+MAXIMUM_WAITING_BYTES = 4_000_000
+"""Of memory, for their data; one message may wait whatever its size."""
+
 MESSAGES_A_TURN = 64
 """That a program may tell the loop before that has shown its next snapshot; the rest waits at the program's end."""
+
+BYTES_A_TURN = 128 * 1024
+"""Of these messages as they arrive; what goes beyond is the last one."""
 
 _LOOK_S = 0.005
 
@@ -49,11 +56,14 @@ class Session:
         self._pace = OperatorPace(self._loop.time)
         self._news = asyncio.Event()
         self._overflow = asyncio.Event()
+        # Filled by the loop's thread and this one.
+        self._lock = threading.Lock()
         self._waiting: deque[ToProgram | str] = deque()
+        self._waiting_bytes = 0
         self._is_called = False
         self._is_full = False
         self._is_over = False
-        self._told = 0
+        self._told = self._told_bytes = 0
         self._seen_number = -1
         self._program: Program = convert.program_of(hello, name, self._tell, operations)
 
@@ -97,6 +107,7 @@ class Session:
                 self._put(str(error))
                 continue
             if item is not None:
+                self._told_bytes += request.ByteSize()
                 self._operations.tell(item)
 
     async def _turn(self) -> None:
@@ -105,8 +116,8 @@ class Session:
             snapshot = self._operations.feed.snapshot
             number = -1 if snapshot is None else snapshot.number
             if number != self._seen_number:
-                self._seen_number, self._told = number, 0
-            if self._told < MESSAGES_A_TURN:
+                self._seen_number, self._told, self._told_bytes = number, 0, 0
+            if self._told < MESSAGES_A_TURN and self._told_bytes < BYTES_A_TURN:
                 self._told += 1
                 return
             await asyncio.sleep(_LOOK_S)
@@ -117,12 +128,15 @@ class Session:
             await self._news.wait()
             self._news.clear()
             while self._waiting:
-                item = self._waiting.popleft()
+                with self._lock:
+                    item = self._waiting.popleft()
+                    self._waiting_bytes -= _weight_bytes(item)
                 await write(convert.refused(item) if isinstance(item, str) else convert.telling(item))
 
     async def _fall_behind(self) -> None:
         await self._overflow.wait()
-        raise TooSlowError(f"more than {MAXIMUM_WAITING} messages wait for this program to read them")
+        megabytes = MAXIMUM_WAITING_BYTES // 1_000_000
+        raise TooSlowError(f"more than {MAXIMUM_WAITING} messages or {megabytes} MB wait for this program to read them")
 
     def _tell(self, item: ToProgram) -> None:
         """From the loop's thread."""
@@ -131,10 +145,14 @@ class Session:
     def _put(self, item: ToProgram | str) -> None:
         if self._is_over or self._is_full:
             return
-        if len(self._waiting) >= MAXIMUM_WAITING:
-            self._is_full = True
-        else:
-            self._waiting.append(item)
+        weight = _weight_bytes(item)
+        with self._lock:
+            is_too_heavy = self._waiting and self._waiting_bytes + weight > MAXIMUM_WAITING_BYTES
+            if len(self._waiting) >= MAXIMUM_WAITING or is_too_heavy:
+                self._is_full = True
+            else:
+                self._waiting.append(item)
+                self._waiting_bytes += weight
         if not self._is_called:
             self._is_called = True
             with contextlib.suppress(RuntimeError):  # The face is closed.
@@ -145,3 +163,8 @@ class Session:
         if self._is_full:
             self._overflow.set()
         self._news.set()
+
+
+def _weight_bytes(item: ToProgram | str) -> int:
+    """Of the data of a message; what has none is small."""
+    return int(getattr(item, "weight_bytes", 0))

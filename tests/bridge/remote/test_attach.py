@@ -1,5 +1,6 @@
 """Programs of the model and operators of a layer, over real sockets."""
 
+import asyncio
 import math
 import os
 import signal
@@ -382,17 +383,61 @@ class TestHostilePrograms:
         eventually(lambda: len(daemon.of(programs.Told)) == 5000)
         program.end()
 
-    def test_a_program_that_does_not_read_is_ended_with_a_clear_status(self, daemon: FakeDaemon, stub: Any) -> None:
+    @pytest.mark.parametrize("size", [200, 20_000])
+    def test_a_program_that_does_not_read_is_ended_with_a_clear_status(
+        self, size: int, daemon: FakeDaemon, stub: Any
+    ) -> None:
         program = attached(stub, serves=["open"])
         known = daemon.program()
-        data = "x" * 20_000
+        data = "x" * size
         end_s = time.monotonic() + PATIENCE_S
         while not daemon.of(programs.Detached):
             known.tell(programs.PassedOn("/scan", data))
             assert time.monotonic() < end_s
         code, details = program.failure()
         assert code is grpc.StatusCode.RESOURCE_EXHAUSTED
-        assert details == "more than 1000 messages wait for this program to read them"
+        assert details == "more than 1000 messages or 4 MB wait for this program to read them"
+        program.end()
+
+    def test_memory_of_what_waits_for_a_program_is_bounded(self, daemon: FakeDaemon) -> None:
+        waiting: list[session.Session] = []
+
+        async def fill(data: list[float], times: int) -> int:
+            made = session.Session(daemon.operations, pb.Hello(name="arm"), "arm", None)
+            waiting.append(made)
+            for _ in range(times):
+                made._tell(programs.PassedOn("/scan", list(data)))
+            return len(made._waiting)
+
+        large = [float(number) for number in range(10_000)]
+        # 24 bytes a number, 8 for its place.
+        assert asyncio.run(fill(large, 30)) == session.MAXIMUM_WAITING_BYTES // 320_056
+        assert asyncio.run(fill(large * 20, 2)) == 1
+        assert asyncio.run(fill([], 2000)) == session.MAXIMUM_WAITING
+
+    def test_what_has_been_read_weighs_nothing(self, daemon: FakeDaemon, stub: Any) -> None:
+        program = attached(stub)
+        large = [0.5] * 10_000
+        for _ in range(3 * session.MAXIMUM_WAITING_BYTES // 320_056):
+            daemon.program().tell(programs.PassedOn("/scan", list(large)))
+            assert len(program.receive().passed_on.data.list_value.values) == 10_000
+        program.end()
+
+    def test_a_program_that_floods_with_large_messages_is_held_back_at_its_end(
+        self, daemon: FakeDaemon, stub: Any
+    ) -> None:
+        program = attached(stub)
+        daemon.program()
+        daemon.turns = False
+        data = value_of("x" * 50_000)
+        for _ in range(12):
+            program.send(give=pb.Message(identifier="/order", data=data))
+        # The third goes beyond the limit; the loop's thread may have taken one.
+        eventually(lambda: daemon.waiting >= 2)
+        time.sleep(0.2)
+        assert daemon.waiting <= 3
+        daemon.turns = True
+        eventually(lambda: len(daemon.of(programs.Told)) == 12)
         program.end()
 
     def test_the_end_of_the_bridge_is_told(self, daemon: FakeDaemon) -> None:

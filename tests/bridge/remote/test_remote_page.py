@@ -20,8 +20,9 @@ def test_the_limits() -> None:
     message = f"| {face.MAXIMUM_REQUEST_BYTES // 1024} KiB; {face.MAXIMUM_METADATA_BYTES // 1024} KiB |"
     values = f"| {data.MAXIMUM_DEPTH} and {data.MAXIMUM_VALUES:,}; {data.MAXIMUM_NAME} |"
     events = f"| {watchers.MAXIMUM_EVENTS}, or {watchers.MAXIMUM_BYTES // 2**20} MiB |"
-    waiting = f"wait for a program | {session.MAXIMUM_WAITING} |"
-    turn = f"next snapshot | {session.MESSAGES_A_TURN} |"
+    megabytes = session.MAXIMUM_WAITING_BYTES // 1_000_000
+    waiting = f"wait for a program | {session.MAXIMUM_WAITING}, or {megabytes} MB of data |"
+    turn = f"next snapshot | {session.MESSAGES_A_TURN}, or {session.BYTES_A_TURN // 1024} KiB |"
     silence = f"| {face.PING_S + face.PING_LIMIT_S:g} s with a ping"
     operator = f"in a second | {pace.MESSAGES_A_S} | no sign of life; after {pace.FLOOD_S} such"
     limits = (operator, streams, connections, calls, message, values, events, waiting, turn, silence)

@@ -161,7 +161,7 @@ def test_no_time_is_used_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 @pytest.mark.parametrize("key", [b"", b"x" * 31, b"zz" * 32, b"00" * 31])
 def test_a_key_of_another_length_is_told(tmp_path: Path, key: bytes) -> None:
     (tmp_path / "key").write_bytes(key)
-    with pytest.raises(SigningError, match="32 bytes, or as many as hexadecimal text"):
+    with pytest.raises(SigningError, match="is 32 bytes, or 64 hexadecimal digits, not "):
         Signing(tmp_path / "key").begin()
 
 

@@ -203,7 +203,7 @@ class Conductor:
         return "" if self.state is State.RUNNING else self._readiness.missing() or self._dead_thread()
 
     def _dead_thread(self) -> str:
-        return "" if self._are_alive() else "a device's thread has ended; the bridge must be started anew"
+        return "" if self._are_alive() else "a thread of a device or a remote face has ended; the bridge must be started anew"
 
     def _order_standby(self, order: Order) -> None:
         match self.state:
@@ -295,7 +295,7 @@ class Conductor:
     def look(self, now_s: float) -> None:
         """At the end of a turn: whether the state becomes another."""
         if self.state is State.RUNNING and not self._are_alive():
-            self._fault("a device's thread has ended")
+            self._fault("a thread of a device or a remote face has ended")
         if self._failed_turn and self.state is State.RUNNING:
             self._fault(f"a turn has failed, and no message of the model tells it so: {self._failed_turn}")
         self._failed_turn = ""

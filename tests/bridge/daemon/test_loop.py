@@ -140,7 +140,7 @@ def test_a_thread_that_has_ended_is_a_fault(scene: Scene) -> None:
     scene.up()
     scene.is_alive = False
     scene.live(0.1, 2.0)
-    assert scene.daemon.problem == "a device's thread has ended"
+    assert scene.daemon.problem == "a thread of a device or a remote face has ended"
 
 
 def test_a_velocity_from_before_an_operators_stop_does_not_move_the_robot_afterwards(scene: Scene) -> None:

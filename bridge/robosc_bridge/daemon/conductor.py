@@ -203,7 +203,11 @@ class Conductor:
         return "" if self.state is State.RUNNING else self._readiness.missing() or self._dead_thread()
 
     def _dead_thread(self) -> str:
-        return "" if self._are_alive() else "a thread of a device or a remote face has ended; the bridge must be started anew"
+        return (
+            ""
+            if self._are_alive()
+            else "a thread of a device or a remote face has ended; the bridge must be started anew"
+        )
 
     def _order_standby(self, order: Order) -> None:
         match self.state:

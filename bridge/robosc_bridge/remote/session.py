@@ -78,9 +78,12 @@ class Session:
         """
         self._operations.tell(Attached(self._program))
         _log.info("%s is attached", self._program.name)
-        work = (self._read(requests), self._write(write), self._fall_behind())
-        tasks = [asyncio.ensure_future(item) for item in work]
+        tasks: list[asyncio.Future[None]] = []
         try:
+            # Before anything is read: while its first words are on their way, gRPC cannot refuse what it cannot read.
+            await write(convert.welcome(self._operator_timeout_s))
+            work = (self._read(requests), self._write(write), self._fall_behind())
+            tasks += [asyncio.ensure_future(item) for item in work]
             if self._is_operator:
                 self._operations.operator_seen()
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -123,7 +126,6 @@ class Session:
             await asyncio.sleep(_LOOK_S)
 
     async def _write(self, write: Callable[[convert.AttachResponse], Awaitable[None]]) -> None:
-        await write(convert.welcome(self._operator_timeout_s))
         while True:
             await self._news.wait()
             self._news.clear()

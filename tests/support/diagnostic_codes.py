@@ -16,10 +16,11 @@ _IS_ONE_WORD = re.compile(r"[a-z0-9]+")
 NO_CODES = frozenset(
     {
         *("utf-8", "utf-8-sig", "robosc-supervisor", "explain-synthesis", "only-uncontrollable", "unreachable-state"),
+        "ssh-ed25519",
         *(info.name for info in available_targets()),
     }
 )
-"""Texts of the source that look like codes and are none: a command, its remarks about supervisors, names of targets."""
+"""Texts of the source that look like codes and are none: a command, its remarks about supervisors, a kind of key, targets."""
 
 # The pages themselves, and the models that a new robot begins with.
 _ELSEWHERE = ("explain", "starter")

@@ -189,5 +189,6 @@ def test_streams_without_an_end_do_not_keep_it_from_ending(
         face.stop()
         assert time.monotonic() - begin_s < 4.0
         forever.set()
-        assert {call.details() for call in calls} == {"the bridge ends"}
+        # The last ones on a busy machine are ended by gRPC itself.
+        assert "the bridge ends" in {call.details() for call in calls} <= {"the bridge ends", "CANCELLED"}
     assert not [record for record in caplog.records if record.levelno >= logging.ERROR or record.exc_info]

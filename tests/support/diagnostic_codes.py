@@ -20,7 +20,7 @@ NO_CODES = frozenset(
         *(info.name for info in available_targets()),
     }
 )
-"""Texts of the source that look like codes and are none: a command, its remarks about supervisors, a kind of key, targets."""
+"""Texts of the source that look like codes and are none: a command, its remarks, a kind of key, names of targets."""
 
 # The pages themselves, and the models that a new robot begins with.
 _ELSEWHERE = ("explain", "starter")

@@ -7,6 +7,7 @@ decision, against the schedule. *CPU*: user and system time of the whole bridge 
 Usage: loop_period.py [SECONDS]
 """
 
+import argparse
 import json
 import subprocess
 import sys
@@ -24,12 +25,12 @@ from rig import (  # noqa: E402
     Machine,
     configuration,
     environment,
-    preferred,
     simulated,
     spread,
 )
 
 from figures import text_table  # noqa: E402  # found through the path above
+from support.real_time import preferred  # noqa: E402  # rig adds its folder to the path
 
 SECONDS = 30.0
 STANDBY_S = 5.0
@@ -100,4 +101,6 @@ def table(seconds: float = SECONDS) -> str:
 
 
 if __name__ == "__main__":
-    sys.stdout.write(table(*map(float, sys.argv[1:2])) + "\n")
+    parser = argparse.ArgumentParser(description="How punctually the bridge decides.")
+    parser.add_argument("seconds", type=float, nargs="?", default=SECONDS, help="of each drive (default: %(default)s)")
+    sys.stdout.write(table(parser.parse_args().seconds) + "\n")

@@ -35,7 +35,6 @@ from rig import (  # noqa: E402
     environment,
     in_ms,
     percentile,
-    preferred,
     simulated,
     spread,
 )
@@ -44,6 +43,7 @@ from figures import text_table  # noqa: E402  # found through the path above
 from robosc_bridge.devices.lidar import LDS01, LDS02, LDS03, Model  # noqa: E402
 from robosc_bridge.protocol.turns import TurnBuilder, nearest_by_degree  # noqa: E402
 from robosc_bridge.simulated.recorder import Record, read_records  # noqa: E402
+from support.real_time import preferred  # noqa: E402  # rig adds its folder to the path
 
 TRIALS = 200
 LIDAR = "lds03"

@@ -10,6 +10,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 ROOT = Path(__file__).parents[3]
+sys.path.insert(0, str(ROOT / "tests"))
+
+from support.real_time import preferred  # noqa: E402  # found through the path above
+
 WANDERER = Path(__file__).with_name("wanderer.rscd")
 STOP_AT_OBSTACLE = Path(__file__).with_name("stop_at_obstacle.rscd")
 LIMIT_S = 60.0
@@ -53,21 +57,6 @@ class Simulator:
         """Have it answer."""
         self.tell(command)
         return self._line().strip()
-
-
-@contextmanager
-def preferred() -> Iterator[None]:
-    """Programs that are started in this block go before others, where that is permitted."""
-    before = os.getpriority(os.PRIO_PROCESS, 0)
-    try:
-        os.setpriority(os.PRIO_PROCESS, 0, -15)
-    except PermissionError:
-        yield
-        return
-    try:
-        yield
-    finally:
-        os.setpriority(os.PRIO_PROCESS, 0, before)
 
 
 @contextmanager

@@ -103,6 +103,7 @@ class Machine:
 
     def __init__(self) -> None:
         self._late_s: list[float] = []
+        self._away_s: list[tuple[float, float]] = []
         self._stolen = 0.0
 
     @contextmanager
@@ -117,7 +118,12 @@ class Machine:
         finally:
             now_stolen, now_total = _ticks()
             self._stolen = (now_stolen - stolen) / max(now_total - total, 1)
-            self._late_s = json.loads(process.communicate()[0])
+            found = json.loads(process.communicate()[0])
+            self._late_s, self._away_s = found["late_s"], found["away_s"]
+
+    def was_away(self, begin_s: float, end_s: float) -> bool:
+        """Whether a processor did nothing for anyone during a part of this time, by `time.monotonic`."""
+        return any(since_s < end_s and until_s > begin_s for since_s, until_s in self._away_s)
 
     def __str__(self) -> str:
         """Load, what the host took away, and how late a program wakes that sleeps for a millisecond."""

@@ -32,18 +32,20 @@ PANEL = ("button_1", "button_2", "bumper_1", "bumper_2")
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """What a drive base has, beside wheels.
+    """What a device has, beside what all of its kind have.
 
     Attributes:
         buttons: Names that its readings tell; those of bumpers are `bumper_1` (in front) and `bumper_2` (behind).
         has_imu: Whether its readings tell accelerations and turn rates.
         needs_turtlebot3: Whether its argument `robot` is a `devices.robots.Robot`, whose motors or board it drives;
             else it is a `devices.robots.Body`, and the robot may be any.
+        turn_s: How long a turn of a range scanner takes; None: that is not known.
     """
 
     buttons: tuple[str, ...] = ()
     has_imu: bool = False
     needs_turtlebot3: bool = False
+    turn_s: float | None = None
 
     @property
     def has_bumpers(self) -> bool:
@@ -61,7 +63,7 @@ class Driver:
         description: One line for a person.
         make: Makes one, without opening anything. Its arguments are `path`, of a drive base `robot`, and the options of
             the configuration, which are the driver's own.
-        facts: Of a drive base; None: it does not say, and whatever a configuration ties is taken to be there.
+        facts: None: it does not say, and whatever a configuration ties is taken to be there.
     """
 
     kind: Kind
@@ -94,7 +96,7 @@ _BUILT_IN: dict[Kind, dict[str, tuple[str, str, Facts | None]]] = {
         ),
         "mavlink-rover": (
             "a MAVLink rover: ArduPilot Rover, driven in its mode GUIDED over a serial line, UDP or TCP",
-            "robosc_bridge.devices.mavlink_rover:MavlinkRover",
+            "robosc_bridge.devices.mavlink_drivers:make_rover",
             Facts(has_imu=True),
         ),
         "opencr": (
@@ -107,21 +109,21 @@ _BUILT_IN: dict[Kind, dict[str, tuple[str, str, Facts | None]]] = {
         "lds01": (
             "the LiDAR LDS-01 (HLS-LFCD2): 0.12 to 3.5 m, 5 turns a second",
             "robosc_bridge.devices.lidar:make_lds01",
-            None,
+            Facts(turn_s=0.2),
         ),
         "lds02": (
             "the LiDAR LDS-02 (LD08): 0.16 to 8 m, 6 turns a second",
             "robosc_bridge.devices.lidar:make_lds02",
-            None,
+            Facts(turn_s=1 / 6),
         ),
         "lds03": (
             "the LiDAR LDS-03 (COIN-D4): 0.05 to 12 m, 10 turns a second",
             "robosc_bridge.devices.lidar:make_lds03",
-            None,
+            Facts(turn_s=0.1),
         ),
         "mavlink-rover": (
             "the obstacles that a MAVLink rover tells of, also on the line of its drive base",
-            "robosc_bridge.devices.mavlink_obstacles:MavlinkObstacles",
+            "robosc_bridge.devices.mavlink_drivers:make_obstacles",
             None,
         ),
     },
@@ -153,12 +155,12 @@ def available_drivers(kind: Kind) -> tuple[DriverInfo, ...]:
     return tuple(infos[name] for name in sorted(infos))
 
 
-def facts_of(name: str) -> Facts | None:
-    """What a drive base has; None: its driver does not say, or there is none of that name, which is told elsewhere."""
-    if (Kind.DRIVE_BASE, name) not in _registered and name in _BUILT_IN[Kind.DRIVE_BASE]:
-        return _BUILT_IN[Kind.DRIVE_BASE][name][2]
+def facts_of(name: str, kind: Kind = Kind.DRIVE_BASE) -> Facts | None:
+    """What a device has; None: its driver does not say, or there is none of that name, which is told elsewhere."""
+    if (kind, name) not in _registered and name in _BUILT_IN[kind]:
+        return _BUILT_IN[kind][name][2]
     try:
-        return find_driver(Kind.DRIVE_BASE, name).facts
+        return find_driver(kind, name).facts
     except UnknownDriverError:
         return None
 

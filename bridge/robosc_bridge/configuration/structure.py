@@ -44,7 +44,7 @@ class Drive(_Section, frozen=True):
     driver: Annotated[_Name, Meta(description="`opencr`, `dynamixel`, `mavlink-rover`, or one of a plug-in.")]
     port: Annotated[_Text, Meta(description="Serial port, best by a stable name below /dev/serial/by-id.")]
     options: Annotated[
-        dict[_OptionName, _Option | tuple[_Option, ...]], Meta(description="Further arguments of the driver.")
+        dict[_OptionName, _Option | tuple[_Option, ...]], Meta(description="Of the driver: see docs/bridge-drivers.md.")
     ] = {}
 
 
@@ -54,7 +54,7 @@ class Scanner(_Section, frozen=True):
     driver: Annotated[_Name, Meta(description="`lds01`, `lds02`, `lds03`, or one of a plug-in.")]
     port: Annotated[_Text, Meta(description="Serial port, best by a stable name below /dev/serial/by-id.")]
     options: Annotated[
-        dict[_OptionName, _Option | tuple[_Option, ...]], Meta(description="Further arguments of the driver.")
+        dict[_OptionName, _Option | tuple[_Option, ...]], Meta(description="Of the driver: see docs/bridge-drivers.md.")
     ] = {}
 
 

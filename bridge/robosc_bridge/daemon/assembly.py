@@ -29,10 +29,12 @@ from robosc_bridge.daemon.sight import camera_worker, needs_camera, sight_proble
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
 from robosc_bridge.devices.interface import DriveBase, RangeScanner, Velocity
+from robosc_bridge.devices.options import checked_options
 from robosc_bridge.devices.registry import make_drive_base, make_range_scanner
 from robosc_bridge.devices.robots import ROBOTS, Body, Robot
-from robosc_bridge.drivers import facts_of
+from robosc_bridge.drivers import Kind, facts_of, find_driver
 from robosc_bridge.errors import BridgeError
+from robosc_bridge.protocol.mavlink_signing import SigningError
 from robosc_bridge.remote import settings_of
 from robosc_bridge.safety import SafetyLayer, SafetyLimits
 from robosc_bridge.skills import EmergencyStop, Rotate
@@ -117,7 +119,11 @@ def check_settings(configuration: Configuration, ties: Ties, deployment: Deploym
     if configuration.scanner is not None:
         range_scanner(configuration.scanner)
     settings = ties.settings(configuration.execution)
-    problems = [*file_problems(configuration, fastest), *sight_problems(configuration.skills.line, ties, settings)]
+    problems = [
+        *file_problems(configuration, fastest),
+        *sight_problems(configuration.skills.line, ties, settings),
+        *_scan_problems(configuration),
+    ]
     if problems:
         raise AssemblyError("; ".join(problems))
     kept = ties.never_released(settings) if deployment is Deployment.LAYER else ()
@@ -130,6 +136,15 @@ def check_settings(configuration: Configuration, ties: Ties, deployment: Deploym
     except SettingsError as error:
         raise AssemblyError(f"execution: {error}") from error
     return settings
+
+
+def _scan_problems(configuration: Configuration) -> list[str]:
+    """A time within which no turn can be complete would stop the robot for ever."""
+    scanner, timeout_s = configuration.scanner, configuration.safety.scan_timeout_s
+    facts = None if scanner is None else facts_of(scanner.driver, Kind.RANGE_SCANNER)
+    if facts is None or facts.turn_s is None or timeout_s > facts.turn_s:
+        return []
+    return [f"safety.scan_timeout_s: a turn of the LiDAR takes {facts.turn_s:g} s, so it must be longer than that"]
 
 
 def _robot(configuration: Configuration) -> Robot | Body:
@@ -149,17 +164,21 @@ def drive_base(configuration: Configuration) -> DriveBase:
         AssemblyError: It takes no such option.
     """
     drive = configuration.drive
+    driver = find_driver(Kind.DRIVE_BASE, drive.driver)
     try:
-        return make_drive_base(drive.driver, **{"path": drive.port, "robot": _robot(configuration), **drive.options})
-    except (TypeError, ValueError) as error:
+        options = checked_options(driver, drive.options)
+        return make_drive_base(drive.driver, path=drive.port, robot=_robot(configuration), **options)
+    except (SigningError, TypeError, ValueError) as error:
         raise AssemblyError(f"driver '{drive.driver}': {error}") from error
 
 
 def range_scanner(scanner: Scanner) -> RangeScanner:
     """The LiDAR, not opened yet; raises as `drive_base`."""
+    driver = find_driver(Kind.RANGE_SCANNER, scanner.driver)
     try:
-        return make_range_scanner(scanner.driver, **{"path": scanner.port, **scanner.options})
-    except (TypeError, ValueError) as error:
+        options = checked_options(driver, scanner.options)
+        return make_range_scanner(scanner.driver, path=scanner.port, **options)
+    except (SigningError, TypeError, ValueError) as error:
         raise AssemblyError(f"driver '{scanner.driver}': {error}") from error
 
 

@@ -1,5 +1,6 @@
 """What is refused before anything is opened, and how the parts start and stop together."""
 
+import re
 import sys
 import threading
 from pathlib import Path
@@ -222,6 +223,28 @@ def test_a_face_that_may_not_listen_so_is_refused_before_anything_is_made(
     remote: str, why: str, supervisor: Supervisor
 ) -> None:
     configuration = parse(f"{CONFIGURATION}\nremote: {remote}\n".encode(), "test.yaml").configuration
+    with pytest.raises(AssemblyError) as raised:
+        check_settings(configuration, tie(supervisor.model, configuration), supervisor.deployment)
+    assert why in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("scanner", "why"),
+    [
+        (
+            "lds01, port: /dev/scanner}\nsafety: {scan_timeout_s: 0.2",
+            "safety.scan_timeout_s: a turn of the LiDAR takes 0.2",
+        ),
+        (
+            "lds03, port: /dev/scanner, options: {front_rad: left}",
+            "driver 'lds03': option 'front_rad': Expected `float`",
+        ),
+        ("lds03, port: /dev/scanner, options: {front: 1}", "driver 'lds03': there is no option 'front'; there is baud"),
+    ],
+)
+def test_a_scanner_that_cannot_be_so_is_refused(scanner: str, why: str, supervisor: Supervisor) -> None:
+    text = re.sub(r"^scanner: .*$", f"scanner: {{driver: {scanner}}}", CONFIGURATION, flags=re.MULTILINE)
+    configuration = parse(text.encode(), "test.yaml").configuration
     with pytest.raises(AssemblyError) as raised:
         check_settings(configuration, tie(supervisor.model, configuration), supervisor.deployment)
     assert why in str(raised.value)

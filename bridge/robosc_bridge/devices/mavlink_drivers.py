@@ -1,0 +1,84 @@
+"""The drivers named `mavlink-rover`, with options as a file can say them."""
+
+from pathlib import Path
+
+from robosc_bridge.devices.mavlink_link import BAUD
+from robosc_bridge.devices.mavlink_obstacles import MavlinkObstacles
+from robosc_bridge.devices.mavlink_rover import MavlinkRover
+from robosc_bridge.devices.robots import Body
+from robosc_bridge.protocol.mavlink_signing import Signing
+
+
+def make_rover(
+    path: str,
+    robot: Body,
+    baud: int = BAUD,
+    *,
+    system: int | None = None,
+    own_system: int = 255,
+    own_component: int = 190,
+    signing_key: str | None = None,
+    signing_link: int = 0,
+    motion_limit_s: float = 1.0,
+    telemetry_s: float = 0.05,
+) -> MavlinkRover:
+    """A drive base.
+
+    Args:
+        path: As of `MavlinkRover`, and so are the others that are not told here.
+        robot: What it can do.
+        baud: Of a serial port.
+        system: Of the vehicle; None: the first rover that is heard.
+        own_system: Ours.
+        own_component: Ours.
+        signing_key: File with the key of signing; None: nothing is signed.
+        signing_link: Number of the signed stream.
+        motion_limit_s: For how long the vehicle's last estimate of its motion holds.
+        telemetry_s: How often it is asked to tell its motion.
+
+    Raises:
+        SigningError: There is no key in that file.
+        ValueError: An argument is out of its range.
+    """
+    return MavlinkRover(
+        path,
+        robot,
+        baud,
+        system=system,
+        own_system=own_system,
+        own_component=own_component,
+        signing=_signing(signing_key, signing_link),
+        motion_limit_s=motion_limit_s,
+        telemetry_s=telemetry_s,
+    )
+
+
+def make_obstacles(
+    path: str,
+    baud: int = BAUD,
+    *,
+    system: int | None = None,
+    own_system: int = 255,
+    own_component: int = 190,
+    signing_key: str | None = None,
+    signing_link: int = 0,
+) -> MavlinkObstacles:
+    """A range scanner; arguments and errors are those of `make_rover`."""
+    return MavlinkObstacles(
+        path,
+        baud,
+        system=system,
+        own_system=own_system,
+        own_component=own_component,
+        signing=_signing(signing_key, signing_link),
+    )
+
+
+def _signing(key_file: str | None, link: int) -> Signing | None:
+    if not 0 <= link <= 255:
+        raise ValueError(f"signing_link must be from 0 to 255, not {link}")
+    if key_file is None:
+        return None
+    signing = Signing(Path(key_file), link)
+    signing.check()
+    return signing

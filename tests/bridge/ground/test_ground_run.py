@@ -24,6 +24,31 @@ from support.models import EXAMPLES
 
 MODEL = EXAMPLES / "maze_solver" / "maze_solver.rscd"
 START_LIMIT_S, LIMIT_S = 90.0, 30.0
+HELD_BACK = "Held back: /cmd_vel: not allowed now"
+
+LAYER = """
+robot Careful {
+    interface twist use Twist from geometry_msgs
+    interface laser_scan use LaserScan from sensor_msgs
+    datatype object Vector { x: double z: double }
+    datatype object Twist { linear: Vector angular: Vector }
+    datatype object Scan { ranges: array(double) }
+    datatype enum Clearance from Scan to { value.ranges[0] > 0.6 -> clear default -> obstructed }
+    component Laser {
+        outgoing message scan with identifier: "/scan", type: Clearance links laser_scan
+        behaviour {
+            variable ahead: Clearance = obstructed
+            on response from scan do ahead := value
+            initial marked state seeing {}
+        }
+    }
+    component Wheels {
+        incoming message move with identifier: "/cmd_vel", type: Twist links twist
+        behaviour { initial marked state ready { on request to move } }
+    }
+    requirement move needs Laser.ahead = clear
+}
+"""
 
 
 class Station:
@@ -62,13 +87,25 @@ class Station:
         )
         return int(ack.result)
 
+    def velocity(self, speed_m_s: float) -> None:
+        """One set-point: forward."""
+        self.line.mav.set_position_target_local_ned_send(0, 1, 1, 8, 0x05E7, 0, 0, 0, speed_m_s, 0, 0, 0, 0, 0, 0, 0)
+
+    def asking_for(self, speed_m_s: float, is_so: Callable[[], bool], what: str) -> None:
+        """Send set-points until something is so."""
+        end_s = time.monotonic() + LIMIT_S
+        while not is_so():
+            assert time.monotonic() < end_s, f"waited in vain for {what}; heard {joined_texts(self.heard)}"
+            self.velocity(speed_m_s)
+            self.until(lambda _: True, "anything")
+
 
 def _armed(beat: Any) -> bool:
     return bool(beat.base_mode & 128)
 
 
-def _configured(folder: Path, robot: SimulatedTurtleBot3, remote: str) -> Path:
-    command = [sys.executable, "-m", "robosc_bridge.main", "init", "--model", str(MODEL), "--scanner", "lds01"]
+def _configured(folder: Path, robot: SimulatedTurtleBot3, remote: str, model: Path = MODEL) -> Path:
+    command = [sys.executable, "-m", "robosc_bridge.main", "init", "--model", str(model), "--scanner", "lds01"]
     made = subprocess.run(command, capture_output=True, text=True, check=True)
     ports = iter((robot.base_path, robot.scanner_path))
     text = re.sub(r"^  port: .*$", lambda _: f"  port: {next(ports)}", made.stdout, flags=re.MULTILINE)
@@ -82,16 +119,20 @@ def _configured(folder: Path, robot: SimulatedTurtleBot3, remote: str) -> Path:
 
 
 @contextmanager
-def _running(folder: Path, robot: SimulatedTurtleBot3, remote: str) -> Iterator[subprocess.Popen[str]]:
-    file = _configured(folder, robot, remote)
+def _running(
+    folder: Path, robot: SimulatedTurtleBot3, remote: str, model: Path = MODEL, deployment: str = "controller"
+) -> Iterator[subprocess.Popen[str]]:
+    file = _configured(folder, robot, remote, model)
     command = [
         sys.executable,
         "-m",
         "robosc_bridge.main",
         "run",
         "--standby",
+        "--deployment",
+        deployment,
         "--model",
-        str(MODEL),
+        str(model),
         "--config",
         str(file),
     ]
@@ -171,6 +212,36 @@ def test_a_ground_station_starts_holds_and_stops_the_robot(tmp_path: Path, stati
     names = {item.name for item in there.heard if item.get_type() == "NAMED_VALUE_INT"}
     assert {"sup_state", "blocked"} < names
     assert not [item for item in there.heard if item.get_type() == "BAD_DATA"]
+
+
+def test_set_points_move_the_wheels_as_far_as_the_layer_lets_them(tmp_path: Path, station: tuple[Station, str]) -> None:
+    there, remote = station
+    model = tmp_path / "careful.rscd"
+    model.write_text(LAYER)
+    with (
+        SimulatedTurtleBot3("burger", "opencr", "lds01") as robot,
+        _running(tmp_path, robot, remote, model, "layer") as process,
+    ):
+        there.beat("standby", lambda beat: beat.system_status == 3, START_LIMIT_S)
+        # What is asked for before it is armed comes to nothing.
+        there.velocity(0.1)
+        assert there.command(400, 1.0) == 0
+        there.beat("arming", _armed)
+        assert _speeds(robot) == (0.0, 0.0)
+        there.asking_for(0.1, lambda: min(_speeds(robot)) > 0.0, "motion")
+        # Where the layer says no, the wheels stop although the set-points go on.
+        told = joined_texts(there.heard).count(HELD_BACK)
+        robot.world.place(1.5, 0.0, 0.0)
+        there.asking_for(0.1, lambda: _speeds(robot) == (0.0, 0.0), "standstill before a wall")
+        there.asking_for(0.1, lambda: joined_texts(there.heard).count(HELD_BACK) > told, "the refusal in words")
+        robot.world.place(0.0, 0.0, 0.0)
+        there.asking_for(0.1, lambda: min(_speeds(robot)) > 0.0, "motion")
+        # A station that falls silent leaves a robot that stands.
+        _wait(lambda: _speeds(robot) == (0.0, 0.0), "standstill", 5.0)
+        process.send_signal(signal.SIGTERM)
+        _, errors = process.communicate(timeout=LIMIT_S)
+        assert process.returncode == 0, errors
+        assert "Traceback" not in errors
 
 
 def test_an_address_that_cannot_be_is_told_by_check_and_run(tmp_path: Path) -> None:

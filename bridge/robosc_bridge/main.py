@@ -11,6 +11,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import get_args
 
+import msgspec
+
 from robosc._version import __version__
 from robosc.errors import LanguageError, RoboscError
 from robosc.execution.event_log import EventLog, NullLog, open_event_log
@@ -38,6 +40,7 @@ from robosc_bridge.daemon.supervisors import (
 from robosc_bridge.drivers import Kind, available_drivers
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.terminal.commands import add_commands
+from robosc_bridge.view.settings import ADDRESS as VIEW_ADDRESS
 
 OK, FAULT, WRONG_USE = 0, 1, 2
 
@@ -82,6 +85,14 @@ def _parser() -> argparse.ArgumentParser:
     )
     run.add_argument(
         "--standby", action="store_true", help="wait for an operator to start it; needs a remote face (section remote)"
+    )
+    run.add_argument(
+        "--view",
+        metavar="HOST:PORT",
+        nargs="?",
+        const=VIEW_ADDRESS,
+        help="serve the live view, a web page (default: view.address of the configuration; without a value "
+        f"{VIEW_ADDRESS})",
     )
     run.add_argument("--verbose", action="store_true", help="tell more")
     run.set_defaults(run=_run)
@@ -191,6 +202,9 @@ def _run(arguments: argparse.Namespace) -> int:
     tell = logging.getLogger("robosc_bridge").info
     loaded = load(arguments.config)
     configuration = loaded.configuration
+    if arguments.view is not None:
+        view = msgspec.structs.replace(configuration.view, address=arguments.view)
+        configuration = msgspec.structs.replace(configuration, view=view)
     server = arguments.server or configuration.supervisor.server
     deployment = arguments.deployment or deployment_of(arguments.model)
     trusted = trusted_keys(configuration.supervisor.trusted_keys)

@@ -9,11 +9,11 @@ from robosc.automata.structure import System
 from robosc.explanation.analysis import Hindrance, HindranceKind
 from robosc.explanation.obstacles import Obstacle, ObstacleKind
 from robosc.explanation.structure import Part, StateValues
-from robosc.explanation.words import value_text
+from robosc.explanation.words import requirement_text, value_text
 from robosc.expressions import TRUE, Expression, Value, type_text
 from robosc.expressions.text import automaton_text, expression_text
 from robosc.model.places import Places
-from robosc.model.structure import CommunicationKind, Model, RequirementForm
+from robosc.model.structure import CommunicationKind, Model
 from robosc.source import Location
 
 MAXIMUM_TEXT = 300
@@ -91,7 +91,9 @@ class Terms:
     def _described(self, item: Obstacle) -> tuple[str, Location]:
         if item.kind is ObstacleKind.REQUIREMENT:
             number = self._requirements[item]
-            return self._requirement(number), self._places.requirements[number]
+            return requirement_text(self._model.requirements[number], self._components), self._places.requirements[
+                number
+            ]
         if item.invariants:
             (place,) = item.invariants
             invariant = self._model.invariants[place]
@@ -107,15 +109,6 @@ class Terms:
             text = f"the range of {item.range}: {type_text(subject_type(self._system, item.range))}"
             return text, self._places.variables[component, variable]
         return self._marking(str(item.marking))
-
-    def _requirement(self, number: int) -> str:
-        item = self._model.requirements[number]
-        names = item.communications
-        shown = names[0] if len(names) == 1 else f"{{{', '.join(names)}}}"
-        expression = self._text(item.expression)
-        if item.form is RequirementForm.NEEDS:
-            return f"requirement {shown} needs {expression}"
-        return f"requirement {expression} disables {shown}"
 
     def _marking(self, automaton: str) -> tuple[str, Location]:
         if automaton in self._plants:

@@ -9,6 +9,8 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from robosc.execution.event_log import Entry
 from robosc.model import check
+from robosc.model.structure import Deployment
+from robosc.supervisor import Supervisor
 from robosc_bridge.configuration import parse, tie
 from robosc_bridge.daemon.feed import Feed, Snapshot
 from robosc_bridge.daemon.operations import Operations
@@ -17,6 +19,7 @@ from robosc_bridge.daemon.reports import Device
 from robosc_bridge.daemon.states import Command, Order, State
 from robosc_bridge.devices.interface import BINS, DriveReading, Pose, RawScan, Scan, Velocity
 from support.models import bundle_of
+from support.random_supervisors import CERTIFICATE
 
 MODEL = """
 robot Carrier {
@@ -110,8 +113,10 @@ class PlayedDaemon:
         self.feed = Feed()
         configuration = parse(self.configuration.encode(), "test.yaml").configuration
         ties = tie(checked.model, configuration)
+        deployment = Deployment.LAYER if self.is_layer else Deployment.CONTROLLER
+        supervisor = Supervisor(checked.model, deployment, (), CERTIFICATE)
         self.operations = Operations(
-            checked.model, ties, self.feed, self._post, self._operator_seen, is_layer=self.is_layer
+            supervisor, ties, self.feed, self._post, self._operator_seen, is_layer=self.is_layer
         )
         self.snapshot = STANDBY
         self.show()

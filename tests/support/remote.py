@@ -11,7 +11,8 @@ from typing import Any
 import grpc
 
 from robosc.model import check
-from robosc.model.structure import Model
+from robosc.model.structure import Deployment, Model
+from robosc.supervisor import Supervisor
 from robosc_api.security import Credentials, open_channel
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_api.v1 import bridge_pb2_grpc
@@ -25,6 +26,7 @@ from robosc_bridge.devices.interface import BINS, DriveReading, MotorFault, Pose
 from robosc_bridge.remote import RemoteFace, RemoteSettings, serve
 from robosc_bridge.safety import Caution, Reason
 from support.models import bundle_of
+from support.random_supervisors import CERTIFICATE
 
 PATIENCE_S = 30.0
 
@@ -125,7 +127,8 @@ class FakeDaemon:
         loaded = parse(CONFIGURATION, "test.yaml")
         self.feed = Feed()
         ties = tie(checked, loaded.configuration, loaded.document)
-        self.operations = Operations(checked, ties, self.feed, self._post, self._see, is_layer=is_layer)
+        supervisor = Supervisor(checked, Deployment.LAYER if is_layer else Deployment.CONTROLLER, (), CERTIFICATE)
+        self.operations = Operations(supervisor, ties, self.feed, self._post, self._see, is_layer=is_layer)
         self.seen = 0
         self.refusal: str | None = ""
         self.orders: list[Order] = []

@@ -97,5 +97,9 @@ def _idle(configuration: Configuration) -> Iterator[tuple[Path, str]]:
         for name in names:
             if getattr(remote, needed) is None and getattr(remote, name) != getattr(plain, name):
                 yield ("remote", name), f"means nothing without '{needed}'"
+    view = configuration.view
+    if (view.tls_certificate is None) != (view.tls_key is None):
+        missing = "tls_key" if view.tls_key is None else "tls_certificate"
+        yield ("view",), f"a certificate and its key belong together: '{missing}' is missing"
     if configuration.safety.stops_when_blind and configuration.scanner is None:
         yield ("safety", "stops_when_blind"), "means nothing without the section 'scanner'"

@@ -208,6 +208,26 @@ class Remote(_Section, frozen=True):
     ] = 0.1
 
 
+class View(_Section, frozen=True):
+    """The live view: a web page that shows what the robot does."""
+
+    address: Annotated[
+        _Address | None,
+        Meta(description="HOST:PORT to serve the page on, such as 127.0.0.1:8066; null: none."),
+    ] = None
+    names: Annotated[
+        tuple[_Name, ...],
+        Meta(max_length=20, description="Further names by which browsers reach it, beside its address and localhost."),
+    ] = ()
+    tls_certificate: Annotated[
+        _Text | None, Meta(description="File with its certificate chain (PEM); null: no TLS, loopback alone.")
+    ] = None
+    tls_key: Annotated[_Text | None, Meta(description="File with its private key (PEM).")] = None
+    insecure_beyond_loopback: Annotated[
+        bool, Meta(description="Serve it without TLS where other machines reach it, on a network that is trusted.")
+    ] = False
+
+
 class SupervisorSource(_Section, frozen=True):
     """Where the supervisor comes from, besides the file on the command line."""
 
@@ -250,6 +270,7 @@ class Configuration(_Section, frozen=True):
     safety: Annotated[Safety, Meta(description="Limits of the safety layer.")] = Safety()
     skills: Annotated[Skills, Meta(description="Settings of the skills.")] = Skills()
     remote: Annotated[Remote, Meta(description="How the bridge is reached and watched.")] = Remote()
+    view: Annotated[View, Meta(description="The live view, a web page.")] = View()
     supervisor: Annotated[SupervisorSource, Meta(description="Where the supervisor comes from.")] = SupervisorSource()
     log: Annotated[Log, Meta(description="What is written down.")] = Log()
     channels: Annotated[

@@ -19,7 +19,7 @@ from robosc_bridge.configuration.channels import GrpcChannel
 from robosc_bridge.configuration.structure import Configuration, Scanner
 from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.device_thread import DeviceThread
-from robosc_bridge.daemon.faces import Face, Living, is_remote
+from robosc_bridge.daemon.faces import Face, Living, is_remote, is_startable
 from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.files import file_problems
 from robosc_bridge.daemon.jobs import Job
@@ -38,6 +38,7 @@ from robosc_bridge.protocol.mavlink_signing import SigningError
 from robosc_bridge.remote import settings_of
 from robosc_bridge.safety import SafetyLayer, SafetyLimits
 from robosc_bridge.skills import EmergencyStop, Rotate
+from robosc_bridge.view import settings_of as view_settings
 
 EXCHANGE_S = 0.02
 """Time between exchanges with the drive base: what OpenCR refreshes its registers at."""
@@ -246,6 +247,12 @@ def _require_faces(configuration: Configuration, ties: Ties) -> None:
             check_listening(face.address, face.security)
         except (SecurityError, ValueError) as error:
             raise AssemblyError(f"remote: {error}") from error
+    page = view_settings(configuration)
+    if page is not None:
+        try:
+            check_listening(page.address, page.security)
+        except (SecurityError, ValueError) as error:
+            raise AssemblyError(f"view: {error}") from error
 
 
 def assemble(
@@ -272,8 +279,9 @@ def assemble(
         UnknownDriverError: There is no such driver.
     """
     settings = check_settings(configuration, ties, deployment)
-    if not starts_itself and not is_remote(configuration):
-        raise AssemblyError("to wait in standby, the bridge needs 'remote.grpc_address' or 'remote.mavlink_url'")
+    if not starts_itself and not is_startable(configuration):
+        needed = "'remote.grpc_address', 'remote.mavlink_url' or 'view.address'"
+        raise AssemblyError(f"to wait in standby, the bridge needs {needed}")
     clock = SystemClock()
     limits = safety_limits(configuration)
     safety = SafetyLayer(limits)
@@ -286,7 +294,7 @@ def assemble(
         needs_scanner=configuration.scanner is not None,
         needs_camera=needs_camera(ties),
         starts_itself=starts_itself,
-        stays_after_fault=is_remote(configuration),
+        stays_after_fault=is_startable(configuration),
         is_layer=is_layer,
     )
     rotate = configuration.skills.rotate
@@ -321,6 +329,6 @@ def assemble(
     living = Living(threads)
     daemon.connect(drive.hurry, worker.reset, living.are_alive)
     operations = Operations(
-        supervisor.model, ties, feed, daemon.post, lambda: safety.operator_seen(clock.monotonic()), is_layer=is_layer
+        supervisor, ties, feed, daemon.post, lambda: safety.operator_seen(clock.monotonic()), is_layer=is_layer
     )
     return Machine(daemon, drive, scanner, camera, operations, living)

@@ -9,9 +9,12 @@ from robosc.execution.executor import Executor
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.layer import Layer
 from robosc.execution.protocol import requesting
+from robosc.model.structure import CommunicationKind
 from robosc_bridge.daemon.jobs import Job
 from robosc_bridge.daemon.requesters import Requesters
 from robosc_bridge.daemon.robot import Robot
+
+_CALLED = (str(CommunicationKind.SERVICE), str(CommunicationKind.ACTION))
 
 
 class Execution:
@@ -49,6 +52,7 @@ class Execution:
         # Once now, so that what cannot be executed is found at the start of the program.
         _, system = self._made()
         self._names = tuple(info.name for info in requesting(system.description.communications))
+        self._called = tuple(info.name for info in system.description.communications if info.kind in _CALLED)
 
     @property
     def layer(self) -> Layer | None:
@@ -110,3 +114,7 @@ class Execution:
     def enabled(self) -> tuple[str, ...]:
         """Names of the requests that are allowed now, in the model's order."""
         return () if self._system is None else tuple(self._names[number] for number in self._system.enabled_requests())
+
+    def communications(self) -> Mapping[str, str]:
+        """Location of each service and action; empty: nothing is executed."""
+        return {} if self._system is None else {name: self._system.location(name) for name in self._called}

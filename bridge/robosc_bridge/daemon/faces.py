@@ -11,6 +11,8 @@ from robosc_bridge.devices.interface import Velocity
 from robosc_bridge.ground import GroundLink, ground_settings
 from robosc_bridge.remote import RemoteFace, settings_of
 from robosc_bridge.safety import SafetyLimits
+from robosc_bridge.view import ViewFace
+from robosc_bridge.view import settings_of as view_settings
 
 _log = logging.getLogger(__name__)
 
@@ -64,8 +66,13 @@ class Living:
 
 
 def is_remote(configuration: Configuration) -> bool:
-    """Whether a remote face is configured, through which somebody can start the robot, and start it again."""
+    """Whether a remote face is configured, through which programs and operators reach the robot all the time."""
     return configuration.remote.grpc_address is not None or configuration.remote.mavlink_url is not None
+
+
+def is_startable(configuration: Configuration) -> bool:
+    """Whether somebody can start the robot through a face, and start it again."""
+    return is_remote(configuration) or configuration.view.address is not None
 
 
 def make_faces(configuration: Configuration, operations: Operations, limits: SafetyLimits) -> tuple[Face, ...]:
@@ -81,4 +88,7 @@ def make_faces(configuration: Configuration, operations: Operations, limits: Saf
     ground = ground_settings(configuration, Velocity(limits.linear_m_s, limits.angular_rad_s))
     if ground is not None:
         faces.append(GroundLink(operations, ground))
+    page = view_settings(configuration)
+    if page is not None:
+        faces.append(ViewFace(operations, page))
     return tuple(faces)

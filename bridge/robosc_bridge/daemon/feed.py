@@ -7,7 +7,7 @@ slowly loses entries and is told how many, never the latest snapshot.
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from robosc.execution.event_log import Entry, EventLog
@@ -39,6 +39,7 @@ class Snapshot:
         reading: What the drive base told last; None: nothing yet, or it is lost.
         scan: The LiDAR's last full turn; None: the same.
         overruns: How many decisions were left out because the one before took too long.
+        communications: Location of each service and action, by name; empty: nothing is executed.
     """
 
     number: int
@@ -54,6 +55,7 @@ class Snapshot:
     reading: DriveReading | None
     scan: Scan | None
     overruns: int
+    communications: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

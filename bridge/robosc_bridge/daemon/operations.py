@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from typing import Protocol
 
-from robosc.model.structure import Model
+from robosc.supervisor import Supervisor
 from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.programs import FromProgram
@@ -25,7 +25,7 @@ class Operations:
     """The daemon as remote faces see it.
 
     Args:
-        model: What is executed.
+        supervisor: What is executed.
         ties: What its communications are tied to.
         is_layer: Whether the supervisor is a supervision layer.
         feed: What the daemon shows.
@@ -33,7 +33,8 @@ class Operations:
         operator_seen: Tells the safety layer that the operator is there.
 
     Attributes:
-        model: What is executed.
+        supervisor: What is executed.
+        model: Its model.
         ties: What its communications are tied to.
         is_layer: Whether the supervisor is a supervision layer.
         feed: What the daemon shows.
@@ -41,7 +42,7 @@ class Operations:
 
     def __init__(
         self,
-        model: Model,
+        supervisor: Supervisor,
         ties: Ties,
         feed: Feed,
         post: Inbox,
@@ -49,7 +50,8 @@ class Operations:
         *,
         is_layer: bool,
     ) -> None:
-        self.model = model
+        self.supervisor = supervisor
+        self.model = supervisor.model
         self.ties = ties
         self.is_layer = is_layer
         self.feed = feed

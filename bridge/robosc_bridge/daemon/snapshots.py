@@ -32,6 +32,9 @@ class Shown(Protocol):
     def enabled(self) -> tuple[str, ...]:
         """The requests that are allowed now."""
 
+    def communications(self) -> Mapping[str, str]:
+        """Location of each service and action."""
+
 
 class Snapshots:
     """Makes snapshots, and only those that are worth it.
@@ -52,6 +55,7 @@ class Snapshots:
         self._changes = -1
         self._components: Mapping[str, Mapping[str, Any]] = {}
         self._enabled: tuple[str, ...] = ()
+        self._communications: Mapping[str, str] = {}
         self._shown: tuple[object, ...] = ()
         self._due_s = -1.0
 
@@ -67,7 +71,8 @@ class Snapshots:
             self._changes = changes
             self._components = self._execution.components()
             self._enabled = self._execution.enabled()
-        seen = (state, problem, notice, stops, self._readiness.devices, self._components)
+            self._communications = self._execution.communications()
+        seen = (state, problem, notice, stops, self._readiness.devices, self._components, self._communications)
         now_s = self._clock.monotonic()
         if seen == self._shown and now_s < self._due_s:
             return
@@ -91,5 +96,6 @@ class Snapshots:
                 self._readiness.reading,
                 self._readiness.scan,
                 self._execution.overruns,
+                self._communications,
             )
         )

@@ -1,0 +1,137 @@
+"""What a source tells, whatever it is: the robot, what it is doing, what happens. Plain values, ready for the page."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from robosc.execution.event_log import Entry
+
+
+class SourceKind(StrEnum):
+    """Where what is shown comes from."""
+
+    BRIDGE = "bridge"
+    ROS2 = "ros2"
+    LOG = "log"
+
+
+@dataclass(frozen=True, slots=True)
+class Talk:
+    """A communication of the model.
+
+    Attributes:
+        name: Its name.
+        component: Who declares it.
+        kind: `incoming message`, `outgoing message`, `service` or `action`.
+        identifier: Its topic, service or action.
+        channel: What it is tied to in a bridge; empty: nothing is known of that.
+    """
+
+    name: str
+    component: str
+    kind: str
+    identifier: str
+    channel: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class LogSpan:
+    """The log that is replayed.
+
+    Attributes:
+        begin_s: Time of its first entry, in seconds since 1970-01-01 UTC.
+        end_s: Time of its last one.
+        count: Its entries.
+    """
+
+    begin_s: float
+    end_s: float
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """Something that a person is told."""
+
+    code: str
+    text: str
+    holds_until_reset: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """What the drive base told.
+
+    Attributes:
+        pose: x and y in metres, heading in radians.
+        linear_m_s: Forward.
+        angular_rad_s: Counter-clockwise.
+        battery_v: None: not known.
+        is_torque_on: Whether the motors hold.
+    """
+
+    pose: tuple[float, float, float]
+    linear_m_s: float
+    angular_rad_s: float
+    battery_v: float | None
+    is_torque_on: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """What the robot is doing.
+
+    Attributes:
+        time_s: When that was so, in seconds since 1970-01-01 UTC.
+        state: What the bridge is doing; empty: there is none.
+        problem: The fault that has stopped it; empty: none.
+        reasons: Why nothing moves.
+        warnings: What a person should know though it does.
+        stops: Why nothing is requested.
+        devices: Whether each device works.
+        components: State and variables of each component with a behaviour; empty: nothing is executed.
+        communications: Location of services and actions, as far as they are known.
+        enabled: Names of the communications that may be requested, as the executor says; None: nobody says so.
+        drive: What the drive base told; None: nothing.
+        age_s: How old this was when it came.
+    """
+
+    time_s: float
+    state: str = ""
+    problem: str = ""
+    reasons: Sequence[Notice] = ()
+    warnings: Sequence[Notice] = ()
+    stops: Sequence[str] = ()
+    devices: Mapping[str, bool] = field(default_factory=dict)
+    components: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    communications: Mapping[str, str] = field(default_factory=dict)
+    enabled: Sequence[str] | None = None
+    drive: Drive | None = None
+    age_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class LaserScan:
+    """A turn of the LiDAR.
+
+    Attributes:
+        ranges_m: One a degree, counter-clockwise from the front; not finite: nothing was seen.
+        pose: Where the robot was; None: not known.
+    """
+
+    ranges_m: Sequence[float]
+    pose: tuple[float, float, float] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Happenings:
+    """Entries of the event log.
+
+    Attributes:
+        entries: In their order.
+        lost: How many before them were lost.
+    """
+
+    entries: Sequence[Entry]
+    lost: int = 0

@@ -1,0 +1,374 @@
+"""The server of the live view: the page's files over HTTP, and a WebSocket for each page that is open.
+
+It never trusts who connects: sizes, times, connections and requests are bounded, and what moves the robot needs the
+token of this start. A stop alone needs none, and waits for nobody: a reader that is slow is sent less, and heard all
+the same.
+"""
+
+import asyncio
+import contextlib
+import logging
+import os
+import ssl
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from aiohttp import WSCloseCode, WSMsgType, web
+
+from robosc_api.security import SecurityError, ServerSecurity, check_files, check_listening, joined
+from robosc_api.security.addresses import split
+from robosc_bridge.daemon.states import Command
+from robosc_bridge.view.access import Access
+from robosc_bridge.view.definition import Robot
+from robosc_bridge.view.hub import Hub, Studio, Viewer
+from robosc_bridge.view.page_files import PageFiles, read_page
+from robosc_bridge.view.requests import MAXIMUM_BYTES, Order, Stop, asked
+from robosc_bridge.view.settings import ViewSettings
+from robosc_bridge.view.sources import RefusedError, Source, ViewError
+from robosc_bridge.view.telling import done_text, refused_text
+
+_log = logging.getLogger(__name__)
+
+MAXIMUM_VIEWERS = 32
+"""Pages that are open at the same time."""
+
+MAXIMUM_CONNECTIONS = 128
+"""At the same time, those of pages among them."""
+
+MAXIMUM_WAITING = 4
+"""Commands of one page that wait for their answer; a stop waits for none."""
+
+REQUESTS_A_S, BURST = 20.0, 60
+"""Of one page, beside stops; one that sends more is cut off."""
+
+REQUEST_LIMIT_S = 10.0
+"""For a request to be sent, and for a WebSocket to be asked for."""
+
+SEND_LIMIT_S = 30.0
+"""A page that takes no byte for so long is cut off."""
+
+PING_S = 5.0
+"""A page that does not answer to a ping within half of it is gone."""
+
+BATCH_S = 0.02
+"""Least time between two batches of messages to a page."""
+
+HEADERS = {
+    "Content-Security-Policy": "default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; "
+    "object-src 'none'",
+    "Cache-Control": "no-store",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Permissions-Policy": "camera=(), geolocation=(), microphone=()",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+}
+
+_BACKLOG = 16
+_SWEEP_S = 1.0
+_CLOSE_LIMIT_S = 2.0
+
+_Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+class ViewServer:
+    """Serves one source; lives in one event loop.
+
+    Args:
+        settings: Where and how.
+        source: What is shown; called for each page where each has a replay of its own, else once.
+        is_shared: Whether all pages see the same.
+        robot: What will be shown, where that is known: laid out now, before anything moves.
+
+    Attributes:
+        address: `HOST:PORT` that it listens on; empty: it does not yet.
+        url: What to open in a browser, with the token.
+    """
+
+    def __init__(
+        self, settings: ViewSettings, source: Callable[[], Source], *, is_shared: bool, robot: Robot | None = None
+    ) -> None:
+        self.address = self.url = ""
+        self._settings = settings
+        self._source = source
+        self._studio = Studio(robot)
+        self._shared = Hub(source(), self._studio) if is_shared else None
+        self._hubs: set[Hub] = set()
+        self._page: PageFiles | None = None
+        self._access: Access | None = None
+        self._runner: web.AppRunner | None = None
+        self._server: asyncio.Server | None = None
+        self._sweep: asyncio.Task[None] | None = None
+        self._silent: dict[Any, float] = {}
+        self._viewers = 0
+        self._sockets: set[web.WebSocketResponse] = set()
+
+    async def start(self) -> None:
+        """Listen.
+
+        Raises:
+            ViewError: It cannot.
+        """
+        settings = self._settings
+        self._page = read_page()
+        try:
+            check_listening(settings.address, settings.security)
+            check_files(settings.security)
+            host, port = split(settings.address)
+        except (SecurityError, ValueError) as error:
+            raise ViewError(f"the live view: {error}") from error
+        context = tls_context(settings.security)
+        app = web.Application(middlewares=[self._guarded], client_max_size=MAXIMUM_BYTES)
+        app.router.add_get("/", self._index, allow_head=False)
+        app.router.add_get("/page/{name}", self._asset, allow_head=False)
+        app.router.add_get("/stream", self._stream, allow_head=False)
+        self._runner = web.AppRunner(app, access_log=None, handle_signals=False, keepalive_timeout=REQUEST_LIMIT_S)
+        await self._runner.setup()
+        loop = asyncio.get_running_loop()
+        try:
+            self._server = await loop.create_server(self._connected, host, port, ssl=context, backlog=_BACKLOG)
+        except OSError as error:
+            await self._runner.cleanup()
+            raise ViewError(f"the live view cannot listen on {settings.address}: {_os_text(error)}") from error
+        bound = self._server.sockets[0].getsockname()[1]
+        self._access = Access(host, bound, is_secure=context is not None, names=settings.names)
+        self.address = joined(host, bound)
+        self.url = self._access.address
+        self._sweep = asyncio.create_task(self._sweep_up())
+
+    async def stop(self) -> None:
+        """End every connection and give the port back."""
+        if self._sweep is not None:
+            self._sweep.cancel()
+        if self._server is not None:
+            self._server.close()
+        for hub in {*self._hubs, *([self._shared] if self._shared else [])}:
+            await hub.close()
+        closing = [socket.close(code=WSCloseCode.GOING_AWAY, message=b"the server ends") for socket in self._sockets]
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(_CLOSE_LIMIT_S):
+                await asyncio.gather(*closing, return_exceptions=True)
+        if self._runner is not None:
+            await self._runner.cleanup()
+
+    # Connections
+
+    def _connected(self) -> asyncio.Protocol:
+        """A protocol for one more connection, or one that ends it at once."""
+        assert self._runner is not None  # noqa: S101  # Nobody connects before `start`.
+        server = self._runner.server
+        if server is None or len(server.connections) >= MAXIMUM_CONNECTIONS:
+            return _Full()
+        handler = server()
+        self._silent[handler] = asyncio.get_running_loop().time() + REQUEST_LIMIT_S
+        return handler
+
+    async def _sweep_up(self) -> None:
+        """End connections on which nothing is asked for."""
+        loop = asyncio.get_running_loop()
+        while True:
+            await asyncio.sleep(_SWEEP_S)
+            for handler in [item for item, until_s in self._silent.items() if until_s < loop.time()]:
+                del self._silent[handler]
+                handler.force_close()
+                if handler.transport is not None:
+                    handler.transport.abort()
+
+    # Requests
+
+    @web.middleware
+    async def _guarded(self, request: web.Request, handler: _Handler) -> web.StreamResponse:
+        self._silent.pop(request.protocol, None)
+        try:
+            if self._access is None or not self._access.is_ours(request.headers.get("Host")):
+                raise web.HTTPMisdirectedRequest(text="this server is not reached by that name\n")
+            response = await handler(request)
+        except web.HTTPException as error:
+            response = error
+        if not response.prepared:
+            response.headers.update(HEADERS)
+            response.headers["Server"] = "RoboSC"
+            # One request a connection: none can be held without asking for something.
+            response.force_close()
+        if isinstance(response, web.HTTPException):
+            raise response
+        return response
+
+    async def _index(self, request: web.Request) -> web.StreamResponse:
+        assert self._page is not None and self._access is not None  # noqa: S101
+        shown = request.query.getall("token", [])
+        if shown and not (len(shown) == 1 and self._access.is_token(shown[0])):
+            text = "that is not the token of this start: open the address that the server has printed\n"
+            raise web.HTTPForbidden(text=text)
+        text = self._page.with_token(self._access.token) if shown else self._page.index
+        return web.Response(text=text, content_type="text/html")
+
+    async def _asset(self, request: web.Request) -> web.StreamResponse:
+        assert self._page is not None  # noqa: S101
+        found = self._page.assets.get(request.match_info["name"])
+        if found is None:
+            raise web.HTTPNotFound(text="there is no such file\n")
+        return web.Response(body=found[1], content_type=found[0], charset="utf-8")
+
+    async def _stream(self, request: web.Request) -> web.StreamResponse:
+        assert self._access is not None  # noqa: S101
+        if not self._access.is_own_page(request.headers.get("Origin"), request.headers.get("Host")):
+            raise web.HTTPForbidden(text="only a page of this server may open a stream\n")
+        if self._viewers >= MAXIMUM_VIEWERS:
+            raise web.HTTPServiceUnavailable(text=f"{MAXIMUM_VIEWERS} pages are open already\n")
+        self._viewers += 1
+        hub = self._shared or Hub(self._source(), self._studio)
+        self._hubs.add(hub)
+        try:
+            return await self._serve(request, hub)
+        finally:
+            self._viewers -= 1
+            if not hub.is_watched:
+                self._hubs.discard(hub)
+
+    async def _serve(self, request: web.Request, hub: Hub) -> web.StreamResponse:
+        page = web.WebSocketResponse(max_msg_size=MAXIMUM_BYTES, compress=False, heartbeat=PING_S, autoping=True)
+        page.headers.update(HEADERS)
+        await page.prepare(request)
+        self._sockets.add(page)
+        viewer = hub.join()
+        session = _Session(page, viewer, hub.source, self._access, str(request.remote))
+        writing = asyncio.create_task(_write(page, viewer))
+        try:
+            await session.read()
+        finally:
+            self._sockets.discard(page)
+            writing.cancel()
+            session.close()
+            await asyncio.gather(writing, return_exceptions=True)
+            await hub.leave(viewer)
+        return page
+
+
+class _Full(asyncio.Protocol):
+    """Ends a connection for which there is no place."""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        transport.abort()  # type: ignore[attr-defined]
+
+
+async def _write(page: web.WebSocketResponse, viewer: Viewer) -> None:
+    """Send what there is, as fast as the page reads."""
+    try:
+        while not page.closed:
+            for text in await viewer.take():
+                async with asyncio.timeout(SEND_LIMIT_S):
+                    await page.send_str(text)
+            await asyncio.sleep(BATCH_S)
+    except (ConnectionError, RuntimeError):
+        pass  # It has gone.
+    except TimeoutError:
+        transport = page._req.transport if page._req is not None else None
+        if transport is not None:
+            transport.abort()
+
+
+class _Session:
+    """What one page asks for."""
+
+    def __init__(
+        self, page: web.WebSocketResponse, viewer: Viewer, source: Source, access: Access | None, by: str
+    ) -> None:
+        self._page = page
+        self._viewer = viewer
+        self._source = source
+        self._access = access
+        self._by = f"live view at {by}"
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._left = float(BURST)
+        self._last_s = asyncio.get_running_loop().time()
+
+    async def read(self) -> None:
+        """Do what the page asks for, until it leaves."""
+        async for message in self._page:
+            if message.type is not WSMsgType.TEXT:
+                await self._page.close(code=WSCloseCode.UNSUPPORTED_DATA, message=b"only texts are understood")
+                return
+            if not self._take(message.data):
+                await self._page.close(code=WSCloseCode.POLICY_VIOLATION, message=b"too many requests")
+                return
+
+    def close(self) -> None:
+        """The page has left: commands that wait for an answer are taken back."""
+        for task in self._tasks:
+            task.cancel()
+
+    def _take(self, text: str) -> bool:
+        """Begin what is asked for; False: it asks for too much."""
+        try:
+            wanted = asked(text)
+        except RefusedError as error:
+            self._viewer.answer(refused_text("request", str(error)))
+            return self._is_in_time()
+        match wanted:
+            case Stop():
+                self._start(Command.STOP)
+                return self._is_in_time() or len(self._tasks) < BURST
+            case Order(command=command, token=token):
+                self._order(command, token)
+            case wish:
+                try:
+                    self._source.steer(wish)
+                except RefusedError as error:
+                    self._viewer.answer(refused_text(type(wish).__name__.lower(), str(error)))
+        return self._is_in_time()
+
+    def _order(self, command: Command, token: object) -> None:
+        if self._access is None or not self._access.is_token(token):
+            why = "this needs the token of this start: open the page by the address that the server has printed"
+        elif len(self._tasks) >= MAXIMUM_WAITING:
+            why = "other commands wait for their answer"
+        else:
+            self._start(command)
+            return
+        self._viewer.answer(refused_text(str(command), why))
+
+    def _start(self, command: Command) -> None:
+        task = asyncio.create_task(self._do(command))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _do(self, command: Command) -> None:
+        try:
+            await self._source.order(command, self._by)
+        except RefusedError as error:
+            self._viewer.answer(refused_text(str(command), str(error)))
+        except Exception as error:
+            _log.exception("%s wanted: %s", self._by, command)
+            self._viewer.answer(refused_text(str(command), f"it has failed: {type(error).__name__}"))
+        else:
+            self._viewer.answer(done_text(str(command)))
+
+    def _is_in_time(self) -> bool:
+        now_s = asyncio.get_running_loop().time()
+        self._left = min(self._left + (now_s - self._last_s) * REQUESTS_A_S, BURST) - 1.0
+        self._last_s = now_s
+        return self._left >= 0.0
+
+
+def tls_context(security: ServerSecurity) -> ssl.SSLContext | None:
+    """What the server shows of itself; None: no TLS.
+
+    Raises:
+        ViewError: A file cannot be used.
+    """
+    if security.certificate is None or security.key is None:
+        return None
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.minimum_version = ssl.TLSVersion.TLSv1_2
+    try:
+        context.load_cert_chain(security.certificate, security.key)
+    except (OSError, ssl.SSLError) as error:
+        raise ViewError(f"{security.certificate} and {security.key} cannot be used: {error}") from error
+    return context
+
+
+def _os_text(error: OSError) -> str:
+    """What went wrong, without the words that asyncio puts around it."""
+    return os.strerror(error.errno) if error.errno else str(error)

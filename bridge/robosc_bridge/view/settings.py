@@ -1,0 +1,43 @@
+"""Where and how the page is served."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from robosc_api.security import ServerSecurity
+from robosc_bridge.configuration.structure import Configuration
+
+ADDRESS = "127.0.0.1:8066"
+"""Where the page is served unless somebody says otherwise."""
+
+
+@dataclass(frozen=True, slots=True)
+class ViewSettings:
+    """Where and how the page is served.
+
+    Attributes:
+        address: `HOST:PORT`; port 0 picks a free one.
+        security: The certificate.
+        names: Further names by which browsers reach the server.
+    """
+
+    address: str = ADDRESS
+    security: ServerSecurity = field(default_factory=ServerSecurity)
+    names: tuple[str, ...] = ()
+
+
+def settings_of(configuration: Configuration) -> ViewSettings | None:
+    """What a configuration says; None: no page is to be served.
+
+    Args:
+        configuration: Of the robot.
+    """
+    view = configuration.view
+    chosen = view.address
+    if chosen is None:
+        return None
+    security = ServerSecurity(
+        certificate=None if view.tls_certificate is None else Path(view.tls_certificate),
+        key=None if view.tls_key is None else Path(view.tls_key),
+        insecure_beyond_loopback=view.insecure_beyond_loopback,
+    )
+    return ViewSettings(chosen, security, view.names)

@@ -1,0 +1,454 @@
+"""Which requests a supervisor lets through in the state that a robot is in, and why not the others.
+
+A request is not enabled where its service or action is not idle, where a behaviour that mentions it has no transition
+on it, where an update would take a variable out of its range, where a requirement does not hold, and where synthesis
+forbids it (semantics part 1). Each of these is a sentence here, so that a request has one if and only if it is not
+enabled. What synthesis adds means nothing where the rest blocks a request already, and is told only where it does not.
+
+The state comes from elsewhere - a bridge, a topic, a log file - and is untrusted: numbers and texts are taken for what
+the model's types say, and all that fits none is an error. Locations of services and actions may be unknown.
+"""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from robosc.automata.compile import Function, State, compile_expression, subjects_read
+from robosc.automata.decision import Decision, Test, index_in
+from robosc.automata.plants import communication_plant, communication_plant_name
+from robosc.automata.state import Subject
+from robosc.errors import RoboscError
+from robosc.explanation.words import requirement_text, value_text
+from robosc.expressions import (
+    BooleanType,
+    DoubleType,
+    EnumType,
+    Expression,
+    IntegerType,
+    Type,
+    Value,
+    conjuncts,
+    domain,
+    type_text,
+    values,
+)
+from robosc.expressions.text import automaton_text, expression_text
+from robosc.model.structure import (
+    Behaviour,
+    Communication,
+    CommunicationKind,
+    Component,
+    EventKind,
+    Model,
+    Requirement,
+    RequirementForm,
+    Transition,
+)
+from robosc.supervisor.structure import AddedCondition, DecisionDiagram
+
+MAXIMUM_REASONS = 8
+"""Sentences for one request."""
+
+MAXIMUM_TEXT = 300
+"""Characters of a text of the model that a sentence repeats."""
+
+MAXIMUM_NAMES = 8
+"""Names, and values, that a sentence lists."""
+
+MAXIMUM_DIGITS = 400
+"""Characters of a number that comes as a text."""
+
+_INTEGER = re.compile(r"-?[0-9]{1,18}", re.ASCII)
+_TRUTHS = {"true": True, "false": False}
+_CALLED = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
+_IDLE = "idle"
+
+
+class StateError(RoboscError, ValueError):
+    """A state that the model cannot be in; one sentence."""
+
+
+@dataclass(frozen=True, slots=True)
+class Blocked:
+    """A request that is not enabled.
+
+    Attributes:
+        event: The request, such as `move.request`.
+        why: One sentence for each cause; at least one.
+    """
+
+    event: str
+    why: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """The requests of a model in one state, each in one of these, in the model's order.
+
+    Attributes:
+        enabled: What may be requested.
+        blocked: What may not.
+        unknown: What cannot be told, since the location of a service or action is not known.
+    """
+
+    enabled: tuple[str, ...]
+    blocked: tuple[Blocked, ...]
+    unknown: tuple[str, ...]
+
+
+class _NoData(dict[Any, Any]):
+    """Nothing was received: every part of it is unknown."""
+
+    def __missing__(self, key: Any) -> None:
+        return None
+
+
+_NO_DATA: Mapping[Any, Any] = _NoData()
+
+
+@dataclass(frozen=True, slots=True)
+class _Condition:
+    """An expression, taken apart once."""
+
+    function: Function
+    text: str
+    reads: tuple[Subject, ...]
+
+    def holds(self, state: State) -> bool:
+        return self.function(state, _NO_DATA) is True
+
+
+@dataclass(frozen=True, slots=True)
+class _Kept:
+    """An update that must stay in a range."""
+
+    subject: Subject
+    function: Function
+    low: int
+    high: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Way:
+    """A transition on a request."""
+
+    guard: _Condition | None
+    kept: tuple[_Kept, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """A component whose behaviour mentions a request, with its transitions on it by state."""
+
+    name: str
+    ways: Mapping[str, tuple[_Way, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Need:
+    """A requirement on a request."""
+
+    text: str
+    is_needs: bool
+    condition: _Condition
+    parts: tuple[_Condition, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Rule:
+    """All that may block a request."""
+
+    event: str
+    plant: str | None
+    parts: tuple[_Part, ...]
+    needs: tuple[_Need, ...]
+    added: Decision | None
+
+
+class Requests:
+    """Judges the requests of one supervisor.
+
+    Args:
+        model: The checked model.
+        added: What synthesis adds to it.
+    """
+
+    def __init__(self, model: Model, added: Iterable[AddedCondition]) -> None:
+        self._components = frozenset(item.name for item in model.components)
+        self._behaviours = {item.name: item.behaviour for item in model.components if item.behaviour is not None}
+        self._plants = {communication_plant_name(item): item for item in model.communications if item.kind in _CALLED}
+        self._types: dict[Subject, Type] = {
+            Subject(name, variable.name): variable.type
+            for name, behaviour in self._behaviours.items()
+            for variable in behaviour.variables
+        }
+        locations = [Subject(name) for name in (*self._behaviours, *self._plants)]
+        self._places = {subject: place for place, subject in enumerate([*locations, *self._types])}
+        diagrams = {item.event: item.condition for item in added}
+        self._rules = tuple(
+            self._rule(model, item, diagrams.get(item.event(EventKind.REQUEST)))
+            for item in model.communications
+            if item.kind is not CommunicationKind.OUTGOING_MESSAGE
+        )
+
+    @property
+    def events(self) -> tuple[str, ...]:
+        """Every request, in the model's order."""
+        return tuple(rule.event for rule in self._rules)
+
+    def judge(self, components: Mapping[str, Any], communications: Mapping[str, str]) -> Judged:
+        """What may be requested in a state, and why the rest may not.
+
+        Args:
+            components: State and variables of every component with a behaviour, `{name: {"state": s, "variables": {v:
+                value}}}`; values as the model has them, as JSON has them, or as texts.
+            communications: Location of services and actions, by name; those that are missing are unknown.
+
+        Raises:
+            StateError: The model has no such state.
+        """
+        state = self._state(components, communications)
+        enabled, blocked, unknown = list[str](), list[Blocked](), list[str]()
+        for rule in self._rules:
+            why = tuple(self._why(rule, state))[:MAXIMUM_REASONS]
+            is_unknown = rule.plant is not None and state[self._places[Subject(rule.plant)]] is None
+            if not why and rule.added is not None:
+                allowed, tested = self._decided(rule.added, state)
+                is_unknown = is_unknown or allowed is None
+                if allowed is False:
+                    why = (f"the supervisor forbids it, because of what can follow{_bracketed(tested)}",)
+            if why:
+                blocked.append(Blocked(rule.event, why))
+            elif is_unknown:
+                unknown.append(rule.event)
+            else:
+                enabled.append(rule.event)
+        return Judged(tuple(enabled), tuple(blocked), tuple(unknown))
+
+    # Taking the model apart
+
+    def _rule(self, model: Model, communication: Communication, added: DecisionDiagram | None) -> _Rule:
+        event = communication.event(EventKind.REQUEST)
+        return _Rule(
+            event,
+            communication_plant_name(communication) if communication.kind in _CALLED else None,
+            tuple(
+                self._part(component, behaviour, event)
+                for component in model.components
+                if (behaviour := component.behaviour) and any(item.event == event for item in behaviour.transitions)
+            ),
+            tuple(self._need(item) for item in model.requirements_on(communication.name)),
+            None if added is None else self._decision(added),
+        )
+
+    def _part(self, component: Component, behaviour: Behaviour, event: str) -> _Part:
+        on_event = [item for item in behaviour.transitions if item.event == event]
+        ordered = [*(item for item in on_event if item.source is not None), *(i for i in on_event if i.source is None)]
+        return _Part(
+            component.name,
+            {
+                state.name: tuple(
+                    self._way(component.name, behaviour, item) for item in ordered if item.source in (state.name, None)
+                )
+                for state in behaviour.states
+            },
+        )
+
+    def _way(self, component: str, behaviour: Behaviour, transition: Transition) -> _Way:
+        kept = []
+        for update in transition.updates:
+            variable = next(item for item in behaviour.variables if item.name == update.variable)
+            match variable.type:
+                case IntegerType(low=int(low), high=int(high)) if variable.is_synthesis:
+                    function = compile_expression(update.expression, self._places)
+                    kept.append(_Kept(Subject(component, variable.name), function, low, high))
+        return _Way(None if transition.guard is None else self._condition(transition.guard), tuple(kept))
+
+    def _need(self, item: Requirement) -> _Need:
+        is_needs = item.form is RequirementForm.NEEDS
+        return _Need(
+            _cut(requirement_text(item, self._components)),
+            is_needs,
+            self._condition(item.condition),
+            tuple(map(self._condition, conjuncts(item.expression))) if is_needs else (),
+        )
+
+    def _condition(self, expression: Expression) -> _Condition:
+        reads = sorted(subjects_read(expression), key=self._places.__getitem__)
+        text = _cut(expression_text(expression, self._components))
+        return _Condition(compile_expression(expression, self._places), text, tuple(reads))
+
+    def _decision(self, diagram: DecisionDiagram) -> Decision:
+        nodes = tuple(
+            Test(self._places[Subject(node.automaton, node.variable)], node.starts, node.children)
+            for node in diagram.nodes
+        )
+        # Only what a diagram tests must have finitely many values.
+        tested = {node.place for node in nodes}
+        indices = tuple(
+            index_in(self._domain(subject) if place in tested else ()) for subject, place in self._places.items()
+        )
+        return Decision(nodes, diagram.root, indices)
+
+    def _domain(self, subject: Subject) -> tuple[Value, ...] | range:
+        if subject.variable is not None:
+            return domain(self._types[subject])
+        if subject.automaton in self._plants:
+            return communication_plant(self._plants[subject.automaton]).locations
+        return tuple(state.name for state in self._behaviours[subject.automaton].states)
+
+    # The state
+
+    def _state(self, components: Mapping[str, Any], communications: Mapping[str, str]) -> State:
+        found: list[Any] = []
+        for subject in self._places:
+            name = subject.automaton
+            if name in self._plants:
+                found.append(self._location(self._plants[name], communications))
+                continue
+            part = components.get(name)
+            if not isinstance(part, Mapping):
+                raise StateError(f"nothing is told about component '{name}'")
+            found.append(self._value(subject, part))
+        return tuple(found)
+
+    def _location(self, communication: Communication, communications: Mapping[str, str]) -> str | None:
+        location = communications.get(communication.name)
+        if location is not None and location not in communication_plant(communication).locations:
+            raise StateError(f"'{communication.name}' cannot be in '{str(location)[:100]}'")
+        return location
+
+    def _value(self, subject: Subject, part: Mapping[str, Any]) -> Value:
+        name = subject.automaton
+        if subject.variable is None:
+            state = part.get("state")
+            if not any(item.name == state for item in self._behaviours[name].states):
+                raise StateError(f"component '{name}' has no state '{str(state)[:100]}'")
+            return str(state)
+        variables, type_ = part.get("variables"), self._types[subject]
+        raw = variables.get(subject.variable) if isinstance(variables, Mapping) else None
+        value = read_value(type_, raw)
+        if value is None:
+            raise StateError(f"{subject} is not told as a value of {type_text(type_)}")
+        return value
+
+    # Why
+
+    def _why(self, rule: _Rule, state: State) -> Iterator[str]:
+        if rule.plant is not None:
+            location = state[self._places[Subject(rule.plant)]]
+            if location not in (None, _IDLE):
+                yield f"{automaton_text(rule.plant, self._components)} is in {location}, not in {_IDLE}"
+        for part in rule.parts:
+            yield from self._hindered(part, state)
+        for need in rule.needs:
+            if not need.condition.holds(state):
+                yield self._violated(need, state)
+
+    def _hindered(self, part: _Part, state: State) -> Iterator[str]:
+        location = str(state[self._places[Subject(part.name)]])
+        ways = part.ways[location]
+        taken = next((way for way in ways if way.guard is None or way.guard.holds(state)), None)
+        if taken is None and not ways:
+            there = [name for name, found in part.ways.items() if found]
+            yield f"{part.name} is in {location}, not in {_listed(there)}" if there else f"{part.name} never allows it"
+        elif taken is None:
+            guards = [way.guard for way in ways if way.guard is not None]
+            told = " nor ".join(guard.text for guard in guards[:MAXIMUM_NAMES])
+            read = tuple(dict.fromkeys(subject for guard in guards for subject in guard.reads))
+            yield f"{part.name} is in {location}, where {told} does not hold{self._values(read, state)}"
+        else:
+            for item in taken.kept:
+                value = item.function(state, _NO_DATA)
+                if value is not None and values.assignable_integer(value, item.low, item.high) is None:
+                    now = value_text(state[self._places[item.subject]])
+                    yield f"it would take {item.subject}, which is {now}, out of its range {item.low}..{item.high}"
+
+    def _violated(self, need: _Need, state: State) -> str:
+        if need.condition.function(state, _NO_DATA) is None:
+            return f"{need.text}: its value is not known{self._values(need.condition.reads, state)}"
+        if not need.is_needs:
+            return f"{need.text}, and that holds{self._values(need.condition.reads, state)}"
+        failing = [part for part in need.parts if not part.holds(state)]
+        read = tuple(dict.fromkeys(subject for part in failing for subject in part.reads))
+        if len(need.parts) == 1:
+            return f"{need.text}, which does not hold{self._values(read, state)}"
+        told = " and ".join(part.text for part in failing[:MAXIMUM_NAMES])
+        return f"{need.text}: {told} do{'' if len(failing) > 1 else 'es'} not hold{self._values(read, state)}"
+
+    def _values(self, read: Iterable[Subject], state: State) -> str:
+        return _bracketed([self._told(subject, state) for subject in read])
+
+    def _told(self, subject: Subject, state: State) -> str:
+        value = state[self._places[subject]]
+        name = automaton_text(subject.automaton, self._components) if subject.variable is None else str(subject)
+        return f"{name} is {_cut(value_text(value))}"
+
+    def _decided(self, decision: Decision, state: State) -> tuple[bool | None, list[str]]:
+        """Whether a diagram is true, None where it looks at what is not known, and what it looked at."""
+        order = tuple(self._places)
+        number, told = decision.root, list[str]()
+        while number > 1:
+            node = decision.nodes[number - 2]
+            value = state[node.place]
+            if value is None:
+                return None, told
+            told.append(self._told(order[node.place], state))
+            number = node.child(decision.indices[node.place](value))
+        return number == 1, told
+
+
+def read_value(type_: Type, raw: Any) -> Value | None:
+    """A value of a type, out of JSON (whose numbers may all be doubles) or a text; None: it is none."""
+    match type_:
+        case BooleanType():
+            return raw if isinstance(raw, bool) else _TRUTHS.get(raw) if isinstance(raw, str) else None
+        case IntegerType(low=low, high=high):
+            number = _whole(raw)
+            is_in = number is not None and (low is None or low <= number) and (high is None or number <= high)
+            return number if is_in else None
+        case DoubleType():
+            return _double(raw)
+        case EnumType(values=names):
+            return raw if isinstance(raw, str) and raw in names else None
+        case _:
+            return raw if isinstance(raw, str) else None
+
+
+def _whole(raw: Any) -> int | None:
+    if isinstance(raw, float):
+        return int(raw) if raw.is_integer() else None
+    if isinstance(raw, str):
+        return int(raw) if _INTEGER.fullmatch(raw) else None
+    return raw if isinstance(raw, int) and not isinstance(raw, bool) else None
+
+
+def _double(raw: Any) -> float | None:
+    if (
+        isinstance(raw, bool)
+        or not isinstance(raw, int | float | str)
+        or (isinstance(raw, str) and len(raw) > MAXIMUM_DIGITS)
+    ):
+        return None
+    try:
+        return float(raw)
+    except (ValueError, OverflowError):
+        return None
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= MAXIMUM_TEXT else text[: MAXIMUM_TEXT - 4] + " ..."
+
+
+def _listed(names: list[str]) -> str:
+    shown = names[:MAXIMUM_NAMES]
+    more = "" if len(names) <= MAXIMUM_NAMES else f" or {len(names) - MAXIMUM_NAMES} more"
+    return (
+        ", ".join(shown[:-1]) + (" or " if len(shown) > 1 and not more else ", " * (len(shown) > 1)) + shown[-1] + more
+    )
+
+
+def _bracketed(told: list[str]) -> str:
+    shown = ", ".join(told[:MAXIMUM_NAMES]) + (", ..." if len(told) > MAXIMUM_NAMES else "")
+    return f" ({shown})" if shown else ""

@@ -1,0 +1,85 @@
+"""A request has a reason if and only if the interpreter, which executes supervisors, does not enable it."""
+
+from random import Random
+from typing import Any
+
+import hypothesis.strategies as st
+from hypothesis import given, settings
+
+from robosc.execution.event_log import plain
+from robosc.execution.interpreter import InterpretedSystem
+from robosc.explanation.blocked import MAXIMUM_REASONS, Requests
+from robosc.model.structure import CommunicationKind
+from robosc.supervisor import Supervisor
+from support.random_supervisors import random_data, random_supervisor
+
+_CALLED = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
+
+
+def locations(supervisor: Supervisor, system: InterpretedSystem) -> dict[str, str]:
+    return {item.name: system.location(item.name) for item in supervisor.model.communications if item.kind in _CALLED}
+
+
+def enabled(system: InterpretedSystem, requests: Requests) -> tuple[str, ...]:
+    return tuple(requests.events[number] for number in system.enabled_requests())
+
+
+def wander(supervisor: Supervisor, dice: Random, steps: int) -> Any:
+    """The states along a random run."""
+    system = InterpretedSystem(supervisor)
+    events = [event for item in supervisor.model.communications for event in item.events] + [*supervisor.model.taus]
+    for _ in range(steps if events else 0):
+        yield system
+        event = dice.choice(events)
+        # What the supervisor would not let through is taken, too: its states are judged as well.
+        system.step(event, system.read(event, random_data(dice)))
+    yield system
+
+
+def as_texts(components: Any) -> Any:
+    """As the topic `/state` has them."""
+
+    def text(value: Any) -> str:
+        return str(value).lower() if isinstance(value, bool) else str(value)
+
+    return {
+        name: {
+            "state": part["state"],
+            "variables": {variable: text(value) for variable, value in part["variables"].items()},
+        }
+        for name, part in components.items()
+    }
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=150)
+def test_a_request_has_a_reason_if_and_only_if_it_is_not_enabled(seed: int) -> None:
+    supervisor, dice = random_supervisor(seed), Random(seed)
+    requests = Requests(supervisor.model, supervisor.added)
+    for system in wander(supervisor, dice, 12):
+        known, components = locations(supervisor, system), system.state()
+        judged = requests.judge(components, known)
+        assert judged.enabled == enabled(system, requests)
+        assert judged.unknown == ()
+        assert {item.event for item in judged.blocked} == set(requests.events) - set(judged.enabled)
+        for item in judged.blocked:
+            assert 0 < len(item.why) <= MAXIMUM_REASONS
+            assert all(why and "\n" not in why for why in item.why)
+        # The same out of a log file, and out of the topic.
+        assert requests.judge(plain(components), known) == judged
+        assert requests.judge(as_texts(components), known) == judged
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=60)
+def test_what_is_told_without_locations_holds_with_them(seed: int) -> None:
+    supervisor, dice = random_supervisor(seed), Random(seed)
+    requests = Requests(supervisor.model, supervisor.added)
+    for system in wander(supervisor, dice, 6):
+        known = locations(supervisor, system)
+        some = {name: place for name, place in known.items() if dice.random() < 0.5}
+        whole, part = requests.judge(system.state(), known), requests.judge(system.state(), some)
+        assert set(part.enabled) <= set(whole.enabled)
+        assert {item.event for item in part.blocked} <= {item.event for item in whole.blocked}
+        told = {*part.enabled, *part.unknown, *(item.event for item in part.blocked)}
+        assert told == set(requests.events)

@@ -76,6 +76,7 @@ def _robot(options: argparse.Namespace, recorder: Recorder | None) -> SimulatedT
         line=_track(options.line),
         camera_link=options.camera_link,
         recorder=recorder,
+        patience_s=options.wait,
     )
 
 
@@ -145,6 +146,12 @@ def _parser() -> argparse.ArgumentParser:
         "--pose", type=_pose, default=(0.0, 0.0, 0.0), metavar="X,Y,HEADING", help="start, in m and rad; default: 0,0,0"
     )
     parser.add_argument("--speed", type=float, default=1.0, metavar="N", help="the world passes N times as fast")
+    parser.add_argument(
+        "--wait",
+        type=float,
+        metavar="S",
+        help="the world waits for its host: no more than so many of its seconds pass after the last bytes from there",
+    )
     parser.add_argument("--noise", type=float, default=0.0, metavar="M", help="standard deviation of the LiDAR in m")
     parser.add_argument("--seed", type=int, default=0, help="of the maze and of all faults that come by chance")
     parser.add_argument("--base-link", type=Path, metavar="PATH", help="where the base's port is to be")

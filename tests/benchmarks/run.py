@@ -3,7 +3,7 @@
 Usage: run.py [NAME...]      (all of them without an argument)
 
 Names: cold-start, conditions, execution, language, synthesis; of the bridge: decoders, drive-bases, loop-period,
-reaction, endurance.
+maze, reaction, endurance.
 """
 
 import sys
@@ -17,6 +17,7 @@ import decoders
 import drive_bases
 import endurance
 import loop_period
+import maze
 import reaction
 
 import cold_start
@@ -34,6 +35,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "execution": execution.table,
     "language": language.table,
     "loop-period": loop_period.table,
+    "maze": maze.table,
     "reaction": reaction.table,
     "synthesis": synthesis.table,
 }

@@ -195,10 +195,13 @@ class Program:
         """
         end_s = time.monotonic() + limit_s
         while True:
+            # Before the look: what it has told just before its end counts.
+            has_ended = self.status is not None
             found = re.search(pattern, self.log.read_text(encoding="utf-8", errors="replace"), re.MULTILINE)
             if found:
                 return found
-            self.require()
+            if has_ended:
+                self.require()
             if time.monotonic() > end_s:
                 raise ScenarioError(f"{self.name} did not tell {pattern!r} in {limit_s:g} s:\n{self.told()}")
             time.sleep(_POLL_S)

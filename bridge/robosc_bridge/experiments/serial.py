@@ -72,14 +72,19 @@ class Rig:
         simulator: The robot and its world.
         bridge: What executes the supervisor.
         address: Of the bridge's gRPC service.
-        motion: The record of the robot's motion.
+        used_s: What processors had worked for bridge and simulator until then.
     """
 
     setting: Setting
     simulator: Program
     bridge: Program
     address: str
-    motion: Path
+    used_s: tuple[float, float]
+
+    @property
+    def motion(self) -> Path:
+        """The record of the robot's motion."""
+        return self.setting.folder / "motion.jsonl"
 
     @property
     def event_log(self) -> Path:
@@ -100,12 +105,15 @@ class Rig:
         self.simulator.require()
 
     def finish(self) -> dict[str, float]:
-        """Bring the robot to rest and end bridge and simulator; their processors' seconds, as figures.
+        """Bring the robot to rest and end bridge and simulator; what processors worked for them since, as figures.
 
         Raises:
             ScenarioError: One of them did not end in order.
         """
-        used = {"bridge_cpu_s": self.bridge.cpu_s, "simulator_cpu_s": self.simulator.cpu_s}
+        used = {
+            "bridge_cpu_s": self.bridge.cpu_s - self.used_s[0],
+            "simulator_cpu_s": self.simulator.cpu_s - self.used_s[1],
+        }
         finish(self.bridge)
         finish(self.simulator)
         return used
@@ -213,8 +221,8 @@ def running(setting: Setting) -> Iterator[Rig]:
         )
         address = bridge.wait_for(r"the remote face listens on (\S+:\d+)$", _SYNTHESIS_LIMIT_S)[1]
         bridge.wait_for(r" running$", _BRIDGE_LIMIT_S)
+        rig = Rig(setting, simulator, bridge, address, (bridge.cpu_s, simulator.cpu_s))
         _wait_for_supervisor(client)
-        rig = Rig(setting, simulator, bridge, address, folder / "motion.jsonl")
         (kept,) = (folder / "kept").glob("*.rsup")
         if kept.read_bytes() != rig.supervisor.read_bytes():
             raise ScenarioError("client and bridge were sent different supervisors of the same model")

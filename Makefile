@@ -1,5 +1,5 @@
 # Two commands do everything on a machine with git, make, Python 3.12 and pip:
-#   make demo    the main job: model -> gRPC server -> ROS 2 package -> node that drives a simulated robot
+#   make demo    the main job: model -> gRPC server -> bridge -> serial lines -> simulated robot, out of a maze
 #   make test    every test
 # Both make .venv from the lock if it is not there. PYTHON=... chooses the interpreter.
 
@@ -26,8 +26,8 @@ colcon: $(COLCON)/.ready ## make .venv-colcon: builds ROS 2 packages without an 
 $(COLCON)/.ready: deploy/requirements-colcon.txt deploy/make_colcon_environment.sh | $(READY)
 	PYTHON=$(BIN)/python sh deploy/make_colcon_environment.sh $(COLCON)
 
-demo: $(READY) ## run the line follower from model to moving robot
-	$(BIN)/python deploy/demo/demo.py
+demo: $(READY) ## lead a simulated robot out of a maze, from model to serial bytes; DEMO='--scene maze-spiral' and so on
+	$(BIN)/python deploy/demo/demo.py $(DEMO)
 
 # One worker more than cores: many tests wait for real middleware.
 WORKERS := $(shell echo $$(( $$(nproc 2>/dev/null || echo 2) + 1 )))

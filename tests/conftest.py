@@ -37,6 +37,9 @@ _IN_REAL_TIME = (
     "tests/bridge/remote/test_whole.py",
     "tests/bridge/terminal/test_teleop.py",
     "tests/end_to_end/test_demo.py",
+    "tests/end_to_end/test_line_follower_demo.py",
+    "tests/end_to_end/test_serial_line.py",
+    "tests/end_to_end/test_serial_maze.py",
     "tests/test_tutorial.py",
 )
 

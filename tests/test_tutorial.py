@@ -26,7 +26,7 @@ from support.tutorial import (
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 CHAPTERS = read_chapters((DOCS / "tutorial.md").read_text(encoding="utf-8"))
-NEEDS_ROS = "deploy/demo/demo.py"
+NEEDS_ROS = "deploy/demo/line_follower.py"
 
 
 class Reader:

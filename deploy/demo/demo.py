@@ -1,236 +1,139 @@
-"""The main job, start to end: model -> gRPC service -> ROS 2 package -> running node -> moving robot.
+"""The product at work without a robot: model -> synthesis server -> bridge -> serial bytes -> robot, out of a maze.
 
-Starts the synthesis server, lets the client send it the line follower, starts the generated controller
-and a simulated robot as processes of their own on real ROS 2 topics, shows what happened and judges it.
-Everything it writes lies in a temporary folder; nothing is left behind, also after Ctrl-C.
+Starts the synthesis server, lets the client send it the maze solver, and has the bridge obtain its supervisor from
+there and drive a simulated TurtleBot3 through its serial lines, in a world that passes faster than the clock. Then it
+judges what happened, and draws it. Nothing runs on after it, also after Ctrl-C.
 
-Usage: demo.py [--model FILE]        (or: make demo)
+Usage: demo.py [--scene NAME|FILE] [--seed N] [--speed N] [--model FILE] [--output FOLDER]        (or: make demo)
 """
 
 import argparse
-import os
-import re
 import shutil
-import signal
-import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from judge import judge_log, judge_motion, read_lines, table
+from robosc.event_logs import draw_sequence, read_log
+from robosc_bridge.experiments.maze import MODEL, SCENES, run_maze
+from robosc_bridge.experiments.processes import interruptible
+from robosc_bridge.experiments.scenario import Outcome, ScenarioError
+from robosc_bridge.simulated.map_picture import draw_map
+from robosc_bridge.simulated.motion import read_motion
 
 ROOT = Path(__file__).resolve().parents[2]
-MODEL = ROOT / "examples" / "line_follower" / "line_follower.rscd"
-START_LIMIT_S = 30.0
-RUN_LIMIT_S = 60.0
-STOP_LIMIT_S = 5.0
-
-# Fast DDS announces itself at once and often with this profile; its default finds peers seconds later now and then.
-DISCOVERY_PROFILE = """<?xml version="1.0" encoding="UTF-8"?>
-<profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
-  <participant profile_name="demo" is_default_profile="true"><rtps><builtin><discovery_config>
-    <initialAnnouncements><count>30</count><period><sec>0</sec><nanosec>50000000</nanosec></period></initialAnnouncements>
-    <leaseAnnouncement><sec>0</sec><nanosec>250000000</nanosec></leaseAnnouncement>
-  </discovery_config></builtin></rtps></participant>
-</profiles>
-"""
+SPEED = 10.0
+SHOWN_S = 3.0
+"""How much of the log the picture of events begins with: all of it would be a wall of strokes."""
 
 
-class DemoError(Exception):
-    """A step of the demonstration that failed, in one sentence."""
+class Progress:
+    """One line that changes, in a terminal; elsewhere a line each time that another step begins."""
 
+    def __init__(self) -> None:
+        self._is_terminal = sys.stdout.isatty()
+        self._is_shown = False
+        self._said = 0
 
-def say(text: str) -> None:
-    """A line for the user, at once."""
-    sys.stdout.write(text + "\n")
-    sys.stdout.flush()
+    def say(self, text: str) -> None:
+        """What is going on."""
+        if self._is_terminal:
+            sys.stdout.write(f"\r\x1b[K{text}")
+            self._is_shown = True
+        elif self._said % 20 == 0:
+            sys.stdout.write(text + "\n")
+        self._said += 1
+        sys.stdout.flush()
 
-
-@contextmanager
-def process(
-    name: str, command: Sequence[str], environment: dict[str, str], log: Path
-) -> Iterator[subprocess.Popen[str]]:
-    """A child in a session of its own, so that Ctrl-C reaches only us and we stop it in order."""
-    with log.open("w", encoding="utf-8") as output:
-        child = subprocess.Popen(
-            command,
-            env=environment,
-            cwd=log.parent,
-            stdin=subprocess.DEVNULL,
-            stdout=output,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-            text=True,
-        )
-    try:
-        yield child
-    finally:
-        stop(name, child)
-
-
-def stop(name: str, child: subprocess.Popen[str]) -> None:
-    """End a child and whatever it started: first politely, so that a robot comes to rest."""
-    if child.poll() is None:
-        child.terminate()
-        try:
-            child.wait(STOP_LIMIT_S)
-        except subprocess.TimeoutExpired:
-            say(f"{name} did not stop when asked; killing it")
-    with suppress(ProcessLookupError):
-        os.killpg(child.pid, signal.SIGKILL)
-    child.wait()
-
-
-def ros_environment(folder: Path) -> dict[str, str]:
-    """ROS 2 on this machine only, in a domain of our own, with its logs in our folder."""
-    profile = folder / "discovery.xml"
-    profile.write_text(DISCOVERY_PROFILE, encoding="utf-8")
-    return {
-        **os.environ,
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-        "ROS_DOMAIN_ID": str(os.getpid() % 100 + 1),
-        "ROS_LOG_DIR": str(folder / "ros_log"),
-        "FASTRTPS_DEFAULT_PROFILES_FILE": str(profile),
-        "PYTHONDONTWRITEBYTECODE": "1",
-        "PYTHONUNBUFFERED": "1",
-    }
-
-
-def tool(name: str) -> str:
-    """A console script of the environment that runs this file."""
-    path = shutil.which(name, path=str(Path(sys.executable).parent))
-    if path is None:
-        raise DemoError(f"{name} is not installed beside {sys.executable}; run `make demo`")
-    return path
-
-
-def wait_for_line(child: subprocess.Popen[str], log: Path, pattern: str, what: str) -> re.Match[str]:
-    """Wait until a child has printed a line."""
-    limit = time.monotonic() + START_LIMIT_S
-    while time.monotonic() < limit:
-        found = re.search(pattern, log.read_text(encoding="utf-8"), re.MULTILINE)
-        if found:
-            return found
-        if child.poll() is not None:
-            break
-        time.sleep(0.05)
-    raise DemoError(f"{what} did not start:\n{log.read_text(encoding='utf-8')}")
-
-
-def run_client(arguments: Sequence[str], environment: dict[str, str]) -> None:
-    """One call of the client, its output shown as it comes."""
-    say(f"$ robosc-client {' '.join(arguments)}")
-    result = subprocess.run(
-        [tool("robosc-client"), *arguments], env=environment, stdin=subprocess.DEVNULL, timeout=RUN_LIMIT_S, check=False
-    )
-    if result.returncode != 0:
-        raise DemoError(f"robosc-client ended with status {result.returncode}")
-
-
-def run(folder: Path, model_path: Path) -> list[str]:
-    """The whole demonstration with one model; returns what was wrong."""
-    environment = ros_environment(folder)
-    with ExitStack() as stack:
-        server_log = folder / "server.log"
-        server = stack.enter_context(
-            process("the server", [tool("robosc-server"), "--port", "0"], environment, server_log)
-        )
-        address = wait_for_line(server, server_log, r"listening on (\S+:\d+)$", "the server")[1]
-        say(f"robosc-server listens on {address}")
-        model = os.path.relpath(model_path)
-        supervisor, package = folder / "line_follower.rsup", folder / "package"
-        run_client(["synth", model, "--server", address, "-o", str(supervisor)], environment)
-        run_client(["generate", model, "--server", address, "--target", "ros2", "-o", str(package)], environment)
-        (name,) = [path.parent.name for path in package.glob("*/node.py")]
-        log, record = folder / "events", folder / "robot.jsonl"
-        node = stack.enter_context(
-            process(
-                "the controller",
-                [sys.executable, "-m", f"{name}.node", "--ros-args", "-p", "period:=0.05", "-p", f"log_folder:={log}"],
-                {**environment, "PYTHONPATH": os.pathsep.join([str(package), environment.get("PYTHONPATH", "")])},
-                folder / "node.log",
-            )
-        )
-        robot = stack.enter_context(
-            process(
-                "the robot",
-                [sys.executable, str(Path(__file__).with_name("simulated_robot.py")), str(record)],
-                environment,
-                folder / "robot.log",
-            )
-        )
-        say("the generated controller and the simulated robot are running (about ten seconds)")
-        wait_for_robot(robot, node, folder)
-        stop("the controller", node)
-        if node.returncode != 0:
-            raise DemoError(f"the controller ended with status {node.returncode}:\n{(folder / 'node.log').read_text()}")
-    return judge(next(log.glob("*.jsonl")), record)
-
-
-def wait_for_robot(robot: subprocess.Popen[str], node: subprocess.Popen[str], folder: Path) -> None:
-    """Wait for the end of the scenario, and for nothing if the controller has died."""
-    limit = time.monotonic() + RUN_LIMIT_S
-    while robot.poll() is None:
-        if node.poll() is not None:
-            raise DemoError(f"the controller ended by itself:\n{(folder / 'node.log').read_text()}")
-        if time.monotonic() > limit:
-            raise DemoError("the scenario did not end in time")
-        time.sleep(0.05)
-    if robot.returncode != 0:
-        raise DemoError(f"the robot failed:\n{(folder / 'robot.log').read_text()}")
-
-
-def judge(log: Path, record: Path) -> list[str]:
-    """Show the sequence of events and say what was wrong."""
-    entries = read_lines(log)
-    say("")
-    say(table(entries))
-    say("")
-    faults, remarks = judge_motion(read_lines(record))
-    faults = judge_log(entries) + faults
-    for remark in remarks:
-        say(f"  {remark}")
-    moves = sum(entry.get("event") == "move.request" for entry in entries)
-    say(f"  move was requested {moves} times")
-    return faults
-
-
-def read_arguments() -> Path:
-    """The model to run."""
-    parser = argparse.ArgumentParser(
-        description="Generate a line follower's controller, run it with a simulated robot, and judge what it did.",
-        epilog="A model of your own needs the messages of examples/line_follower, with the same identifiers, and the "
-        "states that its requirements name: the simulated robot and the checks know these.",
-    )
-    parser.add_argument("--model", type=Path, default=MODEL, metavar="FILE", help="the model (default: the example's)")
-    model: Path = parser.parse_args().model
-    if not model.is_file():
-        parser.error(f"there is no file {model}")
-    return model
+    def end(self) -> None:
+        """Leave the line."""
+        if self._is_shown:
+            sys.stdout.write("\n")
+            self._is_shown = False
 
 
 def main() -> int:
-    """Run the demonstration; 0 if the robot did what its requirements say."""
-    model = read_arguments()
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.default_int_handler)
+    """Run the demonstration; 0 if the robot came out of the maze and nothing was wrong."""
+    arguments = _arguments()
+    progress = Progress()
     try:
-        with tempfile.TemporaryDirectory(prefix="robosc-demo-") as folder:
-            faults = run(Path(folder), model)
+        with interruptible(), tempfile.TemporaryDirectory(prefix="robosc-demo-") as folder:
+            outcome = run_maze(
+                Path(folder) / "run",
+                arguments.scene,
+                speed=arguments.speed,
+                say=progress.say,
+                seed=arguments.seed,
+                model=arguments.model,
+            )
+            progress.end()
+            written = _keep(outcome, arguments.output)
     except KeyboardInterrupt:
+        progress.end()
         sys.stderr.write("interrupted; everything is stopped\n")
         return 130
-    except (DemoError, subprocess.TimeoutExpired) as error:
+    except (ScenarioError, OSError) as error:
+        progress.end()
         sys.stderr.write(f"demo: {error}\n")
         return 1
-    for fault in faults:
+    _tell(outcome, written)
+    return 0 if outcome.has_passed else 1
+
+
+def _keep(outcome: Outcome, folder: Path) -> list[Path]:
+    """Draw what happened, and keep what it was drawn from."""
+    folder.mkdir(parents=True, exist_ok=True)
+    trajectory, sequence = folder / "trajectory.png", folder / "events.png"
+    draw_map(outcome.scene, read_motion(outcome.motion), trajectory)
+    run = read_log(outcome.event_log)
+    draw_sequence(run, sequence, end_s=_window_s(outcome), title=f"{outcome.scene.name}: the first events")
+    kept = [
+        shutil.copy(outcome.event_log, folder / "events.jsonl"),
+        shutil.copy(outcome.motion, folder / "motion.jsonl"),
+        shutil.copy(outcome.supervisor, folder / outcome.supervisor.name),
+    ]
+    return [trajectory, sequence, *map(Path, kept)]
+
+
+def _window_s(outcome: Outcome) -> float:
+    return min(SHOWN_S, max(outcome.figures.get("wall_s", SHOWN_S), 0.1))
+
+
+def _tell(outcome: Outcome, written: list[Path]) -> None:
+    figures = outcome.figures
+    sys.stdout.write(
+        f"\n{outcome.scene.name}: {figures.get('way_m', 0.0):.1f} m in {figures.get('world_s', 0.0):.0f} s of the world"
+        f", {figures.get('wall_s', 0.0):.1f} s by the clock ({figures.get('speed', 0.0):.1f} times as fast)\n"
+        f"collisions: {figures.get('collisions', 0.0):.0f}   "
+        f"processor: bridge {figures['bridge_cpu_s']:.1f} s, simulator {figures['simulator_cpu_s']:.1f} s\n"
+    )
+    for path in written:
+        sys.stdout.write(f"  {path}\n")
+    for fault in outcome.faults:
         sys.stderr.write(f"FAULT: {fault}\n")
-    if not faults:
-        say("passed: it moved only with a line, a clear LiDAR and in service, and stood still in time")
-    return 1 if faults else 0
+    if outcome.has_passed:
+        sys.stdout.write("passed: out of the maze without touching a wall, every request allowed by the supervisor\n")
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        description="Lead a simulated TurtleBot3 out of a maze: synthesis server, client, bridge, serial lines, robot.",
+        epilog="A model of your own needs the communications of examples/maze_solver/narrow_maze.rscd.",
+    )
+    parser.add_argument(
+        "--scene", default=SCENES[0], metavar="NAME|FILE", help=f"{', '.join(SCENES)}, or a file; default: %(default)s"
+    )
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of maze-random, and of noise")
+    parser.add_argument(
+        "--speed", type=float, default=SPEED, metavar="N", help="the world passes N times as fast; default: %(default)g"
+    )
+    parser.add_argument("--model", type=Path, default=MODEL, metavar="FILE", help="the model (default: the example's)")
+    parser.add_argument(
+        "--output", type=Path, default=ROOT / "out", metavar="FOLDER", help="for pictures and records; default: out/"
+    )
+    arguments = parser.parse_args()
+    if not arguments.model.is_file():
+        parser.error(f"there is no file {arguments.model}")
+    return arguments
 
 
 if __name__ == "__main__":

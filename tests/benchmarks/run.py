@@ -3,7 +3,7 @@
 Usage: run.py [NAME...]      (all of them without an argument)
 
 Names: cold-start, conditions, execution, language, synthesis; of the bridge: decoders, drive-bases, loop-period,
-reaction, endurance, twin.
+maze, reaction, endurance, twin.
 """
 
 import sys
@@ -17,6 +17,7 @@ import decoders
 import drive_bases
 import endurance
 import loop_period
+import maze
 import reaction
 import twin
 
@@ -35,6 +36,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "execution": execution.table,
     "language": language.table,
     "loop-period": loop_period.table,
+    "maze": maze.table,
     "reaction": reaction.table,
     "synthesis": synthesis.table,
     "twin": twin.table,

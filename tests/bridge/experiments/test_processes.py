@@ -1,0 +1,130 @@
+"""Programs of a scenario: what they tell, how they are stopped, and that nothing of them is left."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from robosc_bridge.experiments.processes import Program, finish, interruptible
+from robosc_bridge.experiments.scenario import ScenarioError
+
+LIMIT_S = 30.0
+
+
+def script(folder: Path, text: str) -> tuple[str, ...]:
+    """Words that run a program with this text."""
+    file = folder / "program.py"
+    file.write_text(textwrap.dedent(text), encoding="utf-8")
+    return (str(file),)
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    end_s = time.monotonic() + LIMIT_S
+    while not condition():
+        assert time.monotonic() < end_s, "waited in vain"
+        time.sleep(0.01)
+
+
+def is_alive(number: int) -> bool:
+    try:
+        state = Path(f"/proc/{number}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()[0]
+    except FileNotFoundError:
+        return False
+    return state != "Z"
+
+
+def test_a_program_answers_and_ends_politely(tmp_path: Path) -> None:
+    text = """
+        import sys
+        for line in sys.stdin:
+            print("heard", line.strip(), flush=True)
+    """
+    with Program("echo", script(tmp_path, text), tmp_path, is_asked=True) as program:
+        assert program.ask("one") == "heard one"
+        assert program.ask("two") == "heard two"
+        assert program.status is None
+        assert program.cpu_s >= 0.0
+    assert program.status == -signal.SIGTERM
+
+
+def test_what_a_program_tells_is_waited_for(tmp_path: Path) -> None:
+    with Program("teller", script(tmp_path, "print('port', 17)"), tmp_path) as program:
+        assert program.wait_for(r"^port (\d+)$")[1] == "17"
+        wait_until(lambda: program.status == 0)
+        with pytest.raises(ScenarioError) as raised:
+            finish(program)
+    assert str(raised.value) == "teller ended by itself with status 0:\nport 17"
+
+
+def test_a_program_that_dies_is_told_with_its_last_words(tmp_path: Path) -> None:
+    text = "raise SystemExit('no such device')"
+    with Program("dying", script(tmp_path, text), tmp_path) as program, pytest.raises(ScenarioError) as raised:
+        program.wait_for("never told")
+    assert str(raised.value) == "dying ended by itself with status 1:\nno such device"
+
+
+def test_a_program_that_says_nothing_is_given_up(tmp_path: Path) -> None:
+    text = "import signal; signal.pause()"
+    with Program("silent", script(tmp_path, text), tmp_path, is_asked=True) as program:
+        with pytest.raises(ScenarioError, match=r"silent did not tell 'x' in 0\.2 s"):
+            program.wait_for("x", 0.2)
+        with pytest.raises(ScenarioError, match=r"silent did not answer in 0\.1 s"):
+            program.answer(0.1)
+
+
+def test_what_a_program_has_started_ends_with_it(tmp_path: Path) -> None:
+    text = """
+        import signal, subprocess, sys
+        child = subprocess.Popen([sys.executable, "-c", "import signal; signal.pause()"])
+        print("child", child.pid, flush=True)
+        signal.pause()
+    """
+    with Program("parent", script(tmp_path, text), tmp_path) as program:
+        child = int(program.wait_for(r"^child (\d+)$")[1])
+        assert is_alive(child)
+    wait_until(lambda: not is_alive(child))
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_stops_programs_and_a_second_one_changes_nothing(number: signal.Signals, tmp_path: Path) -> None:
+    text = f"""
+        import signal, sys, time
+        from pathlib import Path
+        from robosc_bridge.experiments.processes import Program, interruptible
+        code = "import signal, sys, time; signal.signal(15, lambda *_: (time.sleep(0.5), sys.exit(0))); " \
+               "print('ready', flush=True); signal.pause()"
+        try:
+            with interruptible(), Program("slow", ("-c", code), Path({str(tmp_path)!r})) as program:
+                program.wait_for("^ready$")
+                print(program._used.pid, flush=True)
+                time.sleep(60)
+        except KeyboardInterrupt:
+            print("interrupted", program.status, flush=True)
+    """
+    outer = subprocess.Popen([sys.executable, *script(tmp_path, text)], stdout=subprocess.PIPE, text=True)
+    try:
+        assert outer.stdout is not None
+        child = int(outer.stdout.readline())
+        outer.send_signal(number)
+        # The child takes half a second to end: it is in the middle of it.
+        time.sleep(0.1)
+        outer.send_signal(number)
+        assert outer.communicate(timeout=LIMIT_S)[0] == "interrupted 0\n"
+        assert not is_alive(child)
+    finally:
+        outer.kill()
+        outer.wait()
+
+
+def test_the_handlers_of_signals_are_as_before_afterwards() -> None:
+    before = signal.getsignal(signal.SIGTERM)
+    with pytest.raises(KeyboardInterrupt), interruptible():
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(LIMIT_S)
+    assert signal.getsignal(signal.SIGTERM) is before

@@ -1,0 +1,56 @@
+"""A world that waits for its host."""
+
+import os
+
+import pytest
+
+from robosc.execution.clock import ManualClock
+from robosc_bridge.simulated import SimulatedTurtleBot3
+from robosc_bridge.simulated.timebase import Timebase
+
+
+def test_time_passes_until_the_patience_is_over_and_goes_on_when_the_host_is_heard() -> None:
+    clock = ManualClock(now_s=100.0)
+    time = Timebase(clock, factor=10.0, patience_s=0.5)
+    clock.advance(0.02)
+    assert time.world_s() == pytest.approx(0.2)
+    clock.advance(1.0)
+    assert time.world_s() == pytest.approx(0.5)
+    clock.advance(5.0)
+    assert time.world_s() == pytest.approx(0.5)
+    # What it has waited for is not made up for.
+    time.heard()
+    clock.advance(0.03)
+    assert time.world_s() == pytest.approx(0.8)
+    time.heard()
+    clock.advance(0.04)
+    assert time.world_s() == pytest.approx(1.2)
+
+
+def test_without_patience_time_passes_whoever_is_heard() -> None:
+    clock = ManualClock()
+    time = Timebase(clock, factor=3.0)
+    clock.advance(10.0)
+    time.heard()
+    assert time.world_s() == pytest.approx(30.0)
+
+
+@pytest.mark.parametrize("patience_s", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_patience_that_cannot_be_is_refused(patience_s: float) -> None:
+    with pytest.raises(ValueError, match="the patience with the host"):
+        Timebase(patience_s=patience_s)
+
+
+def test_any_byte_of_the_host_lets_a_robots_world_go_on() -> None:
+    with SimulatedTurtleBot3("burger", "opencr", "lds01", clock=ManualClock(), factor=2.0, patience_s=0.5) as robot:
+        robot.advance(3.0)
+        assert robot.time.world_s() == pytest.approx(0.5)
+        for path in (robot.base_path, robot.scanner_path):
+            before_s = robot.time.world_s()
+            port = os.open(path, os.O_RDWR | os.O_NOCTTY)
+            try:
+                os.write(port, b"b")
+                robot.advance(3.0)
+            finally:
+                os.close(port)
+            assert robot.time.world_s() == pytest.approx(before_s + 0.5, abs=0.011)

@@ -9,7 +9,20 @@ import sys
 from collections.abc import Callable, Sequence
 
 from robosc._version import __version__
-from robosc.cli import check, doc, explain, explain_synthesis, explore, generate, new, sign, synth, verify
+from robosc.cli import (
+    check,
+    check_log,
+    doc,
+    explain,
+    explain_synthesis,
+    explore,
+    generate,
+    new,
+    plot,
+    sign,
+    synth,
+    verify,
+)
 from robosc.cli import format as format_
 from robosc.cli.arguments import Parser, WrongArguments
 from robosc.cli.output import (
@@ -23,6 +36,11 @@ from robosc.cli.output import (
 )
 from robosc.errors import Diagnostic, LanguageError, RoboscError
 from robosc.source import visible
+
+_COMMANDS = (
+    new, check, format_, synth, verify, sign, explore, generate, explain_synthesis, explain, doc, plot, check_log
+)  # fmt: skip
+"""In the order of `robosc --help`."""
 
 _EPILOG = """\
 exit status:
@@ -42,7 +60,21 @@ def make_parser() -> Parser:
     )
     parser.add_argument("--version", action="version", version=f"robosc {__version__}")
     commands = parser.add_subparsers(title="commands", dest="command", required=True, metavar="COMMAND")
-    for command in (new, check, format_, synth, verify, sign, explore, generate, explain_synthesis, explain, doc):
+    for command in (
+        new,
+        check,
+        format_,
+        synth,
+        verify,
+        sign,
+        explore,
+        generate,
+        explain_synthesis,
+        explain,
+        doc,
+        plot,
+        check_log,
+    ):
         command.add_parser(commands)
     return parser
 

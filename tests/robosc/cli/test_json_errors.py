@@ -28,6 +28,8 @@ WRONG_USE: dict[str, list[str]] = {
     "doc": ["none.rscd"],
     "key": ["no/such/folder/lab"],
     "sign": ["none.rsup", "--key", "none.key"],
+    "plot": ["none.jsonl"],
+    "check-log": ["none.jsonl", "--model", LINE_FOLLOWER],
 }
 """For each command arguments that its parser takes, but that are wrong."""
 

@@ -1,0 +1,151 @@
+"""`robosc check-log`: whether everything in an event log could have happened under the supervisor."""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from robosc.cli import synth
+from robosc.cli.arguments import add_engine_options, read_bundle
+from robosc.cli.output import ExitCode, UsageError, diagnostics_json, print_json
+from robosc.cli.sign import read_supervisor
+from robosc.model.structure import Deployment
+from robosc.source import visible
+
+if TYPE_CHECKING:
+    from robosc.event_logs import LogCheck, LoggedRun
+    from robosc.supervisor import Supervisor
+
+_SHOWN = 20
+
+_DESCRIPTION = """\
+Check an event log (JSON Lines, as every node, the bridge and the simulations write it) against the supervisor: the
+events are replayed from the initial state on the automata. Every request must have been allowed in the state in which
+it happened, every other event possible, every logged state the one that the events lead to; what a supervision layer
+held back must have been forbidden.
+"""
+
+_EPILOG = """\
+exit status:
+  0  nothing is wrong
+  1  something in the log could not have happened, or there is no supervisor
+  2  wrong use; a file that cannot be read or is no event log
+"""
+
+
+def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "check-log",
+        help="check an event log against the supervisor",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("log", type=Path, metavar="LOG", help="the event log, a file of JSON Lines")
+    parser.add_argument(
+        "--model",
+        required=True,
+        type=Path,
+        metavar="FILE",
+        help="the model (.rscd), which is synthesized, or its supervisor (.rsup), which is believed: 'robosc verify' "
+        "checks it",
+    )
+    parser.add_argument(
+        "--deployment",
+        choices=[str(deployment) for deployment in Deployment],
+        help="where the supervisor stood (default: as a .rsup file says; for a model: controller)",
+    )
+    for short, name, what in (("-L", "library", "libraries"), ("-I", "interface", "ROS packages")):
+        parser.add_argument(
+            short,
+            f"--{name}-path",
+            action="append",
+            default=[],
+            type=Path,
+            metavar="DIR",
+            help=f"another folder with {what} of the model, as for 'robosc synth' (may be repeated)",
+        )
+    add_engine_options(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Check; 0 if nothing is wrong, 1 if something is.
+
+    Raises:
+        UsageError: A file cannot be read, or is no event log.
+        InvalidSupervisorError: The supervisor's file is malformed.
+    """
+    from robosc.event_logs import LogError, check_log, read_log
+
+    log: Path = arguments.log
+    try:
+        run_ = read_log(log)
+    except OSError as error:
+        raise UsageError(f"cannot read {log}: {error.strerror or error}") from error
+    except LogError as error:
+        raise UsageError(str(error)) from error
+    supervisor = _supervisor(arguments)
+    if supervisor is None:
+        return ExitCode.FAILED
+    deployment = None if arguments.deployment is None else Deployment(arguments.deployment)
+    found = check_log(run_, supervisor, deployment)
+    if arguments.json:
+        print_json(_document(found, run_, supervisor))
+    else:
+        _print(log, found, supervisor)
+    return ExitCode.OK if found.has_passed else ExitCode.FAILED
+
+
+def _supervisor(arguments: argparse.Namespace) -> "Supervisor | None":
+    """The supervisor to check against; None where there is none, which has been told."""
+    from robosc.supervisor import decode
+
+    if arguments.model.suffix == ".rsup":
+        return decode(read_supervisor(arguments.model))
+    chosen = arguments.deployment
+    arguments.deployment = chosen or str(Deployment.CONTROLLER)
+    bundle = read_bundle(arguments)
+    # What a log tells has happened, however it would have gone on.
+    made = synth.make(arguments, bundle, allow_livelock=True)
+    arguments.deployment = chosen
+    if made.supervisor is None:
+        if arguments.json:
+            print_json({"status": str(made.status), **synth.reasons_json(made), **diagnostics_json(made.diagnostics)})
+        else:
+            synth.report_problems(made, bundle)
+    return made.supervisor
+
+
+def _document(found: "LogCheck", run_: "LoggedRun", supervisor: "Supervisor") -> dict[str, object]:
+    return {
+        "status": "passed" if found.has_passed else "failed",
+        "model": supervisor.model.name,
+        "events": found.events,
+        "requests": found.requests,
+        "blocked": found.blocked,
+        "unjudged": found.unjudged,
+        "restarts": found.restarts,
+        "dropped": run_.dropped,
+        "notes": list(found.notes),
+        "violation_count": found.violation_count,
+        "violations": [{"line": item.line, "time": item.time_s, "message": item.sentence} for item in found.violations],
+    }
+
+
+def _print(log: Path, found: "LogCheck", supervisor: "Supervisor") -> None:
+    lines = [f"{log}:{item.line}: {item.sentence}" for item in found.violations[:_SHOWN]]
+    if found.violation_count > len(lines):
+        lines.append(f"and {found.violation_count - len(lines)} more (--json tells the first 1000)")
+    counts = [f"{found.events} events, {found.requests} of them requests"]
+    if found.blocked:
+        unjudged = f" ({found.unjudged} for a reason that no state tells)" if found.unjudged else ""
+        counts.append(f"{found.blocked} requests held back{unjudged}")
+    if found.restarts:
+        counts.append(f"{found.restarts} restarts")
+    word = "passed" if found.has_passed else f"failed: {found.violation_count} violations"
+    lines.append(f"{log}: {word} against the supervisor of {supervisor.model.name}: {', '.join(counts)}")
+    lines += [f"note: {note}" for note in found.notes]
+    sys.stdout.write("".join(f"{visible(line)}\n" for line in lines))

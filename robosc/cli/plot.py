@@ -1,0 +1,102 @@
+"""`robosc plot`: the sequence of events in an event log, as a picture or a page."""
+
+import argparse
+import math
+import sys
+from pathlib import Path
+
+from robosc.cli.output import ExitCode, UsageError, print_json
+from robosc.source import visible
+
+_DESCRIPTION = """\
+Draw the sequence of events in an event log (JSON Lines, as every node, the bridge and the simulations write it): time
+to the right, one row for each event, controllable events as orange triangles, uncontrollable ones as blue dots, faults,
+stops and restarts as lines. Where thousands of events stand side by side, marks that would cover a mark of the same
+event are left out, and the plot says how many.
+"""
+
+
+def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command."""
+    parser = commands.add_parser("plot", help="draw the sequence of events in an event log", description=_DESCRIPTION)
+    parser.add_argument("log", type=Path, metavar="LOG", help="the event log, a file of JSON Lines")
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help="where to draw: .png or .svg for a picture, .html for a page that can be zoomed and needs no network "
+        "(default: the log's name with .png, beside it)",
+    )
+    parser.add_argument(
+        "--from", dest="begin_s", type=_seconds, metavar="S", help="begin S seconds after the log begins"
+    )
+    parser.add_argument("--to", dest="end_s", type=_seconds, metavar="S", help="end S seconds after the log begins")
+    parser.add_argument(
+        "--event",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="show this event only (may be repeated); * stands for anything, as in '*.request'",
+    )
+    parser.add_argument("--title", default=None, help="what stands above it (default: the log's name)")
+    parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
+    parser.set_defaults(run=run)
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError
+    return value
+
+
+_seconds.__name__ = "number of seconds"
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Draw; 0 if that is done.
+
+    Raises:
+        UsageError: The log cannot be read or is none, or there is nothing in it as asked.
+    """
+    from robosc.event_logs import LogError, PlotError, draw_sequence, read_log
+
+    log: Path = arguments.log
+    output: Path = arguments.output or log.with_suffix(".png")
+    try:
+        run_ = read_log(log)
+    except (LogError, OSError) as error:
+        raise UsageError(_reason(log, error)) from error
+    if output.exists() and output.samefile(log):
+        raise UsageError(f"{output} is the log itself: draw to another file")
+    title = log.stem if arguments.title is None else arguments.title
+    try:
+        drawn = draw_sequence(
+            run_, output, begin_s=arguments.begin_s, end_s=arguments.end_s, events=arguments.event, title=title[:200]
+        )
+    except PlotError as error:
+        raise UsageError(str(error)) from error
+    except OSError as error:
+        raise UsageError(f"cannot write {output}: {error.strerror or error}") from error
+    if arguments.json:
+        print_json(
+            {
+                "file": str(drawn.path),
+                "events": drawn.events,
+                "marks": drawn.marks,
+                "rows": list(drawn.rows),
+                "begin_s": round(drawn.begin_s, 6),
+                "end_s": round(drawn.end_s, 6),
+                "notes": list(drawn.notes),
+            }
+        )
+    else:
+        span = f"{drawn.begin_s:.3f} s to {drawn.end_s:.3f} s"
+        sys.stdout.write(visible(f"{drawn.path}: {drawn.events} events of {len(drawn.rows)} kinds, {span}") + "\n")
+        sys.stdout.write("".join(f"note: {visible(note)}\n" for note in drawn.notes))
+    return ExitCode.OK
+
+
+def _reason(log: Path, error: Exception) -> str:
+    return f"cannot read {log}: {error.strerror or error}" if isinstance(error, OSError) else str(error)

@@ -1,0 +1,26 @@
+"""Event logs after the fact: read, checked against the supervisor, drawn as a sequence of events.
+
+An executor writes its log in one format whatever it runs on (`robosc.execution.event_log`): the nodes of every target,
+the bridge and the simulations. Drawing needs the extra `robosc[plot]`; reading and checking need nothing more.
+"""
+
+from robosc.event_logs.checking import LogCheck, Violation, WrongDeploymentError, check_log
+from robosc.event_logs.drawing import Drawn, PlottingUnavailableError, draw_sequence
+from robosc.event_logs.reading import LogError, read_log
+from robosc.event_logs.sequence import PlotError
+from robosc.event_logs.structure import LogEntry, LoggedRun
+
+__all__ = [
+    "Drawn",
+    "LogCheck",
+    "LogEntry",
+    "LogError",
+    "LoggedRun",
+    "PlotError",
+    "PlottingUnavailableError",
+    "Violation",
+    "WrongDeploymentError",
+    "check_log",
+    "draw_sequence",
+    "read_log",
+]

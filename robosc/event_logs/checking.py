@@ -1,0 +1,210 @@
+"""Whether what a log tells could have happened under a supervisor.
+
+The events are replayed from the initial state on the automata: each request must have been allowed by plants, ranges,
+requirements and what synthesis has added in the state that the events before it led to, each other event must have
+been possible, and each logged state must be the one that they lead to. Resets, cancels and tau transitions stand in a
+log as events like any other; a request is wrong while one of the resets or taus was still to be taken, since the
+executor takes them first. Where something is wrong the replay goes on from what the log tells.
+"""
+
+from dataclasses import dataclass
+
+from robosc.errors import RoboscError
+from robosc.event_logs.replay import Replay
+from robosc.event_logs.structure import LogEntry, LoggedRun
+from robosc.model.structure import CommunicationKind, Deployment, EventKind
+from robosc.supervisor.structure import Supervisor
+
+MAXIMUM_VIOLATIONS = 1000
+"""Violations that are told one by one: more are only counted."""
+
+_FAULT = "a fault"
+
+
+class WrongDeploymentError(RoboscError):
+    """The supervisor was made for another deployment than the run's."""
+
+
+@dataclass(frozen=True, slots=True)
+class Violation:
+    """Something in a log that the supervisor does not account for.
+
+    Attributes:
+        line: The line of the log.
+        time_s: When, in seconds since 1970-01-01 UTC.
+        sentence: What is wrong.
+    """
+
+    line: int
+    time_s: float
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True)
+class LogCheck:
+    """What was found out about a log.
+
+    Attributes:
+        violations: In the order of the log; at most `MAXIMUM_VIOLATIONS`.
+        violation_count: How many there are in all.
+        events: How many events were replayed.
+        requests: How many of them were requests.
+        blocked: How many requests a supervision layer held back.
+        unjudged: How many of those were held back for a reason that no state tells: a NaN in the message, a sensor
+            that was awaited.
+        restarts: How often the model began again.
+        notes: What a reader should know of how whole the log is: after entries that were lost, much that looks wrong
+            may have been right.
+    """
+
+    violations: tuple[Violation, ...]
+    violation_count: int
+    events: int
+    requests: int
+    blocked: int
+    unjudged: int
+    restarts: int
+    notes: tuple[str, ...]
+
+    @property
+    def has_passed(self) -> bool:
+        """Whether nothing is wrong."""
+        return self.violation_count == 0
+
+
+def check_log(run: LoggedRun, supervisor: Supervisor, deployment: Deployment | None = None) -> LogCheck:
+    """Check a log against the supervisor that it should be of.
+
+    Args:
+        run: The log.
+        supervisor: The supervisor; believed.
+        deployment: Where it stood; None: where it was made for.
+
+    Raises:
+        WrongDeploymentError: It was made for another deployment, and its model has actions.
+        UnsupportedModelError: Its automata cannot be replayed: received data has infinitely many values.
+    """
+    deployment = supervisor.deployment if deployment is None else Deployment(deployment)
+    has_actions = any(item.kind is CommunicationKind.ACTION for item in supervisor.model.communications)
+    if has_actions and supervisor.deployment is not deployment:
+        raise WrongDeploymentError(
+            f"the supervisor was made for the deployment {supervisor.deployment}, not {deployment}, and its model has "
+            "actions"
+        )
+    checking = _Checking(Replay(supervisor, deployment), deployment)
+    for entry in run.entries:
+        checking.take(entry)
+    return checking.result(run)
+
+
+class _Checking:
+    """One log while it is checked."""
+
+    def __init__(self, replay: Replay, deployment: Deployment) -> None:
+        self._replay = replay
+        self._deployment = deployment
+        self._violations: list[Violation] = []
+        self._count = 0
+        self._events = self._requests = self._blocked = self._unjudged = self._restarts = 0
+        # What keeps the robot at rest, by the texts of the log.
+        self._stops: set[str] = set()
+        # Actions that were requested: their goals may be under way for longer than the model knows.
+        self._requested: set[str] = set()
+
+    def result(self, run: LoggedRun) -> LogCheck:
+        return LogCheck(
+            violations=tuple(self._violations),
+            violation_count=self._count,
+            events=self._events,
+            requests=self._requests,
+            blocked=self._blocked,
+            unjudged=self._unjudged,
+            restarts=self._restarts,
+            notes=run.notes(),
+        )
+
+    def take(self, entry: LogEntry) -> None:
+        match entry.kind:
+            case "event":
+                self._event(entry)
+            case "unexpected" if entry.event:
+                self._unexpected(entry)
+            case "blocked":
+                self._held_back(entry)
+            case "restart":
+                self._restarts += 1
+                self._replay.restart()
+                self._stops.clear()
+            case "fault":
+                self._stops.add(_FAULT)
+            case "stop":
+                self._stops.add(entry.text("what"))
+            case "resume":
+                # `scan is back` ends `scan on /scan is stale`.
+                name = entry.text("what").removesuffix(" is back")
+                self._stops = {item for item in self._stops if not item.startswith(f"{name} on ")}
+
+    def _event(self, entry: LogEntry) -> None:
+        replay, event = self._replay, entry.event
+        self._events += 1
+        if not replay.has(event):
+            self._wrong(entry, f"{event} is no event of the model")
+            return
+        problems: list[str] = []
+        name, _, kind = event.rpartition(".")
+        if kind == EventKind.REQUEST:
+            self._requests += 1
+            self._requested.add(name)
+            if self._stops:
+                problems.append(f"{event} happened while the robot was to be at rest: {'; '.join(sorted(self._stops))}")
+            pending = replay.pending()
+            if pending is not None:
+                problems.append(f"{event} happened although {pending} was still to be taken before any request")
+        if kind != EventKind.CANCEL and entry.is_controllable is not replay.is_controllable(event):
+            # A cancel is the caller's or the layer's own; both stand in the log of a layer.
+            what = "controllable" if entry.is_controllable else "uncontrollable"
+            problems.append(f"{event} is logged as {what}")
+        why = replay.refusal(event) if replay.is_controllable(event) else ""
+        if why:
+            problems.append(f"{event} was not allowed: {why}")
+        if why and not replay.is_possible(event):
+            replay.adopt(event, entry.state)
+        else:
+            problems += replay.step(event, entry.data, entry.state)
+        if problems:
+            self._wrong(entry, "; ".join(problems))
+
+    def _unexpected(self, entry: LogEntry) -> None:
+        if self._replay.has(entry.event) and self._replay.is_possible(entry.event):
+            self._wrong(entry, f"{entry.event} is logged as unexpected, but could happen")
+
+    def _held_back(self, entry: LogEntry) -> None:
+        """Whether a layer held a request back with reason."""
+        self._blocked += 1
+        identifier, why = entry.text("identifier"), entry.text("why")
+        if self._deployment is Deployment.CONTROLLER:
+            self._wrong(entry, "a controller holds back nothing, as a layer does")
+            return
+        candidates = self._replay.requests.get(identifier, ())
+        if not candidates:
+            self._wrong(entry, f"a request on {identifier} was held back, but the model has none there")
+            return
+        names = ", ".join(f"{item.name}.request" for item in candidates)
+        match why:
+            case "not allowed now":
+                # Which of several messages it was the log does not tell: one that is forbidden is reason enough.
+                if not any(self._replay.refusal(f"{item.name}.request") for item in candidates):
+                    self._wrong(entry, f"a request on {identifier} was held back, but {names} was allowed")
+            case "stopped":
+                if not self._stops:
+                    self._wrong(entry, f"a request on {identifier} was held back as stopped, but nothing stopped it")
+            case "its last goal may still be under way":
+                if not any(item.name in self._requested for item in candidates):
+                    self._wrong(entry, f"a request on {identifier} was held back, but {names} never happened before")
+            case _:
+                self._unjudged += 1
+
+    def _wrong(self, entry: LogEntry, sentence: str) -> None:
+        self._count += 1
+        if len(self._violations) < MAXIMUM_VIOLATIONS:
+            self._violations.append(Violation(entry.line, entry.time_s, sentence))

@@ -1,0 +1,108 @@
+"""Sequences of events as pictures and pages, as in the paper's Figures 14 and 15.
+
+Time goes to the right, one row stands for an event. Orange triangles are controllable, blue dots uncontrollable: the
+tones are those that M. Okabe and K. Ito propose for colour-blind readers ("Color Universal Design", 2008), and shape
+tells the two apart without any colour.
+"""
+
+import importlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from robosc.errors import RoboscError
+from robosc.event_logs.sequence import PlotError, sequence_of
+from robosc.event_logs.structure import LoggedRun
+
+CONTROLLABLE = "#D55E00"
+UNCONTROLLABLE = "#0072B2"
+
+SUFFIXES = (".png", ".svg", ".html")
+"""What can be drawn, by the file's name."""
+
+
+class PlottingUnavailableError(RoboscError, LookupError):
+    """A package that draws is not installed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """What stands in a plot.
+
+    Attributes:
+        path: Its file.
+        events: How many events there are in the time window.
+        marks: How many marks were drawn for them.
+        rows: Names of the events that have a row, from top to bottom.
+        begin_s: Where the time axis begins, in seconds since the begin of the log.
+        end_s: Where it ends.
+        notes: What is not shown, in sentences.
+    """
+
+    path: Path
+    events: int
+    marks: int
+    rows: tuple[str, ...]
+    begin_s: float
+    end_s: float
+    notes: tuple[str, ...]
+
+
+def draw_sequence(
+    run: LoggedRun,
+    path: str | Path,
+    *,
+    begin_s: float | None = None,
+    end_s: float | None = None,
+    events: Sequence[str] = (),
+    title: str = "",
+) -> Drawn:
+    """Draw a log. The same log gives the same file.
+
+    Args:
+        run: The log.
+        path: Where to: `.png` and `.svg` are pictures, `.html` a page that can be zoomed and needs no network.
+        begin_s: Begin of the time window, in seconds since the begin of the log; None: the first event.
+        end_s: Its end; None: the last event.
+        events: Names, or patterns such as `*.request`, of the events to show; empty: all.
+        title: What stands above it.
+
+    Raises:
+        PlotError: There is nothing to show, or no such kind of file.
+        PlottingUnavailableError: The extra `robosc[plot]` is not installed.
+        OSError: The file cannot be written.
+    """
+    target = Path(path)
+    suffix = target.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise PlotError(f"{target}: plots are {', '.join(SUFFIXES)} files")
+    sequence = sequence_of(run, begin_s, end_s, events)
+    if suffix == ".html":
+        content, drawn = _drawer("page", "plotly").page(sequence, title)
+    else:
+        content, drawn = _drawer("picture", "matplotlib").picture(sequence, title, suffix[1:])
+    target.write_bytes(content)
+    return Drawn(
+        path=target,
+        events=drawn.count,
+        marks=drawn.drawn,
+        rows=tuple(row.event for row in drawn.rows),
+        begin_s=drawn.begin_s,
+        end_s=drawn.end_s,
+        notes=drawn.notes,
+    )
+
+
+def _drawer(module: str, package: str) -> Any:
+    """A module of this package that draws with another package, loaded on use.
+
+    Raises:
+        PlottingUnavailableError: That is not installed.
+    """
+    try:
+        return importlib.import_module(f"robosc.event_logs.{module}")
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] != package:
+            raise
+        raise PlottingUnavailableError(f"this plot needs {package}: pip install 'robosc[plot]'") from error

@@ -1,0 +1,143 @@
+"""Reads event logs, which may come from anywhere: every size is bounded, and what is wrong is told with its line."""
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NoReturn
+
+from robosc.errors import RoboscError
+from robosc.event_logs.structure import LogEntry, LoggedRun
+
+MAXIMUM_BYTES = 1 << 29
+"""Size of a file beyond which it is not read."""
+
+MAXIMUM_LINE_BYTES = 1 << 20
+"""The longest entry: the state of a robot with thousands of components."""
+
+MAXIMUM_ENTRIES = 1_000_000
+"""A day of ten events a second."""
+
+_MAXIMUM_NAME = 600
+"""Characters of an event's name: two identifiers of 255 and more."""
+
+
+class LogError(RoboscError):
+    """A file is no event log, or too large a one; the message tells the line."""
+
+
+def read_log(path: str | Path) -> LoggedRun:
+    """Read a log (JSON Lines).
+
+    A last line that is cut off is left out and told, and so are lines that were torn because the disk was full: their
+    writer has counted them as dropped.
+
+    Args:
+        path: The file; no pipe or device, which might never end.
+
+    Raises:
+        LogError: It is no event log, or too large.
+        OSError: It cannot be read.
+    """
+    file = Path(path)
+    if file.exists() and not (file.is_file() or file.is_dir()):
+        # A pipe would not even open before somebody writes.
+        raise LogError(f"{path} is no plain file")
+    with file.open("rb") as stream:
+        size = file.stat().st_size
+        if size > MAXIMUM_BYTES:
+            raise LogError(f"{path} has {size} bytes; a log of more than {MAXIMUM_BYTES} is not read")
+        return _Reading(str(path)).read(stream)
+
+
+class _Reading:
+    """One log while it is read."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._entries: list[LogEntry] = []
+        self._dropped = 0
+        self._torn: list[tuple[int, str]] = []
+        self._state: Mapping[str, Any] = {}
+
+    def read(self, stream: Any) -> LoggedRun:
+        number, is_ended, read_bytes = 0, True, 0
+        while content := stream.readline(MAXIMUM_LINE_BYTES + 1):
+            number += 1
+            read_bytes += len(content)
+            is_ended = content.endswith(b"\n")
+            if len(content) > MAXIMUM_LINE_BYTES:
+                self._refuse(number, f"longer than {MAXIMUM_LINE_BYTES} bytes")
+            if read_bytes > MAXIMUM_BYTES or number > MAXIMUM_ENTRIES:
+                # It may also have grown since its size was looked up.
+                self._refuse(number, f"a log of more than {MAXIMUM_ENTRIES} lines is not read")
+            self._take(number, content)
+        torn_line = None
+        if self._torn and self._torn[-1][0] == number and not is_ended:
+            torn_line = self._torn.pop()[0]
+        if len(self._torn) > self._dropped:
+            self._refuse(*self._torn[0])
+        return LoggedRun(tuple(self._entries), self._dropped, torn_line)
+
+    def _take(self, number: int, content: bytes) -> None:
+        if not content.strip():
+            return
+        try:
+            document = json.loads(content.decode("utf-8"), parse_constant=_refuse_constant)
+        except RecursionError:
+            self._refuse(number, "nested too deeply")
+        except ValueError as error:
+            if not (self._entries or content.startswith(b"{")):
+                self._refuse(number, "no entry of an event log")
+            self._torn.append((number, f"no JSON: {str(error)[:200]}"))
+            return
+        if not isinstance(document, dict):
+            self._refuse(number, "no JSON object")
+        self._entries.append(self._entry(number, document))
+
+    def _entry(self, number: int, document: dict[str, Any]) -> LogEntry:
+        time_s, kind = document.get("time"), document.get("kind")
+        if not isinstance(time_s, int | float) or isinstance(time_s, bool) or not math.isfinite(time_s):
+            self._refuse(number, "its 'time' is no number of seconds")
+        if not isinstance(kind, str) or not 0 < len(kind) <= _MAXIMUM_NAME:
+            self._refuse(number, "it has no 'kind'")
+        event = document.get("event", "")
+        if not isinstance(event, str) or len(event) > _MAXIMUM_NAME or (kind == "event" and not event):
+            self._refuse(number, "its 'event' is no event's name")
+        is_controllable = document.get("controllable", False)
+        if not isinstance(is_controllable, bool):
+            self._refuse(number, "its 'controllable' is neither true nor false")
+        if kind == "event":
+            document["state"] = self._shared_state(number, document.get("state"))
+        if kind == "dropped":
+            count = document.get("count")
+            if not isinstance(count, int) or isinstance(count, bool) or count < 0:
+                self._refuse(number, "its 'count' is no number of entries")
+            self._dropped += count
+        return LogEntry(number, float(time_s), kind, event, is_controllable, document)
+
+    def _shared_state(self, number: int, state: object) -> Mapping[str, Any]:
+        """The state of an entry; components that did not change are those of the entry before, to save room."""
+        if not isinstance(state, dict):
+            self._refuse(number, "it has no 'state'")
+        for name, part in state.items():
+            before = self._state.get(name)
+            if before is not None and part == before:
+                # Equal in Python, but 1, 1.0 and true are different values of a variable.
+                if repr(part) == repr(before):
+                    state[name] = before
+            elif not _is_component(part):
+                self._refuse(number, f"the state of '{name[:_MAXIMUM_NAME]}' is no state with variables")
+        self._state = state
+        return state
+
+    def _refuse(self, number: int, why: str) -> NoReturn:
+        raise LogError(f"{self._name}, line {number}: {why}")
+
+
+def _is_component(part: object) -> bool:
+    return isinstance(part, dict) and isinstance(part.get("state"), str) and isinstance(part.get("variables"), dict)
+
+
+def _refuse_constant(text: str) -> NoReturn:
+    raise ValueError(f"{text} is no JSON number")

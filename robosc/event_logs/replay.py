@@ -1,0 +1,362 @@
+"""A supervisor's automata, led through what a log tells.
+
+This is deliberately not the executor: what can happen and where it leads comes from the explicit meaning of the
+automata (`robosc.automata.Semantics`) and the conditions that synthesis has added. Variables that synthesis leaves out
+are computed by the slow evaluator, as far as the log tells what they are made of: it leaves out arrays.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+
+from robosc.automata import Semantics, to_automata
+from robosc.automata.compile import Carried, State
+from robosc.automata.plants import communication_plant, communication_plant_name
+from robosc.automata.state import Subject, subject_domain, subjects
+from robosc.event_logs.data import MISFIT, NOT_TOLD, Misfit, NotTold, Received, is_same, path_text, value_of
+from robosc.expressions import DoubleType, IntegerType, PathStep, Value
+from robosc.expressions.evaluate import evaluate
+from robosc.expressions.values import assignable_double, assignable_integer
+from robosc.model.structure import (
+    Behaviour,
+    Communication,
+    CommunicationKind,
+    Component,
+    Deployment,
+    EventKind,
+    Model,
+    Transition,
+    Variable,
+    is_tau,
+)
+from robosc.supervisor.conditions import state_predicates
+from robosc.supervisor.structure import Supervisor
+
+_WITH_RESET = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
+_NAMES_SHOWN = 3
+
+
+class _NotToldError(Exception):
+    """A value depends on something that the log leaves out."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Stored:
+    """A variable that synthesis leaves out: it decides nothing, but its value goes out with requests."""
+
+    component: str
+    variable: Variable
+
+    def assigned(self, value: Any) -> Value | None:
+        """What it takes, or None if it keeps what it has."""
+        found: Value | None
+        match self.variable.type:
+            case IntegerType(low=int(low), high=int(high)):
+                found = assignable_integer(value, low, high)
+            case DoubleType():
+                found = assignable_double(value)
+            case _:
+                found = value
+        return found
+
+
+class Replay:
+    """The state that the events so far lead to.
+
+    Args:
+        supervisor: Its automata, requirements and added conditions.
+        deployment: Where it stood.
+
+    Raises:
+        UnsupportedModelError: A synthesis variable takes received data with infinitely many values.
+    """
+
+    def __init__(self, supervisor: Supervisor, deployment: Deployment) -> None:
+        model = _own_transitions_first(supervisor.model)
+        system = to_automata(model, deployment)
+        self._model = model
+        self._semantics = Semantics(system)
+        self._added = state_predicates(system, supervisor.added)
+        self._events = {event.name: event.is_controllable for event in system.events}
+        self._subjects = subjects(system)
+        self._places = {subject: place for place, subject in enumerate(self._subjects)}
+        self._domains = [subject_domain(system, subject) for subject in self._subjects]
+        self._inputs = {
+            event: tuple((item.path, item.type) for item in system.inputs if item.event == event)
+            for event in self._events
+        }
+        self._behaviours = {item.name: item.behaviour for item in model.components if item.behaviour}
+        self._received = Received(model)
+        self._updates = _stored_updates(model)
+        self._silent = _silent_events(model)
+        self._plants = {
+            event: (self._places[Subject(plant.name)], {edge.target for edge in plant.edges if edge.event == event})
+            for item in model.communications
+            for plant in (communication_plant(item),)
+            for event in item.events
+        }
+        self.requests: Mapping[str, tuple[Communication, ...]] = _requests(model)
+        self.state: State = ()
+        self.stored: dict[tuple[str, str], Value] = {}
+        self.restart()
+
+    def restart(self) -> None:
+        """Back to the initial state."""
+        self.state = self._semantics.initial
+        self.stored = {
+            (component, variable.name): _initial(variable)
+            for component, behaviour in self._behaviours.items()
+            for variable in behaviour.variables
+            if not variable.is_synthesis
+        }
+
+    # What the state allows.
+
+    def has(self, event: str) -> bool:
+        """Whether the model has an event of that name."""
+        return event in self._events
+
+    def is_controllable(self, event: str) -> bool:
+        """Whether the supervisor may disable it."""
+        return self._events[event]
+
+    def is_possible(self, event: str) -> bool:
+        """Whether the plants can do it."""
+        return self._semantics.enabled(self.state, event)
+
+    def refusal(self, event: str) -> str:
+        """Why a controllable event is not allowed now, in words; empty: it is."""
+        if not self._semantics.enabled(self.state, event):
+            return self._blocked_by(event)
+        if not self._semantics.condition(self.state, event):
+            return "its requirements do not hold"
+        added = self._added.get(event)
+        if added is not None and not added(self.state):
+            return "what the supervisor adds to its requirements does not hold"
+        return ""
+
+    def _blocked_by(self, event: str) -> str:
+        name, _, kind = event.rpartition(".")
+        if not is_tau(event):
+            communication = self._model.communication(name)
+            location = self._location(communication)
+            moves = communication_plant(communication).edges
+            if location is not None and not any(e.source == location and e.event == event for e in moves):
+                return f"the {communication.kind} is {location}"
+        if kind == EventKind.REQUEST or is_tau(event):
+            return "a component has no transition for it in its state, or a variable would leave its range"
+        return "the robot cannot do it in this state"
+
+    def _location(self, communication: Communication) -> str | None:
+        if communication.kind not in _WITH_RESET:
+            return None
+        return str(self.state[self._places[Subject(communication_plant_name(communication))]])
+
+    def pending(self) -> str | None:
+        """A silent step that is still to be taken before any request: a reset, or a tau that changes something."""
+        for event in self._silent:
+            if not self.refusal(event):
+                (target,) = self._semantics.targets(self.state, event)
+                if target != self.state:
+                    return event
+        return None
+
+    # What happens.
+
+    def step(self, event: str, data: Any, logged: Mapping[str, Mapping[str, Any]]) -> tuple[str, ...]:
+        """Take an event, whether it is allowed or not.
+
+        Args:
+            event: An event of the model.
+            data: What the log tells of its data.
+            logged: The state after it by the log: what the log leaves out is taken from there.
+
+        Returns:
+            What is wrong, in sentences: the event is not possible, its data is no such data, or the state after it is
+            another one than the logged. The replay goes on from what the log tells, so that nothing is told twice.
+        """
+        problems: list[str] = []
+        target = self._target(event, data, problems)
+        if target is None:
+            if not problems:
+                problems.append(f"{event} cannot happen here: {self._blocked_by(event)}")
+            self.adopt(event, logged)
+            return tuple(problems)
+        unknown = self._store(event, data)
+        self.state = target
+        for component, name in unknown:
+            self._trust(component, name, logged)
+        differences = self._differences(logged)
+        if differences:
+            shown = "; ".join(differences[:_NAMES_SHOWN])
+            more = f"; and {len(differences) - _NAMES_SHOWN} more" if len(differences) > _NAMES_SHOWN else ""
+            problems.append(f"the state after {event} is not the logged one: {shown}{more}")
+        if problems:
+            self._trust_all(logged)
+        return tuple(problems)
+
+    def _target(self, event: str, data: Any, problems: list[str]) -> State | None:
+        found: list[tuple[tuple[PathStep, ...], Value | None]] = []
+        for path, type_ in self._inputs[event]:
+            # A number outside the declared range would have been moved into it.
+            value = self._received.value(event, data, path)
+            if value is NOT_TOLD or value_of(value, type_) is MISFIT:
+                problems.append(f"{event} carries no {path_text(path)} of the declared type")
+                return None
+            found.append((path, value))
+        given: Carried = tuple(found)
+        return self._semantics.target_with(self.state, event, given)
+
+    def adopt(self, event: str, logged: Mapping[str, Mapping[str, Any]]) -> None:
+        """An event that is not possible has happened, says the log: its service or action is where that leads."""
+        if event in self._plants:
+            place, targets = self._plants[event]
+            if len(targets) == 1:
+                (target,) = targets
+                self._put(place, target)
+        self._trust_all(logged)
+
+    def _trust_all(self, logged: Mapping[str, Mapping[str, Any]]) -> None:
+        for component, behaviour in self._behaviours.items():
+            told = logged.get(component)
+            if told is not None:
+                place = self._places[Subject(component)]
+                if told["state"] in self._domains[place]:
+                    self._put(place, told["state"])
+                for variable in behaviour.variables:
+                    self._trust(component, variable.name, logged)
+
+    def _trust(self, component: str, name: str, logged: Mapping[str, Mapping[str, Any]]) -> None:
+        variable = next(item for item in self._behaviours[component].variables if item.name == name)
+        told = logged.get(component, {}).get("variables", {}).get(name)
+        value = value_of(told, variable.type)
+        if value is None or isinstance(value, Misfit):
+            return
+        if variable.is_synthesis:
+            self._put(self._places[Subject(component, name)], value)
+        else:
+            self.stored[component, name] = value
+
+    def _put(self, place: int, value: Value) -> None:
+        self.state = (*self.state[:place], value, *self.state[place + 1 :])
+
+    def _store(self, event: str, data: Any) -> tuple[tuple[str, str], ...]:
+        """Update what synthesis leaves out, before the state changes; the variables whose value is not known."""
+        new: dict[tuple[str, str], Value] = {}
+        unknown: list[tuple[str, str]] = []
+        for component, transitions in self._updates.get(event, ()):
+            taken = next((item for item, _ in transitions if self._is_taken(component, item)), None)
+            updates = next((updates for item, updates in transitions if item is taken), ())
+            for stored, expression in updates:
+                try:
+                    value = stored.assigned(self._value(expression, event, data))
+                except _NotToldError:
+                    unknown.append((stored.component, stored.variable.name))
+                else:
+                    if value is not None:
+                        new[stored.component, stored.variable.name] = value
+        self.stored.update(new)
+        return tuple(unknown)
+
+    def _is_taken(self, component: str, transition: Transition) -> bool:
+        location = self.state[self._places[Subject(component)]]
+        if transition.source not in (None, location):
+            return False
+        return transition.guard is None or self._value(transition.guard, "", None) is True
+
+    def _value(self, expression: Any, event: str, data: Any) -> Any:
+        def received(path: tuple[PathStep, ...]) -> Any:
+            value = self._received.value(event, data, path)
+            if isinstance(value, Misfit | NotTold):
+                raise _NotToldError
+            return value
+
+        return evaluate(
+            expression,
+            self._variable,
+            lambda component: str(self.state[self._places[Subject(component)]]),
+            received,
+        )
+
+    def _variable(self, component: str, variable: str) -> Value:
+        place = self._places.get(Subject(component, variable))
+        return self.stored[component, variable] if place is None else self.state[place]
+
+    def _differences(self, logged: Mapping[str, Mapping[str, Any]]) -> list[str]:
+        """In what the logged state is another one."""
+        found: list[str] = []
+        for component, behaviour in self._behaviours.items():
+            told = logged.get(component)
+            if told is None:
+                found.append(f"nothing is told of {component}")
+                continue
+            location = self.state[self._places[Subject(component)]]
+            if told["state"] != location:
+                found.append(f"{component} is in {location}, not in {_short(told['state'])}")
+            values = told["variables"]
+            for variable in behaviour.variables:
+                value = self._variable(component, variable.name)
+                if not is_same(values.get(variable.name, MISFIT), value, variable.type):
+                    shown = _short(values.get(variable.name))
+                    found.append(f"{component}.{variable.name} is {_short(value)}, not {shown}")
+        return found
+
+
+def _short(value: object) -> str:
+    text = {True: "true", False: "false"}[value] if isinstance(value, bool) else str(value)
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+def _initial(variable: Variable) -> Value:
+    return float(variable.initial) if isinstance(variable.type, DoubleType) else variable.initial
+
+
+def _own_transitions_first(model: Model) -> Model:
+    """The model with the transitions in the order in which an executor looks at them: a state's own come first."""
+    return msgspec.structs.replace(model, components=tuple(map(_sorted, model.components)))
+
+
+def _sorted(component: Component) -> Component:
+    behaviour: Behaviour | None = component.behaviour
+    if behaviour is None:
+        return component
+    transitions = tuple(sorted(behaviour.transitions, key=lambda item: item.source is None))
+    return msgspec.structs.replace(component, behaviour=msgspec.structs.replace(behaviour, transitions=transitions))
+
+
+_StoredUpdates = tuple[tuple[_Stored, Any], ...]
+
+
+def _stored_updates(model: Model) -> dict[str, list[tuple[str, list[tuple[Transition, _StoredUpdates]]]]]:
+    """For each event that stores something: the components that do, with all their transitions on it."""
+    found: dict[str, list[tuple[str, list[tuple[Transition, _StoredUpdates]]]]] = {}
+    for component in model.components:
+        if component.behaviour is None:
+            continue
+        stored = {
+            item.name: _Stored(component.name, item) for item in component.behaviour.variables if not item.is_synthesis
+        }
+        by_event: dict[str, list[tuple[Transition, _StoredUpdates]]] = {}
+        for transition in component.behaviour.transitions:
+            updates = tuple((stored[u.variable], u.expression) for u in transition.updates if u.variable in stored)
+            by_event.setdefault(transition.event, []).append((transition, updates))
+        for event, transitions in by_event.items():
+            if any(updates for _, updates in transitions):
+                found.setdefault(event, []).append((component.name, transitions))
+    return found
+
+
+def _silent_events(model: Model) -> tuple[str, ...]:
+    resets = (item.event(EventKind.RESET) for item in model.communications if item.kind in _WITH_RESET)
+    return (*resets, *model.taus)
+
+
+def _requests(model: Model) -> dict[str, tuple[Communication, ...]]:
+    """The communications that are requested, by identifier."""
+    found: dict[str, tuple[Communication, ...]] = {}
+    for item in model.communications:
+        if item.kind is not CommunicationKind.OUTGOING_MESSAGE:
+            found[item.identifier] = (*found.get(item.identifier, ()), item)
+    return found

@@ -1,0 +1,193 @@
+"""What a plot of a sequence of events shows: rows, marks along time, and fewer of those that cover others."""
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+from robosc.errors import RoboscError
+from robosc.event_logs.structure import LogEntry, LoggedRun
+
+MAXIMUM_ROWS = 80
+"""Rows that a page can hold: of more, the most frequent are shown."""
+
+MAXIMUM_INTERRUPTIONS = 200
+
+_INTERRUPTIONS = ("fault", "stop", "resume", "restart")
+_MAXIMUM_LABEL = 60
+
+
+class PlotError(RoboscError):
+    """Nothing can be drawn as asked."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One event.
+
+    Attributes:
+        event: Its name.
+        is_controllable: Whether the controller took it by itself.
+        times_s: When it happened, in seconds since the begin of the log.
+        lines: Its lines in the log.
+    """
+
+    event: str
+    is_controllable: bool
+    times_s: tuple[float, ...]
+    lines: tuple[int, ...]
+
+    @property
+    def label(self) -> str:
+        """Its name, short enough to stand beside the row."""
+        return self.event if len(self.event) <= _MAXIMUM_LABEL else self.event[: _MAXIMUM_LABEL - 1] + "…"
+
+    def thinned(self, begin_s: float, end_s: float, places: int) -> "Row":
+        """The row with at most one mark, the first, in each of so many places between two times."""
+        if len(self.times_s) <= places:
+            return self
+        width_s = (end_s - begin_s) / places or 1.0
+        kept: dict[int, int] = {}
+        for number, time_s in enumerate(self.times_s):
+            kept.setdefault(min(int((time_s - begin_s) / width_s), places - 1), number)
+        chosen = sorted(kept.values())
+        times_s = tuple(self.times_s[number] for number in chosen)
+        return Row(self.event, self.is_controllable, times_s, tuple(self.lines[number] for number in chosen))
+
+
+@dataclass(frozen=True, slots=True)
+class Interruption:
+    """A fault, a stop, its end, or a restart: a line through all rows."""
+
+    time_s: float
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class EventSequence:
+    """What is drawn.
+
+    Attributes:
+        rows: From top to bottom, by their first occurrence in the log.
+        interruptions: Faults, stops, their ends and restarts.
+        begin_s: Where the time axis begins, in seconds since the begin of the log.
+        end_s: Where it ends.
+        count: How many events there are in it.
+        notes: What is not shown of what was asked for, in sentences.
+    """
+
+    rows: tuple[Row, ...]
+    interruptions: tuple[Interruption, ...]
+    begin_s: float
+    end_s: float
+    count: int
+    notes: tuple[str, ...]
+
+    @property
+    def drawn(self) -> int:
+        """How many marks there are."""
+        return sum(len(row.times_s) for row in self.rows)
+
+    def thinned(self, places: int) -> "EventSequence":
+        """The same with at most one mark of an event in each of so many places along the time axis."""
+        rows = tuple(row.thinned(self.begin_s, self.end_s, places) for row in self.rows)
+        left_out = self.drawn - sum(len(row.times_s) for row in rows)
+        if not left_out:
+            return self
+        note = f"of {self.drawn} events {left_out} are not drawn: they stand where a mark of the same event is"
+        return EventSequence(rows, self.interruptions, self.begin_s, self.end_s, self.count, (*self.notes, note))
+
+
+def sequence_of(
+    run: LoggedRun, begin_s: float | None = None, end_s: float | None = None, events: Sequence[str] = ()
+) -> EventSequence:
+    """The events of a log in a time window.
+
+    Args:
+        run: The log.
+        begin_s: The window's begin, in seconds since the begin of the log; None: the first event.
+        end_s: Its end; None: the last event.
+        events: Names, or patterns such as `*.request`, of the events to show; empty: all.
+
+    Raises:
+        PlotError: There is nothing to show.
+    """
+    if begin_s is not None and end_s is not None and not begin_s < end_s:
+        raise PlotError(f"the time window from {begin_s:g} s to {end_s:g} s is empty")
+    happened = run.events
+    if not happened:
+        raise PlotError("the log tells of no event")
+    chosen = _chosen(happened, events)
+    inside = [
+        (entry.time_s - run.begin_s, entry)
+        for entry in chosen
+        if (begin_s is None or entry.time_s - run.begin_s >= begin_s)
+        and (end_s is None or entry.time_s - run.begin_s <= end_s)
+    ]
+    if not inside:
+        last_s = max(entry.time_s for entry in chosen) - run.begin_s
+        raise PlotError(f"no event in the time window; the last one is at {last_s:.3f} s")
+    first_s = min(time_s for time_s, _ in inside) if begin_s is None else begin_s
+    last_s = max(time_s for time_s, _ in inside) if end_s is None else end_s
+    shown, notes = _most_frequent([entry for _, entry in inside])
+    interruptions = tuple(
+        Interruption(entry.time_s - run.begin_s, f"{entry.kind}: {entry.text('what')}".removesuffix(": ")[:80])
+        for entry in run.entries
+        if entry.kind in _INTERRUPTIONS and first_s <= entry.time_s - run.begin_s <= last_s
+    )
+    if len(interruptions) > MAXIMUM_INTERRUPTIONS:
+        notes += (f"of {len(interruptions)} faults, stops and restarts the first {MAXIMUM_INTERRUPTIONS} are drawn",)
+    return EventSequence(
+        rows=_rows(inside, shown),
+        interruptions=interruptions[:MAXIMUM_INTERRUPTIONS],
+        begin_s=first_s,
+        end_s=last_s,
+        count=len(inside),
+        notes=(*run.notes(), *notes),
+    )
+
+
+def _chosen(happened: Iterable[LogEntry], patterns: Sequence[str]) -> list[LogEntry]:
+    """The entries of the events that are asked for.
+
+    Raises:
+        PlotError: A pattern fits no event of the log.
+    """
+    happened = list(happened)
+    if not patterns:
+        return happened
+    names = dict.fromkeys(entry.event for entry in happened)
+    wanted: set[str] = set()
+    for pattern in patterns:
+        found = [name for name in names if name == pattern or fnmatchcase(name, pattern)]
+        if not found:
+            known = ", ".join(list(names)[:20])
+            raise PlotError(f"no event of the log is called '{pattern}'; there are {known}")
+        wanted.update(found)
+    return [entry for entry in happened if entry.event in wanted]
+
+
+def _most_frequent(entries: list[LogEntry]) -> tuple[set[str], tuple[str, ...]]:
+    """The events that get a row, and what is to be said of the others."""
+    counts = Counter(entry.event for entry in entries)
+    if len(counts) <= MAXIMUM_ROWS:
+        return set(counts), ()
+    shown = {name for name, _ in counts.most_common(MAXIMUM_ROWS)}
+    return shown, (f"of {len(counts)} different events the {MAXIMUM_ROWS} most frequent are shown",)
+
+
+def _rows(inside: list[tuple[float, LogEntry]], shown: set[str]) -> tuple[Row, ...]:
+    found: dict[str, list[tuple[float, LogEntry]]] = {}
+    for time_s, entry in inside:
+        if entry.event in shown:
+            found.setdefault(entry.event, []).append((time_s, entry))
+    return tuple(
+        Row(
+            event=event,
+            # A cancel of a layer may be the caller's or its own: the first one decides.
+            is_controllable=marks[0][1].is_controllable,
+            times_s=tuple(time_s for time_s, _ in marks),
+            lines=tuple(entry.line for _, entry in marks),
+        )
+        for event, marks in found.items()
+    )

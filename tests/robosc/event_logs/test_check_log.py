@@ -1,0 +1,75 @@
+"""The log check: nothing is wrong with what the reference executors log, and what is wrong is found."""
+
+from collections import Counter
+from pathlib import Path
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robosc.event_logs import check_log
+from robosc.supervisor.structure import Supervisor
+from support.random_controllers import random_controller, random_robot
+from support.random_layers import random_layer
+from support.random_logs import Entry, World, faults, mutated, read
+
+STEPS = 50
+
+
+def random_supervisor_of(dice: Random) -> Supervisor:
+    """Of a controller, synthesized or not, or of a layer."""
+    match dice.randrange(3):
+        case 0:
+            return random_layer(dice)
+        case 1:
+            return random_robot(dice.randrange(2**32))
+    return random_controller(dice.randrange(2**32)) or random_layer(dice)
+
+
+def random_log(seed: int) -> tuple[Random, Supervisor, list[Entry]]:
+    dice = Random(seed)
+    supervisor = random_supervisor_of(dice)
+    return dice, supervisor, World(supervisor, dice).run(STEPS)
+
+
+@settings(deadline=None, max_examples=60)
+@given(seed=st.integers(0, 2**32))
+def test_logs_of_the_reference_executors_have_no_violation(seed: int, tmp_path_factory: pytest.TempPathFactory) -> None:
+    _, supervisor, entries = random_log(seed)
+    found = check_log(read(tmp_path_factory.mktemp("log"), entries), supervisor)
+    assert found.violations == ()
+    assert found.has_passed
+    assert found.events == sum(entry["kind"] == "event" for entry in entries)
+    assert found.blocked == sum(entry["kind"] == "blocked" for entry in entries)
+    assert list(faults(supervisor, entries)) == []
+
+
+@settings(deadline=None, max_examples=120)
+@given(seed=st.integers(0, 2**32))
+def test_a_mutated_log_is_found_where_the_interpreted_system_finds_it(
+    seed: int, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    dice, supervisor, entries = random_log(seed)
+    changed = mutated(dice, supervisor, entries)
+    if changed is None:
+        return
+    found = check_log(read(tmp_path_factory.mktemp("log"), changed), supervisor)
+    of_events = [item.line for item in found.violations if changed[item.line - 1]["kind"] == "event"]
+    assert of_events[:1] == list(faults(supervisor, changed))
+
+
+def test_the_random_logs_show_everything(tmp_path: Path) -> None:
+    total: Counter[str] = Counter()
+    for seed in range(80):
+        dice, supervisor, entries = random_log(seed)
+        total.update(entry["kind"] for entry in entries)
+        total.update(entry["event"].rpartition(".")[2][:4] for entry in entries if entry["kind"] == "event")
+        total.update(entry["why"] for entry in entries if entry["kind"] == "blocked")
+        changed = mutated(dice, supervisor, entries)
+        if changed is not None:
+            total["wrong" if list(faults(supervisor, changed)) else "right"] += 1
+    print(dict(total))
+    kinds = "requ resp erro feed canc rese tau_ restart stop fault resume blocked unexpected wrong right".split()
+    for what in (*kinds, "not allowed now", "stopped", "its last goal may still be under way"):
+        assert total[what] >= 3, what

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from robosc_bridge.simulated.scene import Scene  # type: ignore[import-not-found]
+    from robosc_bridge.simulated.scene import Scene
 
 Connection = Literal["serial", "ros2", "ros1"]
 

@@ -84,6 +84,7 @@ def _robot(options: argparse.Namespace, recorder: Recorder | None) -> SimulatedT
         noise_m=options.noise,
         camera_link=options.camera_link,
         recorder=recorder,
+        patience_s=options.wait,
     )
 
 
@@ -163,6 +164,12 @@ def _parser() -> argparse.ArgumentParser:
         "--pose", type=_pose, metavar="X,Y,HEADING", help="start, in m and rad; default: the scene's, else 0,0,0"
     )
     parser.add_argument("--speed", type=float, default=1.0, metavar="N", help="the world passes N times as fast")
+    parser.add_argument(
+        "--wait",
+        type=float,
+        metavar="S",
+        help="the world waits for its host: no more than so many of its seconds pass after the last bytes from there",
+    )
     parser.add_argument(
         "--noise", type=float, metavar="M", help="standard deviation of the LiDAR in m; default: the scene's, else 0"
     )

@@ -57,6 +57,7 @@ class SimulatedTurtleBot3:
         line: On the floor, in place of a scene; with one, there is a camera.
         camera_link: Where the camera's socket is to be; with a place, there is a camera, also without a line.
         recorder: Takes all bytes, as of the lines `base` and `scanner`; None: nobody does.
+        patience_s: How many seconds of the world pass after the host was heard (`Timebase`); None: it never waits.
 
     Attributes:
         time: That all of it lives by.
@@ -96,6 +97,7 @@ class SimulatedTurtleBot3:
         line: Track | None = None,
         camera_link: Path | None = None,
         recorder: Recorder | None = None,
+        patience_s: float | None = None,
     ) -> None:
         for kind, name, known in (("robot", robot, BODIES), ("base", base, BASES), ("LiDAR", lidar, LIDARS)):
             if name not in known:
@@ -104,7 +106,7 @@ class SimulatedTurtleBot3:
             scene = Scene("walls", room(4.0, 3.0) if walls is None else walls, line=line)
         elif walls is not None or line is not None:
             raise ValueError("a scene has its own walls and its own line")
-        self.time = Timebase(clock, factor)
+        self.time = Timebase(clock, factor, patience_s)
         self.world = World(BODIES[robot], scene, self.time, pose, seed)
         self.left, self.right = wheel_servos(self.world)
         self.opencr: OpenCr | None = None

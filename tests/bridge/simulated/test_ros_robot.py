@@ -34,7 +34,7 @@ def lived(robot: RosRobot, seconds: float, velocity: tuple[float, float] | None 
     for _ in range(round(seconds / STEP_S)):
         if velocity is not None:
             robot.command(*velocity)
-        robot.world.time.advance(STEP_S)
+        robot.advance(STEP_S)
         found += robot.live()
     return found
 
@@ -63,7 +63,7 @@ def test_a_fast_world_tells_its_time_a_hundred_times_a_second_of_the_clock() -> 
 def test_what_was_missed_is_not_made_up_for() -> None:
     robot = in_room()
     robot.live()
-    robot.world.time.advance(3.0)
+    robot.advance(3.0)
     found = robot.live()
     assert Counter(type(reading) for reading in found) == {Clock: 1, Odometry: 1, Scan: 1, Battery: 1}
     assert [reading.stamp_s for reading in found] == pytest.approx([3.0] * 4)
@@ -142,6 +142,31 @@ def test_a_velocity_may_hold_for_ever() -> None:
     assert robot.world.turn_rad_s == pytest.approx(0.1)
 
 
+def test_a_world_in_motion_may_wait_for_the_next_velocity() -> None:
+    robot = robot_in(Scene("open", Walls(())), factor=20.0, patience_s=0.4)
+    robot.command(0.1, 0.0)
+    lived(robot, 0.3)
+    assert robot.world.time.world_s() == pytest.approx(0.4)
+    robot.command(0.1, 0.0)
+    lived(robot, 0.3)
+    assert robot.world.time.world_s() == pytest.approx(0.8)
+    assert robot.world.x_m == pytest.approx(0.08, abs=0.01)
+    # It ends on the computer's clock all the same, and at rest nothing is waited for.
+    lived(robot, 0.3)
+    assert robot.world.speed_m_s == 0.0
+    assert robot.world.time.world_s() > 0.8 + 1.0
+    before_s = robot.world.time.world_s()
+    robot.command(0.0, 0.0)
+    lived(robot, 0.2)
+    assert robot.world.time.world_s() == pytest.approx(before_s + 0.2 * 20)
+
+
+@pytest.mark.parametrize("wrong", [0.0, -1.0, math.nan, math.inf])
+def test_a_patience_that_is_no_time_is_refused(wrong: float) -> None:
+    with pytest.raises(ValueError, match="patience"):
+        in_room(patience_s=wrong)
+
+
 def test_wheels_turn_no_faster_than_the_motors_can() -> None:
     robot = in_room()
     lived(robot, 1.0, (50.0, 0.0))
@@ -211,7 +236,8 @@ def test_frames_sit_where_the_body_has_them() -> None:
 def test_time_that_the_process_did_not_get_is_not_lived() -> None:
     now_s = 0.0
     time = Timebase(PacedClock(), 10.0)
-    pacer = Pacer(time, lambda: now_s)
+    robot = RosRobot(World(BODIES["burger"], room(4.0, 3.0), time))
+    pacer = Pacer(robot, lambda: now_s)
     now_s = 5.0
     pacer.begin()
     now_s += 0.02

@@ -42,7 +42,8 @@ class RosRobot:
     """A robot in a world, without any ROS.
 
     Two times are kept apart, as everywhere in the twin: sensors live in the world's time, and how long a velocity holds
-    is measured on the computer's clock, because the nodes that send it live by that.
+    is measured on the computer's clock, because the nodes that send it live by that. So that a machine that has no time
+    for those nodes does not run a robot in a fast world into a wall, the world may wait for the next velocity.
 
     Args:
         world: In which it is; where its scene has a line, there is a camera.
@@ -50,6 +51,8 @@ class RosRobot:
         lidar: Key of `LIDARS`: how far it sees and how often; all have 360 beams here.
         encoding: Of pictures, one of `ENCODINGS`.
         command_timeout_s: How long a velocity holds on the computer's clock; 0: for ever.
+        patience_s: How many seconds the robot may go in the world after a velocity; then the world stands still until
+            the next one comes, or until this one ends. None: it never waits.
         seed: Of the noise that the world's scene tells of.
 
     Attributes:
@@ -61,7 +64,7 @@ class RosRobot:
         refused: Velocities that were no finite numbers; the wheels stand still on one.
 
     Raises:
-        ValueError: There is no such LiDAR or encoding.
+        ValueError: There is no such LiDAR or encoding, or the patience is no positive, finite number.
     """
 
     def __init__(
@@ -72,11 +75,14 @@ class RosRobot:
         lidar: str = "lds01",
         encoding: str = "mono8",
         command_timeout_s: float = COMMAND_TIMEOUT_S,
+        patience_s: float | None = None,
         seed: int = 0,
     ) -> None:
         for kind, name, known in (("LiDAR", lidar, LIDARS), ("encoding", encoding, ENCODINGS)):
             if name not in known:
                 raise ValueError(f"there is no {kind} {name!r}; there are {', '.join(known)}")
+        if patience_s is not None and not 0 < patience_s < math.inf:
+            raise ValueError(f"the patience must be a positive number of seconds, and is {patience_s}")
         self.battery_v = 12.0
         self.is_scanner_covered = False
         self.is_camera_covered = False
@@ -95,7 +101,12 @@ class RosRobot:
         self._timeout_s = command_timeout_s
         self._noise_m = scene.noise.lidar_m
         self._chance = random.Random(seed)  # noqa: S311 (noise is no secret)
+        self._patience_s = patience_s
+        # On the computer's clock, as far as it was lived.
+        self._host_s = 0.0
         self._commanded_s = -math.inf
+        # Of the world, which goes no further before the next velocity.
+        self._limit_s = math.inf
         self._left_rad, self._right_rad = world.left.angle_rad, world.right.angle_rad
         self._x_m = self._y_m = self._heading_rad = 0.0
         # In the order in which they are told; the clock first, so that who reads a stamp knows the time.
@@ -138,7 +149,7 @@ class RosRobot:
             if not (math.isfinite(linear_m_s) and math.isfinite(angular_rad_s)):
                 self.refused += 1
                 linear_m_s = angular_rad_s = 0.0
-            self._commanded_s = self._time.now_s()
+            self._commanded_s = self._host_s
             self._drive(linear_m_s, angular_rad_s)
 
     def _drive(self, linear_m_s: float, angular_rad_s: float) -> None:
@@ -150,21 +161,35 @@ class RosRobot:
             (self.world.right, linear_m_s + aside_m_s),
         ):
             wheel.goal_rad_s = max(-fastest_rad_s, min(fastest_rad_s, speed_m_s / body.wheel_radius_m))
+        is_at_rest = linear_m_s == 0.0 and angular_rad_s == 0.0
+        waits = self._patience_s is not None and not is_at_rest
+        self._limit_s = self._time.world_s() + (self._patience_s or 0.0) if waits else math.inf
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass on the computer's clock, and in the world unless that waits.
+
+        A velocity that nobody has repeated ends here: call it at least every tenth of a second.
+
+        Args:
+            seconds: On the computer's clock.
+        """
+        with self._time.lock:
+            self._host_s += seconds
+            left_s = (self._limit_s - self._time.world_s()) / self._time.factor
+            self._time.advance(max(min(seconds, left_s), 0.0))
+            if self._timeout_s > 0 and self._host_s - self._commanded_s > self._timeout_s:
+                self.world.catch_up()
+                self._drive(0.0, 0.0)
 
     @property
     def due_s(self) -> float:
-        """The world's time at which `live` has something to do next, the end of a velocity apart."""
+        """The world's time at which `live` has something to do next."""
         return min(self._due_s)
 
     def live(self) -> list[Reading]:
-        """What is due now; what was missed is not made up for.
-
-        Call it at least every tenth of a second on the computer's clock: it ends a velocity that nobody has repeated.
-        """
+        """What is due now; what was missed is not made up for."""
         with self._time.lock:
             self.world.catch_up()
-            if self._timeout_s > 0 and self._time.now_s() - self._commanded_s > self._timeout_s:
-                self._drive(0.0, 0.0)
             now_s = self._time.world_s()
             found = []
             for place, (period_s, make) in enumerate(self._periods):

@@ -149,12 +149,25 @@ class RospySide:
             raise ServingError(f"its rospy side cannot be understood: {error}") from error
 
 
-def _environment(folder: Path) -> dict[str, str]:
-    """That of a program which is not of this interpreter's."""
-    found = dict(os.environ)
+def plain_environment(variables: Mapping[str, str] | None = None) -> dict[str, str]:
+    """The environment of programs of another Python: without what is of this one.
+
+    Args:
+        variables: With it; None: those of this process.
+    """
+    found = dict(os.environ if variables is None else variables)
     # What the wheels of ROS 2 set for themselves.
     if found.pop("_ROS_WHEELS_BOOTSTRAP_COMPLETE", None) is not None:
         found.pop("LD_LIBRARY_PATH", None)
+    own = (Path(sys.prefix), Path(sys.base_prefix))
+    paths = [path for path in found.pop("PYTHONPATH", "").split(os.pathsep) if path]
+    if kept := [path for path in paths if not any(Path(path).is_relative_to(each) for each in own)]:
+        found["PYTHONPATH"] = os.pathsep.join(kept)
+    return found
+
+
+def _environment(folder: Path) -> dict[str, str]:
+    found = plain_environment()
     found["PYTHONPATH"] = os.pathsep.join(filter(None, (str(folder), found.get("PYTHONPATH", ""))))
     return found
 

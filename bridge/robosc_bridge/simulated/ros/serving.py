@@ -69,19 +69,20 @@ class PacedClock(ManualClock):
 
 
 class Pacer:
-    """Moves a world's time along the computer's clock.
+    """Lets a robot and its world live along the computer's clock.
 
     Args:
-        time: Of the world, on a `PacedClock`.
+        robot: In a world on a `PacedClock`.
         monotonic: The computer's clock.
 
     Attributes:
         late_s: On the computer's clock: what was not lived because this process was late.
     """
 
-    def __init__(self, time: Timebase, monotonic: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, robot: RosRobot, monotonic: Callable[[], float] = time.monotonic) -> None:
         self.late_s = 0.0
-        self._time = time
+        self._robot = robot
+        self._time = robot.world.time
         self._monotonic = monotonic
         self._then_s = monotonic()
 
@@ -96,7 +97,7 @@ class Pacer:
         self._then_s = now_s
         lived_s = min(passed_s, LONGEST_S)
         self.late_s += passed_s - lived_s
-        self._time.advance(lived_s)
+        self._robot.advance(lived_s)
 
     def until_s(self, world_s: float) -> float:
         """How long it is, on the computer's clock, until the world's time is so late."""
@@ -164,16 +165,16 @@ def make_robot(options: argparse.Namespace) -> tuple[RosRobot, Pacer]:
         ValueError: There is no such scene, or something in it is wrong, or the speed is no positive number.
     """
     scene = load_scene(options.scene, options.seed)
-    base = Timebase(PacedClock(), options.speed)
-    world = World(BODIES[options.robot], scene, base, seed=options.seed)
+    world = World(BODIES[options.robot], scene, Timebase(PacedClock(), options.speed), seed=options.seed)
     robot = RosRobot(
         world,
         lidar=options.lidar,
         encoding=options.encoding,
         command_timeout_s=options.command_timeout,
+        patience_s=options.wait,
         seed=options.seed,
     )
-    return robot, Pacer(base)
+    return robot, Pacer(robot)
 
 
 def _listen(robot: RosRobot) -> None:
@@ -227,6 +228,12 @@ def parser(prog: str, description: str) -> argparse.ArgumentParser:
         default=COMMAND_TIMEOUT_S,
         metavar="S",
         help="how long a velocity holds, on the computer's clock; 0: for ever; default: %(default)s",
+    )
+    found.add_argument(
+        "--wait",
+        type=float,
+        metavar="S",
+        help="in motion, the world waits for the next velocity S seconds of its own after the last one",
     )
     found.add_argument("--motion", type=Path, metavar="FILE", help="write down how the robot moves (JSON Lines)")
     return found

@@ -10,6 +10,13 @@ from robosc_bridge.simulated.servo import HardwareError, Servo
 from robosc_bridge.simulated.turtlebot3 import SimulatedTurtleBot3
 from robosc_bridge.simulated.world import World
 
+WORLD_HELP = """\
+pose [X Y HEADING]                          tell where the robot is, or put it there (m, rad)
+collisions                                  tell how often it came to a wall or an obstacle
+goal                                        tell `reached S`, in seconds of the world, or `not yet`
+obstacle NAME X Y                           put a round thing somewhere (m)
+obstacle NAME away|back                     take it away, or put it back to where it was"""
+
 HELP = """\
 base|scanner disconnect|reconnect|sound     the plug of a line; `sound` removes its faults
 base|scanner FAULT VALUE                    a fault of a line: {faults}
@@ -27,11 +34,7 @@ scanner cover|uncover|stall|go              the LiDAR
 scanner turn SHARE                          its speed, as a share of the nominal one
 camera disconnect|reconnect                 the plug of the camera
 camera cover|uncover|freeze|go              the camera
-pose [X Y HEADING]                          tell where the robot is, or put it there (m, rad)
-collisions                                  tell how often it came to a wall or an obstacle
-goal                                        tell `reached S`, in seconds of the world, or `not yet`
-obstacle NAME X Y                           put a round thing somewhere (m)
-obstacle NAME away|back                     take it away, or put it back to where it was"""
+{world}"""
 
 
 class UnknownCommandError(ValueError):
@@ -62,25 +65,52 @@ def obey(robot: SimulatedTurtleBot3, line: str) -> str:
         raise UnknownCommandError(str(error)) from error
 
 
+def obey_world(world: World, words: list[str]) -> str:
+    """Do to the world what words say.
+
+    Args:
+        world: To which it is done.
+        words: A command of `WORLD_HELP`.
+
+    Returns:
+        What there is to tell; else nothing.
+
+    Raises:
+        UnknownCommandError: It is not known, or not with such values.
+    """
+    try:
+        match words:
+            case ["pose"]:
+                return "pose " + " ".join(f"{value:.4f}" for value in world.pose)
+            case ["pose", x, y, heading]:
+                world.place(float(x), float(y), float(heading))
+            case ["collisions"]:
+                return f"collisions {world.collisions}"
+            case ["goal"]:
+                return _goal(world)
+            case ["obstacle", name, "away" | "back" as what]:
+                world.put_obstacle(name, what == "back")
+            case ["obstacle", name, x, y]:
+                world.move_obstacle(name, float(x), float(y))
+            case _:
+                raise UnknownCommandError(f"unknown command {' '.join(words)!r}; `help` lists them")
+    except UnknownCommandError:
+        raise
+    except ValueError as error:
+        raise UnknownCommandError(str(error)) from error
+    return ""
+
+
 def _obey(robot: SimulatedTurtleBot3, words: list[str]) -> str:
     match words:
         case ["help"]:
             return HELP.format(
                 faults=", ".join(field.name for field in fields(Faults)),
                 errors=", ".join(name.lower() for name in HardwareError.__members__),
+                world=WORLD_HELP,
             )
-        case ["pose"]:
-            return "pose " + " ".join(f"{value:.4f}" for value in robot.world.pose)
-        case ["pose", x, y, heading]:
-            robot.world.place(float(x), float(y), float(heading))
-        case ["collisions"]:
-            return f"collisions {robot.world.collisions}"
-        case ["goal"]:
-            return _goal(robot.world)
-        case ["obstacle", name, "away" | "back" as what]:
-            robot.world.put_obstacle(name, what == "back")
-        case ["obstacle", name, x, y]:
-            robot.world.move_obstacle(name, float(x), float(y))
+        case ["pose" | "collisions" | "goal" | "obstacle", *_]:
+            return obey_world(robot.world, words)
         case ["left" | "right" as side, *what] if robot.rover is None:
             _to_servo(robot.left if side == "left" else robot.right, what)
         case ["battery", voltage] if robot.opencr is not None:

@@ -1,0 +1,52 @@
+"""What can be done by a line of text to the twin behind ROS."""
+
+import math
+
+from robosc_bridge.simulated.commands import WORLD_HELP, UnknownCommandError, obey_world
+from robosc_bridge.simulated.ros.robot import RosRobot
+
+HELP = f"""\
+scanner cover|uncover                       the LiDAR
+camera cover|uncover                        the camera
+battery V                                   its supply
+{WORLD_HELP}"""
+
+
+def obey(robot: RosRobot, line: str) -> str:
+    """Do what a line says.
+
+    Args:
+        robot: To which it is done.
+        line: A command; an empty one does nothing.
+
+    Returns:
+        What there is to tell; else nothing.
+
+    Raises:
+        UnknownCommandError: It is not known, or not with such values.
+    """
+    words = line.split()
+    match words:
+        case []:
+            return ""
+        case ["help"]:
+            return HELP
+        case ["scanner", "cover" | "uncover" as what]:
+            robot.is_scanner_covered = what == "cover"
+        case ["camera", "cover" | "uncover" as what]:
+            robot.is_camera_covered = what == "cover"
+        case ["battery", text]:
+            robot.battery_v = _voltage(text)
+        case _:
+            return obey_world(robot.world, words)
+    return ""
+
+
+def _voltage(text: str) -> float:
+    try:
+        found = float(text)
+    except ValueError:
+        found = math.nan
+    if not 0 <= found < 100:
+        raise UnknownCommandError(f"a battery has 0 V to 100 V, not {text!r}")
+    return found

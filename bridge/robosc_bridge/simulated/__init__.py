@@ -9,18 +9,21 @@ decoders: both sides stand on the manuals alone.
 from robosc_bridge.simulated.camera import SimulatedCamera
 from robosc_bridge.simulated.datagram_line import DatagramFaults, DatagramLine
 from robosc_bridge.simulated.eye import Eye, Mount
-from robosc_bridge.simulated.floor import Track, oval, parse_track
+from robosc_bridge.simulated.floor import Track, oval, parse_track, spline
 from robosc_bridge.simulated.lidar import LIDARS, Lds01, Lds02, Lds03, Lidar
 from robosc_bridge.simulated.line import Faults, SimulatedLine
+from robosc_bridge.simulated.motion import Motion, MotionError, MotionRecorder, read_motion
 from robosc_bridge.simulated.opencr import OpenCr
 from robosc_bridge.simulated.recorder import Record, Recorder, Tap, read_records
 from robosc_bridge.simulated.robots import BODIES, Body
 from robosc_bridge.simulated.rover import Rover
+from robosc_bridge.simulated.scene import Goal, Noise, Obstacle, Scene, SceneError, load_scene, maze_scene, scene_names
 from robosc_bridge.simulated.servo import HardwareError, Servo
 from robosc_bridge.simulated.servo_bus import ServoBus
+from robosc_bridge.simulated.textures import Texture
 from robosc_bridge.simulated.timebase import Timebase
 from robosc_bridge.simulated.turtlebot3 import BASES, SimulatedTurtleBot3, wheel_servos
-from robosc_bridge.simulated.walls import Walls, maze, parse_walls, room
+from robosc_bridge.simulated.walls import Walls, maze, open_maze, parse_walls, room
 from robosc_bridge.simulated.world import Wheel, World
 
 __all__ = [
@@ -32,32 +35,47 @@ __all__ = [
     "DatagramLine",
     "Eye",
     "Faults",
+    "Goal",
     "HardwareError",
     "Lds01",
     "Lds02",
     "Lds03",
     "Lidar",
+    "Motion",
+    "MotionError",
+    "MotionRecorder",
     "Mount",
+    "Noise",
+    "Obstacle",
     "OpenCr",
     "Record",
     "Recorder",
     "Rover",
+    "Scene",
+    "SceneError",
     "Servo",
     "ServoBus",
     "SimulatedCamera",
     "SimulatedLine",
     "SimulatedTurtleBot3",
     "Tap",
+    "Texture",
     "Timebase",
     "Track",
     "Walls",
     "Wheel",
     "World",
+    "load_scene",
     "maze",
+    "maze_scene",
+    "open_maze",
     "oval",
     "parse_track",
     "parse_walls",
+    "read_motion",
     "read_records",
     "room",
+    "scene_names",
+    "spline",
     "wheel_servos",
 ]

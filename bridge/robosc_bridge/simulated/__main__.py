@@ -11,16 +11,19 @@ import signal
 import sys
 import threading
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import FrameType
 
 from robosc_bridge.simulated.commands import UnknownCommandError, obey
 from robosc_bridge.simulated.floor import Track, oval, parse_track
 from robosc_bridge.simulated.lidar import LIDARS
+from robosc_bridge.simulated.motion import MotionRecorder
 from robosc_bridge.simulated.recorder import Recorder
 from robosc_bridge.simulated.robots import BODIES
+from robosc_bridge.simulated.scene import Scene, load_scene, maze_scene, scene_names
 from robosc_bridge.simulated.turtlebot3 import BASES, SimulatedTurtleBot3
-from robosc_bridge.simulated.walls import Walls, maze, parse_walls, room
+from robosc_bridge.simulated.walls import parse_walls, room
 
 OVAL = "oval"
 
@@ -35,6 +38,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0 when it was interrupted, 1 when it cannot be served.
     """
     options = _parser().parse_args(arguments)
+    if options.list_scenes:
+        print("\n".join(scene_names()))
+        return 0
     ended = threading.Event()
 
     def end(number: int, frame: FrameType | None) -> None:
@@ -47,7 +53,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             recorder = None
             if options.record is not None:
                 recorder = Recorder(stack.enter_context(options.record.open("w", encoding="ascii")))
+            motion = None if options.motion is None else stack.enter_context(options.motion.open("w", encoding="ascii"))
             robot = stack.enter_context(_robot(options, recorder))
+            if motion is not None:
+                stack.enter_context(contextlib.closing(MotionRecorder(robot.world, motion)))
             print(f"base {robot.base_path}")
             print(f"scanner {robot.scanner_path}")
             if robot.camera is not None:
@@ -66,16 +75,16 @@ def _robot(options: argparse.Namespace, recorder: Recorder | None) -> SimulatedT
         options.robot,
         options.base,
         options.lidar,
-        walls=_walls(options),
+        scene=_scene(options),
         factor=options.speed,
         pose=options.pose,
         base_link=options.base_link,
         scanner_link=options.scanner_link,
         seed=options.seed,
         noise_m=options.noise,
-        line=_track(options.line),
         camera_link=options.camera_link,
         recorder=recorder,
+        patience_s=options.wait,
     )
 
 
@@ -91,13 +100,18 @@ def _listen(robot: SimulatedTurtleBot3) -> None:
                 print(answer, flush=True)
 
 
-def _walls(options: argparse.Namespace) -> Walls:
-    if options.walls is not None:
-        return parse_walls(options.walls.read_text(encoding="utf-8"))
+def _scene(options: argparse.Namespace) -> Scene:
+    if options.scene is not None:
+        if options.line is not None:
+            raise ValueError("a scene has its own line: --line does not go with --scene")
+        return load_scene(options.scene, options.seed)
+    line = _track(options.line)
     if options.maze is not None:
         columns, rows = options.maze
-        return maze(round(columns), round(rows), seed=options.seed)
-    return room(*options.room)
+        return replace(maze_scene(round(columns), round(rows), seed=options.seed), line=line)
+    if options.walls is not None:
+        return Scene("walls", parse_walls(options.walls.read_text(encoding="utf-8")), line=line)
+    return Scene("room", room(*options.room), line=line)
 
 
 def _track(name: str | None) -> Track | None:
@@ -133,8 +147,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--base", choices=BASES, default="opencr", help="default: %(default)s")
     parser.add_argument("--lidar", choices=sorted(LIDARS), default="lds02", help="default: %(default)s")
     place = parser.add_mutually_exclusive_group()
+    place.add_argument(
+        "--scene", metavar="NAME|FILE", help=f"walls, line, goal, obstacles: {', '.join(scene_names())}, or a YAML file"
+    )
     place.add_argument("--room", type=_size, default=(4.0, 3.0), metavar="XxY", help="a room in metres; default: 4x3")
-    place.add_argument("--maze", type=_size, metavar="COLUMNSxROWS", help="a maze of 0.6 m cells, start at the first")
+    place.add_argument(
+        "--maze", type=_size, metavar="COLUMNSxROWS", help="a maze of 0.6 m cells from the first to its exit"
+    )
     place.add_argument("--walls", type=Path, metavar="FILE", help="walls from a file, `x1 y1 x2 y2` in metres a line")
     parser.add_argument(
         "--line",
@@ -142,17 +161,29 @@ def _parser() -> argparse.ArgumentParser:
         help="a line on the floor, and a camera that sees it: an oval from the start, or `x y` in metres a line",
     )
     parser.add_argument(
-        "--pose", type=_pose, default=(0.0, 0.0, 0.0), metavar="X,Y,HEADING", help="start, in m and rad; default: 0,0,0"
+        "--pose", type=_pose, metavar="X,Y,HEADING", help="start, in m and rad; default: the scene's, else 0,0,0"
     )
     parser.add_argument("--speed", type=float, default=1.0, metavar="N", help="the world passes N times as fast")
-    parser.add_argument("--noise", type=float, default=0.0, metavar="M", help="standard deviation of the LiDAR in m")
-    parser.add_argument("--seed", type=int, default=0, help="of the maze and of all faults that come by chance")
+    parser.add_argument(
+        "--wait",
+        type=float,
+        metavar="S",
+        help="the world waits for its host: no more than so many of its seconds pass after the last bytes from there",
+    )
+    parser.add_argument(
+        "--noise", type=float, metavar="M", help="standard deviation of the LiDAR in m; default: the scene's, else 0"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of the maze and of all that comes by chance")
     parser.add_argument("--base-link", type=Path, metavar="PATH", help="where the base's port is to be")
     parser.add_argument("--scanner-link", type=Path, metavar="PATH", help="where the LiDAR's port is to be")
     parser.add_argument("--camera-link", type=Path, metavar="PATH", help="where the camera's socket is to be")
     parser.add_argument(
         "--record", type=Path, metavar="FILE", help="write all bytes on both lines into a file, with their times"
     )
+    parser.add_argument(
+        "--motion", type=Path, metavar="FILE", help="write how the robot moves into a file (JSON Lines)"
+    )
+    parser.add_argument("--list-scenes", action="store_true", help="print the names of the scenes, and nothing else")
     return parser
 
 

@@ -14,7 +14,6 @@ import threading
 from pathlib import Path
 
 from robosc_bridge.simulated.eye import DARKNESS, Eye, Mount
-from robosc_bridge.simulated.floor import Track
 from robosc_bridge.simulated.world import World
 
 _MOST_CLIENTS = 4
@@ -27,9 +26,9 @@ class SimulatedCamera:
 
     Args:
         world: In which the robot is.
-        track: The line on the floor; None: there is none.
         link: Where its socket is to be; None: in a folder of its own.
-        mount: The camera and where it sits.
+        mount: The camera and where it sits; None: the usual one.
+        seed: Of the noise that the world's scene tells of.
 
     Attributes:
         path: Of the socket.
@@ -41,14 +40,14 @@ class SimulatedCamera:
         OSError: There is something at `link` already, or no socket can be there.
     """
 
-    def __init__(self, world: World, track: Track | None, link: Path | None = None, mount: Mount | None = None) -> None:
+    def __init__(self, world: World, link: Path | None = None, mount: Mount | None = None, seed: int = 0) -> None:
         self.is_covered = False
         self.is_frozen = False
         self.sent = 0
         mount = mount or Mount()
         self._world = world
         self._time = world.time
-        self._eye = Eye(mount, track)
+        self._eye = Eye(mount, world.scene.line, world.scene.floor, world.scene.noise.camera_shades, seed)
         self._period_s = 1.0 / mount.rate_hz
         self._due_s = self._time.now_s()
         self._lock = threading.RLock()

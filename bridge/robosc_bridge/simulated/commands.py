@@ -8,6 +8,7 @@ from robosc_bridge.simulated.line import Faults, SimulatedLine
 from robosc_bridge.simulated.rover import Rover
 from robosc_bridge.simulated.servo import HardwareError, Servo
 from robosc_bridge.simulated.turtlebot3 import SimulatedTurtleBot3
+from robosc_bridge.simulated.world import World
 
 HELP = """\
 base|scanner disconnect|reconnect|sound     the plug of a line; `sound` removes its faults
@@ -27,7 +28,10 @@ scanner turn SHARE                          its speed, as a share of the nominal
 camera disconnect|reconnect                 the plug of the camera
 camera cover|uncover|freeze|go              the camera
 pose [X Y HEADING]                          tell where the robot is, or put it there (m, rad)
-collisions                                  tell how often it came to a wall"""
+collisions                                  tell how often it came to a wall or an obstacle
+goal                                        tell `reached S`, in seconds of the world, or `not yet`
+obstacle NAME X Y                           put a round thing somewhere (m)
+obstacle NAME away|back                     take it away, or put it back to where it was"""
 
 
 class UnknownCommandError(ValueError):
@@ -71,6 +75,12 @@ def _obey(robot: SimulatedTurtleBot3, words: list[str]) -> str:
             robot.world.place(float(x), float(y), float(heading))
         case ["collisions"]:
             return f"collisions {robot.world.collisions}"
+        case ["goal"]:
+            return _goal(robot.world)
+        case ["obstacle", name, "away" | "back" as what]:
+            robot.world.put_obstacle(name, what == "back")
+        case ["obstacle", name, x, y]:
+            robot.world.move_obstacle(name, float(x), float(y))
         case ["left" | "right" as side, *what] if robot.rover is None:
             _to_servo(robot.left if side == "left" else robot.right, what)
         case ["battery", voltage] if robot.opencr is not None:
@@ -101,6 +111,14 @@ def _obey(robot: SimulatedTurtleBot3, words: list[str]) -> str:
         case _:
             raise UnknownCommandError(f"unknown command {' '.join(words)!r}; `help` lists them")
     return ""
+
+
+def _goal(world: World) -> str:
+    with world.time.lock:
+        world.catch_up()
+        if world.scene.goal is None:
+            raise UnknownCommandError("there is no goal in this scene")
+        return "not yet" if world.reached_s is None else f"reached {world.reached_s:.3f}"
 
 
 def _to_servo(servo: Servo, words: list[str]) -> None:

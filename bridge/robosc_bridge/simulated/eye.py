@@ -1,4 +1,4 @@
-"""What a camera on the robot sees of the floor: a pinhole without distortion, noise or shadows.
+"""What a camera on the robot sees of the floor: a pinhole without distortion or shadows.
 
 Central projection (R. Hartley, A. Zisserman, "Multiple View Geometry in Computer Vision", 2nd ed., Cambridge University
 Press 2004, section 6.1), of the one plane that is drawn: walls are not seen.
@@ -8,15 +8,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from robosc_bridge.simulated.floor import Track
+from robosc_bridge.simulated.textures import PLAIN, Shades, Texture
 from robosc_bridge.simulated.walls import Floats
 
-Shades = npt.NDArray[np.uint8]
-
-FLOOR, LINE, DISTANCE, DARKNESS = 200, 30, 160, 0
-"""Shades of the floor, the line, what is above the horizon, and of a covered camera; 255 is white."""
+DISTANCE, DARKNESS = 160, 0
+"""Shades of what is above the horizon, and of a covered camera; 255 is white."""
 
 
 @dataclass(frozen=True)
@@ -51,12 +49,22 @@ class Eye:
     Args:
         mount: The camera.
         track: The line on the floor; None: there is none.
+        floor: What the floor looks like.
+        deviation: Of the noise of each pixel, of 255.
+        seed: Of the noise.
     """
 
-    def __init__(self, mount: Mount, track: Track | None) -> None:
+    def __init__(
+        self, mount: Mount, track: Track | None, floor: Texture = PLAIN, deviation: float = 0.0, seed: int = 0
+    ) -> None:
         self._mount = mount
         self._track = track
-        self._floor = ground_points(mount)
+        self._texture = floor
+        self._deviation = deviation
+        self._chance = np.random.default_rng(seed)
+        points = ground_points(mount)
+        self._is_floor = ~np.isnan(points[:, 0])
+        self._floor: Floats = points[self._is_floor]
 
     def picture(self, pose: tuple[float, float, float]) -> Shades:
         """What is seen from a place.
@@ -70,9 +78,14 @@ class Eye:
         x_m, y_m, heading_rad = pose
         cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
         points = self._floor @ np.array(((cosine, sine), (-sine, cosine))) + np.array((x_m, y_m))
-        shades = np.where(np.isnan(self._floor[:, 0]), DISTANCE, FLOOR).astype(np.uint8)
+        seen = self._texture.shades(points)
         if self._track is not None:
-            shades[self._track.is_line(points)] = LINE
+            seen[self._track.is_line(points)] = self._track.shade
+        shades = np.full(self._is_floor.shape, DISTANCE, dtype=np.uint8)
+        shades[self._is_floor] = seen
+        if self._deviation:
+            noise = self._chance.normal(0.0, self._deviation, shades.shape)
+            shades = np.clip(np.rint(shades + noise), 0, 255).astype(np.uint8)
         return shades.reshape(self._mount.height, self._mount.width)
 
 

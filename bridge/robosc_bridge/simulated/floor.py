@@ -5,7 +5,7 @@ closed.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -16,9 +16,15 @@ from robosc_bridge.simulated.walls import Floats, Walls
 Point = tuple[float, float]
 
 WIDTH_M = 0.05
+SHADE = 30
 
 _CELL_M = 0.005
 _MOST_CELLS = 25_000_000
+_LONGEST_M = 1000.0
+_PIECE_M = 0.2
+# Of a spline: short beside the narrowest line, few enough for any number of points.
+_STEP_M = 0.01
+_MOST_STEPS = 50
 
 
 class Track:
@@ -29,15 +35,17 @@ class Track:
     Args:
         points: Where it goes, in metres; at least two.
         width_m: Of the line.
+        shade: Of the line, from 0 (black) to 255 (white).
 
     Raises:
-        ValueError: There are too few points, a number is not finite, the width is not above 0, or the track lies in
-            more than 625 square metres.
+        ValueError: There are too few points, a number is not finite, the width is not above 0, the track lies in more
+            than 625 square metres, or is longer than 1 km.
     """
 
-    def __init__(self, points: Iterable[Point], width_m: float = WIDTH_M) -> None:
+    def __init__(self, points: Iterable[Point], width_m: float = WIDTH_M, shade: int = SHADE) -> None:
         self.points = tuple(points)
         self.width_m = width_m
+        self.shade = shade
         table = np.array(self.points, dtype=np.float64).reshape(-1, 2)
         if len(table) < 2:
             raise ValueError("a line on the floor has at least two points")
@@ -50,10 +58,17 @@ class Track:
             raise ValueError(
                 f"the line on the floor is spread over {span_m[0]:g} m by {span_m[1]:g} m: that is too far"
             )
+        length_m = float(np.hypot(*np.diff(table, axis=0).T).sum())
+        if length_m > _LONGEST_M:
+            raise ValueError(f"the line on the floor is {length_m:g} m long; it may be {_LONGEST_M:g} m")
         self._middle = Walls((*start, *end) for start, end in pairwise(self.points))
         self._is_line = np.zeros(np.ceil(span_m / _CELL_M).astype(int) + 1, dtype=np.bool_)
         for start, end in pairwise(table):
-            self._draw(start, end)
+            # In short pieces: the cells around a long slanted one are many, and few of them are on it.
+            count = max(1, math.ceil(math.dist(start, end) / _PIECE_M))
+            places = start + np.arange(count + 1)[:, None] / count * (end - start)
+            for first, second in pairwise(places):
+                self._draw(first, second)
 
     def _draw(self, start: Floats, end: Floats) -> None:
         """Mark the cells whose middle is on a piece."""
@@ -102,6 +117,47 @@ def oval(straight_m: float = 1.0, radius_m: float = 0.5, width_m: float = WIDTH_
     right = [(half_m + radius_m * math.cos(angle), radius_m * (1 + math.sin(angle))) for angle in angles]
     left = [(-x_m, 2 * radius_m - y_m) for x_m, y_m in right]
     return Track([*right, *left, right[0]], width_m)
+
+
+def spline(points: Sequence[Point]) -> tuple[Point, ...]:
+    """A smooth curve through points: a cubic spline, by the length of the straight way between them.
+
+    Needs scipy. It is periodic where the last point is the first one, and natural otherwise (C. de Boor, "A Practical
+    Guide to Splines", revised ed., Springer 2001, chapter IV).
+
+    Args:
+        points: At least two, or three of which the last is the first; none twice in a row.
+
+    Returns:
+        Points of the curve, about every centimetre.
+
+    Raises:
+        ValueError: There are too few points, two in a row are the same, or scipy is not installed.
+    """
+    try:
+        # Here, since most scenes do without.
+        from scipy.interpolate import CubicSpline
+    except ImportError as error:
+        raise ValueError("a spline needs scipy; install RoboSC with its extra `simulation`") from error
+    table = np.array(points, dtype=np.float64).reshape(-1, 2)
+    if len(table) < 2:
+        raise ValueError("a spline has at least two points")
+    is_closed = bool((table[0] == table[-1]).all())
+    if is_closed and len(table) < 4:
+        raise ValueError("a closed spline has at least three points")
+    chords_m = np.hypot(*np.diff(table, axis=0).T)
+    if not (chords_m > 0).all():
+        raise ValueError(f"point {int(np.argmin(chords_m)) + 2} of the spline is the same as the one before it")
+    places_m = np.concatenate(([0.0], np.cumsum(chords_m)))
+    curve = CubicSpline(places_m, table, bc_type="periodic" if is_closed else "natural")
+    steps = [max(1, min(_MOST_STEPS, math.ceil(chord_m / _STEP_M))) for chord_m in chords_m.tolist()]
+    asked = [
+        start + (end - start) * step / count
+        for (start, end), count in zip(pairwise(places_m.tolist()), steps, strict=True)
+        for step in range(count)
+    ]
+    found = [(float(x_m), float(y_m)) for x_m, y_m in curve(asked)]
+    return (*found, found[0] if is_closed else (float(table[-1][0]), float(table[-1][1])))
 
 
 def parse_track(text: str) -> Track:

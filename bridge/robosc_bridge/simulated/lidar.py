@@ -12,15 +12,31 @@ import math
 import random
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from robosc_bridge.simulated.lidar_frames import lds01_frame, lds02_frame, lds03_frame, lds03_identity
 from robosc_bridge.simulated.line import Sending
+from robosc_bridge.simulated.walls import Floats
 from robosc_bridge.simulated.world import World
 
 # A thread that was late sends what was missed, but not for longer than this.
 _BACKLOG_S = 0.5
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """A frame before it is measured.
+
+    Attributes:
+        degrees: Where it looks, clockwise from the front.
+        encoded: Makes its bytes of the distances there, in mm; 0: nothing.
+    """
+
+    degrees: Sequence[float]
+    encoded: Callable[[Sequence[int]], bytes]
 
 
 class Lidar(ABC):
@@ -88,20 +104,29 @@ class Lidar(ABC):
         return self._time.now_s() + (self._frame_world_s - self._time.world_s()) / self._time.factor
 
     def live(self) -> Iterable[Sending]:
-        """All frames that are complete."""
-        found: list[Sending] = []
+        """All frames that are complete; what they show is measured at once, where the robot is now."""
         now_s = self._time.world_s()
         self._frame_world_s = max(self._frame_world_s, now_s - _BACKLOG_S)
+        frames: list[_Frame] = []
         while self._is_spinning and self._frame_world_s <= now_s + 1e-9:
             if self.is_stalled:
                 self._frame_world_s = now_s + self._frame_s()
                 break
-            frame = self._frame()
+            frames.append(self._frame())
             self._frame_world_s += self._frame_s()
+        if not frames:
+            return ()
+        distances_mm = self._distances_mm([degree for frame in frames for degree in frame.degrees])
+        found = []
+        start = 0
+        for frame in frames:
+            end = start + len(frame.degrees)
+            data = frame.encoded(distances_mm[start:end])
+            start = end
             if self._is_cut:
-                frame = frame[self._chance.randrange(1, len(frame)) :]
+                data = data[self._chance.randrange(1, len(data)) :]
                 self._is_cut = False
-            found.append(Sending(frame))
+            found.append(Sending(data))
         return found
 
     def receive(self, data: bytes, baud: int) -> Iterable[Sending]:
@@ -127,7 +152,7 @@ class Lidar(ABC):
         """How long the frame takes that is being measured."""
 
     @abstractmethod
-    def _frame(self) -> bytes:
+    def _frame(self) -> _Frame:
         """The frame that is complete now."""
 
     def _distances_mm(self, device_degrees: Sequence[float]) -> list[int]:
@@ -136,13 +161,11 @@ class Lidar(ABC):
         directions = np.stack((np.cos(angles), np.sin(angles)), axis=1)
         return self._measured(self._world.cast(np.zeros_like(directions), directions))
 
-    def _measured(self, lengths_m: Iterable[float]) -> list[int]:
-        found = []
-        for length_m in lengths_m:
-            if self._noise_m:
-                length_m += self._chance.gauss(0.0, self._noise_m)
-            is_seen = not self.is_covered and self.nearest_m <= length_m <= self.farthest_m
-            found.append(round(length_m * 1000) if is_seen else 0)
+    def _measured(self, lengths_m: Floats) -> list[int]:
+        if self._noise_m:
+            lengths_m = lengths_m + [self._chance.gauss(0.0, self._noise_m) for _ in range(len(lengths_m))]
+        is_seen = (lengths_m >= self.nearest_m) & (lengths_m <= self.farthest_m) & (not self.is_covered)
+        found: list[int] = np.rint(np.where(is_seen, lengths_m, 0.0) * 1000).astype(int).tolist()
         return found
 
 
@@ -169,12 +192,15 @@ class Lds01(Lidar):
     def _frame_s(self) -> float:
         return 1.0 / (60 * self.turns_per_s)
 
-    def _frame(self) -> bytes:
+    def _frame(self) -> _Frame:
         degrees = [6 * self._index + place + 1 for place in range(6)]
-        points = [(distance_mm, 1000 if distance_mm else 0) for distance_mm in self._distances_mm(degrees)]
-        frame = lds01_frame(self._index, round(self.turns_per_s * 600), points)
+        encoded = partial(self._encoded, self._index, round(self.turns_per_s * 600))
         self._index = (self._index + 1) % 60
-        return frame
+        return _Frame(degrees, encoded)
+
+    @staticmethod
+    def _encoded(index: int, tenths_rpm: int, distances_mm: Sequence[int]) -> bytes:
+        return lds01_frame(index, tenths_rpm, [(distance_mm, 1000 * bool(distance_mm)) for distance_mm in distances_mm])
 
 
 class Lds02(Lidar):
@@ -197,20 +223,23 @@ class Lds02(Lidar):
     def _frame_s(self) -> float:
         return self._POINTS / self._SAMPLES_PER_S
 
-    def _frame(self) -> bytes:
+    def _frame(self) -> _Frame:
         speed = self.turns_per_s * 360
         start = round(self._degrees * 100) % 36_000
         span = round(speed / self._SAMPLES_PER_S * 100 * (self._POINTS - 1))
         # A host places the points in whole hundredths of a degree.
         step = span // (self._POINTS - 1)
         degrees = [(start + place * step) / 100 for place in range(self._POINTS)]
-        points = [(distance_mm, 200 if distance_mm else 0) for distance_mm in self._optical_mm(degrees)]
         stamp_ms = int(self._time.world_s() * 1000) % 65_536
-        frame = lds02_frame(round(speed), start, (start + span) % 36_000, stamp_ms, points)
+        encoded = partial(self._encoded, round(speed), start, (start + span) % 36_000, stamp_ms)
         self._degrees = (self._degrees + self._POINTS * speed / self._SAMPLES_PER_S) % 360
-        return frame
+        return _Frame(degrees, encoded)
 
-    def _optical_mm(self, device_degrees: Sequence[float]) -> list[int]:
+    @staticmethod
+    def _encoded(speed: int, start: int, end: int, stamp_ms: int, distances_mm: Sequence[int]) -> bytes:
+        return lds02_frame(speed, start, end, stamp_ms, [(each, 200 * bool(each)) for each in distances_mm])
+
+    def _distances_mm(self, device_degrees: Sequence[float]) -> list[int]:
         """What it measures from its optical centre, along the rays on which the corrected points lie."""
         angles = -np.radians(np.asarray(device_degrees))
         cosines, sines = np.cos(angles), np.sin(angles)
@@ -287,20 +316,22 @@ class Lds03(Lidar):
     def _frame_s(self) -> float:
         return self._samples() / self._SAMPLES_PER_S
 
-    def _frame(self) -> bytes:
+    def _frame(self) -> _Frame:
         count = self._samples()
         step = self._degrees_per_sample
         first, last = (_angle(self._degrees + place * step) for place in (0, count - 1))
         # Where a host places them.
         degrees = [(first + place * (last - first) / max(count - 1, 1)) / 64 for place in range(count)]
-        points = [(distance_mm, 200 if distance_mm else 0) for distance_mm in self._distances_mm(degrees)]
         kind = (round(self.turns_per_s * 10) << 1 | 1) & 0xFF if self._begins_turn else 0
-        frame = lds03_frame(kind, first, last, points)
         self._degrees += count * step
         self._begins_turn = self._degrees >= 360 - 1e-6
         if self._begins_turn:
             self._degrees = max(self._degrees - 360, 0.0)
-        return frame
+        return _Frame(degrees, partial(self._encoded, kind, first, last))
+
+    @staticmethod
+    def _encoded(kind: int, first: int, last: int, distances_mm: Sequence[int]) -> bytes:
+        return lds03_frame(kind, first, last, [(each, 200 * bool(each)) for each in distances_mm])
 
 
 def _angle(degrees: float) -> int:

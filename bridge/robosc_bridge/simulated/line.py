@@ -32,6 +32,9 @@ _CHUNK = 4096
 _BUFFER = 4095
 # `poll` knows whole milliseconds only.
 _FINE_S = 0.001
+# A world that passes faster is lived in fewer and larger pieces: a wake-up for each frame would be thousands a second.
+_COARSE_S = 0.002
+_PIECE = 1024
 _BAUDS = {
     getattr(termios, f"B{baud}"): baud
     for baud in (
@@ -262,6 +265,7 @@ class SimulatedLine:
         if self._tap is not None:
             self._tap(True, time.monotonic(), data)
         self.received += len(data)
+        self._time.heard()
         if self.faults.echo:
             self._send([Sending(data)])
         if not self.faults.is_deaf:
@@ -285,6 +289,8 @@ class SimulatedLine:
     def _limit_s(self) -> float:
         wire_s = self._wire[0][0] - time.monotonic() if self._wire else math.inf
         device_s = math.inf if self._time.is_manual else self.device.due_s() - self._time.now_s()
+        if self._time.factor > 1.0:
+            device_s = max(device_s, _COARSE_S)
         return min(wire_s, device_s)
 
     def _host_baud(self) -> int:
@@ -336,6 +342,9 @@ class SimulatedLine:
         now_s = time.monotonic()
         while self._wire and self._wire[0][0] <= now_s:
             _, data = self._wire.popleft()
+            if self._tap is None:
+                while self._wire and self._wire[0][0] <= now_s and len(data) + len(self._wire[0][1]) <= _PIECE:
+                    data += self._wire.popleft()[1]
             if self._master < 0:
                 continue
             written = 0

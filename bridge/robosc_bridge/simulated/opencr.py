@@ -18,6 +18,8 @@ from robosc_bridge.simulated.world import World
 
 DEVICE_ID = 200
 CYCLE_S = 0.020
+# Where the world passes faster, so does what the board does to its motors, as far as a process can serve it.
+_SHORTEST_CYCLE_S = 0.004
 HEARTBEAT_S = 0.500
 _RAW_PER_M_S = 1263.632956882
 _RAW_LIMIT = 337
@@ -100,6 +102,7 @@ class OpenCr:
         self._memory = bytearray(_SIZE)
         self._began_s = self._time.now_s()
         self._cycle_s = self._began_s
+        self._period_s = min(CYCLE_S, max(CYCLE_S / self._time.factor, _SHORTEST_CYCLE_S))
         self._busy_until_s: float | None = None
         self._goal = (0.0, 0.0)
         self._has_motor_power = True
@@ -108,7 +111,7 @@ class OpenCr:
         self._skips_comparison = False
         self._seen_heartbeat = 0
         self._alive_s = self._began_s
-        self._voltages: deque[float] = deque([self.panel.battery_v], maxlen=round(_MEAN_OVER_S / CYCLE_S))
+        self._voltages: deque[float] = deque([self.panel.battery_v], maxlen=round(_MEAN_OVER_S / self._period_s))
         self._low_since_s: float | None = None
         self._start_heading_rad = world.heading_rad
         self._last_speed_m_s = 0.0
@@ -160,9 +163,9 @@ class OpenCr:
         if self._busy_until_s is not None and now_s >= self._busy_until_s:
             found += self._end_calibration(self._busy_until_s)
         if self._busy_until_s is None and now_s >= self._cycle_s:
-            missed = int((now_s - self._cycle_s) / CYCLE_S)
+            missed = int((now_s - self._cycle_s) / self._period_s)
             # One cycle at one time: the wheels have lived on meanwhile, and a late thread must not repeat itself.
-            self._cycle_s += (missed + 1) * CYCLE_S
+            self._cycle_s += (missed + 1) * self._period_s
             self._cycle(now_s)
         return found
 

@@ -3,6 +3,10 @@
 Two times are kept apart. Whatever a device owes its host (heartbeat, bus watchdog, restart) is measured on the clock as
 it is, because the host lives by it. Whatever is physical (motion, a turning scanner) is measured in world time, which
 passes `factor` times as fast.
+
+A fast world makes a host late that is not: what it does within 20 ms, a robot feels after 0.4 s where the world passes
+20 times as fast. So that a machine that has no time for the host does not run the robot into a wall, the world may wait
+for it, as simulators do that let time pass only step by step with a controller.
 """
 
 import math
@@ -20,18 +24,26 @@ class Timebase:
     Args:
         clock: `SystemClock`: the devices live by themselves. `ManualClock`: they live when `advance` is called.
         factor: How many seconds pass in the world in one of the clock.
+        patience_s: How many seconds may pass in the world after the host was heard; then it stands still until it is
+            heard again. Before the host was heard at all, the world passes. None: it never waits.
 
     Raises:
-        ValueError: The factor is no positive, finite number.
+        ValueError: The factor or the patience is no positive, finite number.
     """
 
-    def __init__(self, clock: Clock | None = None, factor: float = 1.0) -> None:
+    def __init__(self, clock: Clock | None = None, factor: float = 1.0, patience_s: float | None = None) -> None:
         if not (math.isfinite(factor) and factor > 0):
             raise ValueError(f"the speed factor must be a positive number, and is {factor}")
+        if patience_s is not None and not (math.isfinite(patience_s) and patience_s > 0):
+            raise ValueError(f"the patience with the host must be a positive number of seconds, and is {patience_s}")
         self.clock: Clock = SystemClock() if clock is None else clock
         self.factor = factor
         self.lock = threading.RLock()
         self._began_s = self.clock.monotonic()
+        self._patience_s = patience_s
+        # By the world's time: when it waits next, and how long it has waited.
+        self._limit_s = math.inf
+        self._waited_s = 0.0
         self._members: list[Callable[[], None]] = []
 
     @property
@@ -45,7 +57,18 @@ class Timebase:
 
     def world_s(self) -> float:
         """Seconds that have passed in the world since the simulation began."""
-        return (self.now_s() - self._began_s) * self.factor
+        with self.lock:
+            world_s = (self.now_s() - self._began_s) * self.factor - self._waited_s
+            if world_s > self._limit_s:
+                self._waited_s += world_s - self._limit_s
+                world_s = self._limit_s
+            return world_s
+
+    def heard(self) -> None:
+        """The host has sent something: the world need not wait for it."""
+        if self._patience_s is not None:
+            with self.lock:
+                self._limit_s = self.world_s() + self._patience_s
 
     def join(self, live: Callable[[], None]) -> None:
         """Call this whenever `advance` has moved the clock by a step."""

@@ -16,6 +16,7 @@ from robosc_bridge.simulated.opencr import OpenCr
 from robosc_bridge.simulated.recorder import Recorder
 from robosc_bridge.simulated.robots import BODIES
 from robosc_bridge.simulated.rover import Rover
+from robosc_bridge.simulated.scene import Scene
 from robosc_bridge.simulated.servo import Servo
 from robosc_bridge.simulated.servo_bus import ServoBus
 from robosc_bridge.simulated.timebase import Timebase
@@ -42,19 +43,21 @@ class SimulatedTurtleBot3:
         robot: Key of `BODIES`.
         base: `opencr`, `dynamixel` for two servos behind an adapter, or `mavlink-rover`.
         lidar: Key of `LIDARS`.
-        walls: Around it; None: a room of 4 m by 3 m.
+        scene: That it is in; None: there are `walls` and a `line` alone.
+        walls: Around it, in place of a scene; None: a room of 4 m by 3 m.
         clock: Of its devices; None: the computer's.
         factor: How much faster the world is than the clock.
-        pose: Where it starts: x, y in metres, heading in rad.
+        pose: Where it starts: x, y in metres, heading in rad; None: where its scene says, or at the origin.
         base_link: Where the base's port is to be; None: anywhere.
         scanner_link: Where the LiDAR's port is to be; None: anywhere.
         seed: Of all that comes by chance.
         has_motors: Whether OpenCR has found its motors when it started.
         calibration_s: How long OpenCR's gyroscope is calibrated.
-        noise_m: Standard deviation of what the LiDAR measures.
-        line: On the floor; with one, there is a camera.
+        noise_m: Standard deviation of what the LiDAR measures; None: as its scene says, or 0.
+        line: On the floor, in place of a scene; with one, there is a camera.
         camera_link: Where the camera's socket is to be; with a place, there is a camera, also without a line.
         recorder: Takes all bytes, as of the lines `base` and `scanner`; None: nobody does.
+        patience_s: How many seconds of the world pass after the host was heard (`Timebase`); None: it never waits.
 
     Attributes:
         time: That all of it lives by.
@@ -70,7 +73,7 @@ class SimulatedTurtleBot3:
         camera: That looks at the floor; None: there is none.
 
     Raises:
-        ValueError: There is no such robot, base or LiDAR.
+        ValueError: There is no such robot, base or LiDAR, or there are walls or a line beside a scene.
         FileExistsError: There is something at a link already.
     """
 
@@ -80,25 +83,31 @@ class SimulatedTurtleBot3:
         base: str = "opencr",
         lidar: str = "lds01",
         *,
+        scene: Scene | None = None,
         walls: Walls | None = None,
         clock: Clock | None = None,
         factor: float = 1.0,
-        pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        pose: tuple[float, float, float] | None = None,
         base_link: Path | None = None,
         scanner_link: Path | None = None,
         seed: int = 0,
         has_motors: bool = True,
         calibration_s: float = 5.0,
-        noise_m: float = 0.0,
+        noise_m: float | None = None,
         line: Track | None = None,
         camera_link: Path | None = None,
         recorder: Recorder | None = None,
+        patience_s: float | None = None,
     ) -> None:
         for kind, name, known in (("robot", robot, BODIES), ("base", base, BASES), ("LiDAR", lidar, LIDARS)):
             if name not in known:
                 raise ValueError(f"there is no {kind} {name!r}; there are {', '.join(known)}")
-        self.time = Timebase(clock, factor)
-        self.world = World(BODIES[robot], room(4.0, 3.0) if walls is None else walls, self.time, pose)
+        if scene is None:
+            scene = Scene("walls", room(4.0, 3.0) if walls is None else walls, line=line)
+        elif walls is not None or line is not None:
+            raise ValueError("a scene has its own walls and its own line")
+        self.time = Timebase(clock, factor, patience_s)
+        self.world = World(BODIES[robot], scene, self.time, pose, seed)
         self.left, self.right = wheel_servos(self.world)
         self.opencr: OpenCr | None = None
         self.bus: ServoBus | None = None
@@ -112,15 +121,16 @@ class SimulatedTurtleBot3:
             device = self.bus = ServoBus((self.left, self.right))
         else:
             device = self.rover = Rover(self.world)
-        self.scanner: Lidar = LIDARS[lidar](self.world, seed=seed, noise_m=noise_m)
+        noise = scene.noise.lidar_m if noise_m is None else noise_m
+        self.scanner: Lidar = LIDARS[lidar](self.world, seed=seed, noise_m=noise)
         base_tap, scanner_tap = (None if recorder is None else recorder.tap(line) for line in ("base", "scanner"))
         self.base_line = SimulatedLine(device, self.time, base_link, seed, base_tap)
         self.camera: SimulatedCamera | None = None
         try:
             self.scanner_line = SimulatedLine(self.scanner, self.time, scanner_link, seed + 1, scanner_tap)
             try:
-                if line is not None or camera_link is not None:
-                    self.camera = SimulatedCamera(self.world, line, camera_link)
+                if scene.line is not None or camera_link is not None:
+                    self.camera = SimulatedCamera(self.world, camera_link, seed=seed)
             except BaseException:
                 self.scanner_line.close()
                 raise

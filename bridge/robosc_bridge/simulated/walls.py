@@ -6,12 +6,15 @@ A wall map as text has one segment per line, `x1 y1 x2 y2` in metres; `#` begins
 import math
 import random
 from collections.abc import Iterable
+from collections.abc import Set as AbstractSet
 
 import numpy as np
 import numpy.typing as npt
 
 Segment = tuple[float, float, float, float]
 Floats = npt.NDArray[np.float64]
+Opening = frozenset[tuple[int, int]]
+"""Two cells of a maze with no wall between them."""
 
 _PARALLEL = 1e-12
 
@@ -96,10 +99,38 @@ def maze(columns: int, rows: int, cell_m: float = 0.6, seed: int = 0) -> Walls:
     Raises:
         ValueError: There is no cell.
     """
+    return _grid(columns, rows, cell_m, _tree(columns, rows, seed))
+
+
+def open_maze(columns: int, rows: int, cell_m: float = 0.6, seed: int = 0) -> tuple[Walls, tuple[float, float]]:
+    """The same maze with an exit: the last cell has no wall towards greater y.
+
+    All of its walls hang together, so that who keeps one of them on the right hand comes to the exit (the wall
+    follower's rule; it was known to W. H. Matthews, "Mazes and Labyrinths", Longmans, Green and Co. 1922, chapter 20).
+
+    Args:
+        columns: Cells along x.
+        rows: Cells along y.
+        cell_m: Width of a cell.
+        seed: Of the choice.
+
+    Returns:
+        The walls, and the middle of the cell outside of the exit.
+
+    Raises:
+        ValueError: There is no cell.
+    """
+    opened = _tree(columns, rows, seed)
+    opened.add(frozenset(((columns - 1, rows - 1), (columns - 1, rows))))
+    return _grid(columns, rows, cell_m, opened), ((columns - 1) * cell_m, rows * cell_m)
+
+
+def _tree(columns: int, rows: int, seed: int) -> set[Opening]:
+    """The pairs of cells without a wall between them."""
     if columns < 1 or rows < 1:
         raise ValueError("a maze needs at least one cell")
     chance = random.Random(seed)  # noqa: S311 (a maze is no secret)
-    opened: set[frozenset[tuple[int, int]]] = set()
+    opened: set[Opening] = set()
     visited = {(0, 0)}
     path = [(0, 0)]
     while path:
@@ -113,7 +144,10 @@ def maze(columns: int, rows: int, cell_m: float = 0.6, seed: int = 0) -> Walls:
         opened.add(frozenset(((column, row), chosen)))
         visited.add(chosen)
         path.append(chosen)
+    return opened
 
+
+def _grid(columns: int, rows: int, cell_m: float, opened: AbstractSet[Opening]) -> Walls:
     def corner(column: int, row: int) -> tuple[float, float]:
         return ((column - 0.5) * cell_m, (row - 0.5) * cell_m)
 

@@ -1,16 +1,20 @@
-"""A planar world: two wheels move a round robot between walls, and rays from its laser meet them.
+"""A planar world: two wheels move a round robot between walls and obstacles, and rays from its laser meet them.
 
 Kinematics of a differential drive, integrated in fixed steps along the arc's chord (R. Siegwart, I. Nourbakhsh,
 D. Scaramuzza, "Introduction to Autonomous Mobile Robots", 2nd ed., MIT Press 2011, section 5.2.4).
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
+from robosc_bridge.simulated.drift import Drift
 from robosc_bridge.simulated.robots import Body
+from robosc_bridge.simulated.rounds import Rounds
+from robosc_bridge.simulated.scene import IDEAL, Obstacle, Scene
 from robosc_bridge.simulated.timebase import Timebase
 from robosc_bridge.simulated.walls import Floats, Walls
 
@@ -32,7 +36,7 @@ class Wheel:
         is_driven: Whether the motor has torque; else the wheel runs out.
         is_blocked: Whether something holds it.
         speed_rad_s: At present.
-        angle_rad: Turned so far.
+        angle_rad: Turned so far, as its encoder counts.
     """
 
     goal_rad_s: float = 0.0
@@ -61,37 +65,82 @@ class Wheel:
         return turned
 
 
+@dataclass(frozen=True)
+class Happening:
+    """Something that is worth to be written down.
+
+    Attributes:
+        kind: A collision, the goal reached for the first time, an obstacle moved, put away or put back.
+        x_m: Where the robot is; of an obstacle, where that is now.
+        y_m: The same.
+        name: Of the obstacle that was met or moved; nothing for walls and the goal.
+        radius_m: Of an obstacle that was moved; 0: of something else.
+        is_there: Whether that is there now.
+    """
+
+    kind: Literal["collision", "goal", "obstacle"]
+    x_m: float
+    y_m: float
+    name: str = ""
+    radius_m: float = 0.0
+    is_there: bool = True
+
+
+OnStep = Callable[[float], None]
+"""Is told the world time of every step that was lived."""
+
+OnHappening = Callable[[float, Happening], None]
+"""Is told what happened, and the world time."""
+
+
 class World:
-    """A robot between walls.
+    """A robot in a scene.
 
     Args:
         body: Of the robot.
-        walls: That it meets and sees.
+        walls: That it meets and sees; a scene has more in it.
         time: That its devices share.
-        pose: Where it starts: x, y in metres, heading in rad.
+        pose: Where it starts: x, y in metres, heading in rad; None: where its scene says.
+        seed: Of slip and of what encoders count.
 
     Attributes:
+        scene: As it was at the start.
+        walls: Of the scene.
         x_m: Of the middle between the wheels.
         y_m: Of the same.
         heading_rad: Counter-clockwise from x, unbounded.
-        collisions: How often the body has come to a wall.
+        collisions: How often the body has come to a wall or an obstacle.
         is_touching: Whether it is at one now.
         left: The left wheel.
         right: The right wheel.
+        lived_s: World time that has been lived.
+        reached_s: World time when the goal was reached first; None: not yet.
     """
 
     def __init__(
-        self, body: Body, walls: Walls, time: Timebase, pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
+        self,
+        body: Body,
+        walls: Walls | Scene,
+        time: Timebase,
+        pose: tuple[float, float, float] | None = None,
+        seed: int = 0,
     ) -> None:
         self.body = body
-        self.walls = walls
+        self.scene = walls if isinstance(walls, Scene) else Scene("walls", walls)
+        self.walls = self.scene.walls
         self.time = time
-        self.x_m, self.y_m, self.heading_rad = pose
+        self.x_m, self.y_m, self.heading_rad = self.scene.start if pose is None else pose
         self.left = Wheel()
         self.right = Wheel()
         self.collisions = 0
         self.is_touching = False
-        self._lived_s = time.world_s()
+        self.lived_s = time.world_s()
+        self.reached_s: float | None = None
+        self._obstacles = {obstacle.name: obstacle for obstacle in self.scene.obstacles}
+        self._see_obstacles()
+        self._drift = Drift(self.scene.noise, seed) if self.scene.noise != IDEAL else None
+        self._watchers: list[tuple[OnStep, OnHappening]] = []
+        self._see_goal()
 
     @property
     def speed_m_s(self) -> float:
@@ -111,40 +160,133 @@ class World:
             self.catch_up()
             return self.x_m, self.y_m, self.heading_rad
 
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """The round things, as they are now."""
+        with self.time.lock:
+            return tuple(self._obstacles.values())
+
     def place(self, x_m: float, y_m: float, heading_rad: float) -> None:
-        """Lift the robot and put it down elsewhere; its wheels notice nothing."""
+        """Lift the robot and put it down elsewhere; its wheels notice nothing.
+
+        Raises:
+            ValueError: A number is not finite.
+        """
+        if not all(map(math.isfinite, (x_m, y_m, heading_rad))):
+            raise ValueError("a place and a heading must be finite numbers")
         with self.time.lock:
             self.catch_up()
             self.x_m, self.y_m, self.heading_rad = x_m, y_m, heading_rad
             self.is_touching = False
+            self._clear_m = 0.0
+            self._see_goal()
+
+    def move_obstacle(self, name: str, x_m: float, y_m: float) -> None:
+        """Put an obstacle somewhere; it is there then.
+
+        Raises:
+            ValueError: There is no such obstacle, or a number is not finite.
+        """
+        if not (math.isfinite(x_m) and math.isfinite(y_m)):
+            raise ValueError("an obstacle's place must be finite numbers")
+        self._change(name, lambda obstacle: replace(obstacle, x_m=x_m, y_m=y_m, is_there=True))
+
+    def put_obstacle(self, name: str, is_there: bool) -> None:
+        """Put an obstacle away, or back to where it was.
+
+        Raises:
+            ValueError: There is no such obstacle.
+        """
+        self._change(name, lambda obstacle: replace(obstacle, is_there=is_there))
+
+    def _change(self, name: str, change: Callable[[Obstacle], Obstacle]) -> None:
+        with self.time.lock:
+            self.catch_up()
+            if name not in self._obstacles:
+                known = ", ".join(self._obstacles) or "none in this scene"
+                raise ValueError(f"there is no obstacle {name!r}; there is {known}")
+            found = self._obstacles[name] = change(self._obstacles[name])
+            self._see_obstacles()
+            self._tell(Happening("obstacle", found.x_m, found.y_m, name, found.radius_m, found.is_there))
+
+    def _see_obstacles(self) -> None:
+        self._there = tuple(obstacle for obstacle in self._obstacles.values() if obstacle.is_there)
+        self._rounds = Rounds((obstacle.x_m, obstacle.y_m, obstacle.radius_m) for obstacle in self._there)
+        self._clear_m = 0.0
+
+    def watch(self, on_step: OnStep, on_happening: OnHappening) -> None:
+        """Tell somebody of every step and of what happens, under the lock of the time."""
+        with self.time.lock:
+            self._watchers.append((on_step, on_happening))
+
+    def unwatch(self, on_step: OnStep, on_happening: OnHappening) -> None:
+        """Tell them no more."""
+        with self.time.lock:
+            self._watchers.remove((on_step, on_happening))
+
+    def _tell(self, happening: Happening) -> None:
+        for _, on_happening in self._watchers:
+            on_happening(self.lived_s, happening)
+
+    def _see_goal(self) -> None:
+        goal = self.scene.goal
+        if goal is not None and self.reached_s is None and goal.is_reached(self.x_m, self.y_m):
+            self.reached_s = self.lived_s
+            self._tell(Happening("goal", self.x_m, self.y_m))
 
     def catch_up(self) -> None:
         """Live until now, in whole steps; what is commanded now acts from here on."""
         with self.time.lock:
             now_s = self.time.world_s()
-            while self._lived_s + STEP_S <= now_s + 1e-9:
-                self._lived_s += STEP_S
+            while self.lived_s + STEP_S <= now_s + 1e-9:
+                self.lived_s += STEP_S
                 self._step()
+                for on_step, _ in self._watchers:
+                    on_step(self.lived_s)
 
     def _step(self) -> None:
-        left_m = self.left.step(STEP_S) * self.body.wheel_radius_m
-        right_m = self.right.step(STEP_S) * self.body.wheel_radius_m
-        if left_m == 0.0 and right_m == 0.0:
+        left_rad, right_rad = self.left.step(STEP_S), self.right.step(STEP_S)
+        drift = self._drift
+        if drift is not None:
+            drift.step()
+            self.left.angle_rad += left_rad * drift.errors[0]
+            self.right.angle_rad += right_rad * drift.errors[1]
+            left_rad *= 1.0 - drift.slips[0]
+            right_rad *= 1.0 - drift.slips[1]
+        if left_rad == 0.0 and right_rad == 0.0:
             return
+        left_m, right_m = left_rad * self.body.wheel_radius_m, right_rad * self.body.wheel_radius_m
         forward_m = (left_m + right_m) / 2
         turn_rad = (right_m - left_m) / self.body.wheel_separation_m
         middle_rad = self.heading_rad + turn_rad / 2
         # A round body can always turn, whatever it touches; its wheels slip where it cannot go on.
         self.heading_rad += turn_rad
-        x_m = self.x_m + forward_m * math.cos(middle_rad)
-        y_m = self.y_m + forward_m * math.sin(middle_rad)
-        nearest_m = self.walls.distance_m(x_m, y_m)
-        if nearest_m >= self.body.radius_m or nearest_m > self.walls.distance_m(self.x_m, self.y_m):
-            self.x_m, self.y_m = x_m, y_m
-            self.is_touching = self.is_touching and nearest_m < self.body.radius_m + _APART_M
-        elif forward_m != 0.0 and not self.is_touching:
-            self.is_touching = True
-            self.collisions += 1
+        self._go(forward_m, forward_m * math.cos(middle_rad), forward_m * math.sin(middle_rad))
+
+    def _go(self, forward_m: float, along_x_m: float, along_y_m: float) -> None:
+        x_m, y_m = self.x_m + along_x_m, self.y_m + along_y_m
+        radius_m = self.body.radius_m
+        # A distance changes by no more than the way that was gone: most often nobody has to measure.
+        self._clear_m -= abs(forward_m)
+        if self._clear_m < radius_m + _APART_M:
+            nearest_m, name = self._nearest(x_m, y_m)
+            if nearest_m < radius_m and nearest_m <= self._nearest(self.x_m, self.y_m)[0]:
+                self._clear_m = 0.0
+                if forward_m != 0.0 and not self.is_touching:
+                    self.is_touching = True
+                    self.collisions += 1
+                    self._tell(Happening("collision", self.x_m, self.y_m, name))
+                return
+            self._clear_m = nearest_m
+            self.is_touching = self.is_touching and nearest_m < radius_m + _APART_M
+        self.x_m, self.y_m = x_m, y_m
+        self._see_goal()
+
+    def _nearest(self, x_m: float, y_m: float) -> tuple[float, str]:
+        """How far the nearest thing is, and its name; nothing for a wall."""
+        to_wall_m = self.walls.distance_m(x_m, y_m)
+        to_round_m, place = self._rounds.nearest(x_m, y_m)
+        return (to_round_m, self._there[place].name) if to_round_m < to_wall_m else (to_wall_m, "")
 
     def cast(self, origins: Floats, directions: Floats) -> Floats:
         """How far rays of the laser go, in its own axes (x forward, y left).
@@ -154,14 +296,17 @@ class World:
             directions: Shape (n, 2).
 
         Returns:
-            Shape (n,): in lengths of each direction; infinity where no wall is met.
+            Shape (n,): in lengths of each direction; infinity where nothing is met.
         """
         with self.time.lock:
             self.catch_up()
             cosine, sine = math.cos(self.heading_rad), math.sin(self.heading_rad)
             turn = np.array(((cosine, sine), (-sine, cosine)))
             middle = np.array((self.x_m + cosine * self.body.scanner_x_m, self.y_m + sine * self.body.scanner_x_m))
-        return self.walls.cast(origins @ turn + middle, directions @ turn)
+            rounds = self._rounds
+        starts, along = origins @ turn + middle, directions @ turn
+        found = self.walls.cast(starts, along)
+        return np.minimum(found, rounds.cast(starts, along)) if rounds.discs else found
 
     def ranges(self, angles_rad: Sequence[float]) -> tuple[float, ...]:
         """What an ideal laser would measure now.
@@ -170,7 +315,7 @@ class World:
             angles_rad: Counter-clockwise from the front.
 
         Returns:
-            In metres; infinity where no wall is met.
+            In metres; infinity where nothing is met.
         """
         angles = np.asarray(angles_rad, dtype=np.float64)
         directions = np.stack((np.cos(angles), np.sin(angles)), axis=1)

@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 
 from robosc_bridge.simulated import Eye, Mount, Track, oval, parse_track
-from robosc_bridge.simulated.eye import DISTANCE, FLOOR, LINE, ground_points
+from robosc_bridge.simulated.eye import DISTANCE, ground_points
+from robosc_bridge.simulated.floor import SHADE as LINE
+from robosc_bridge.simulated.textures import PLAIN
 
+FLOOR = PLAIN.shade
 STRAIGHT = Track([(-1.0, 0.0), (3.0, 0.0)], width_m=0.04)
 # Straight down from 1 m with a right angle of view: one metre to each side.
 ABOVE = Mount(x_m=0.0, height_m=1.0, tilt_rad=math.pi / 2, field_of_view_rad=math.pi / 2, width=100, height=50)

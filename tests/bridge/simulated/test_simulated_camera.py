@@ -10,21 +10,32 @@ import numpy as np
 import pytest
 
 from robosc.execution.clock import ManualClock
-from robosc_bridge.simulated import BODIES, SimulatedCamera, SimulatedTurtleBot3, Timebase, Track, Walls, World, oval
+from robosc_bridge.simulated import (
+    BODIES,
+    Scene,
+    SimulatedCamera,
+    SimulatedTurtleBot3,
+    Timebase,
+    Track,
+    Walls,
+    World,
+    oval,
+)
 from robosc_bridge.simulated.commands import UnknownCommandError, obey
-from robosc_bridge.simulated.eye import LINE
+from robosc_bridge.simulated.floor import SHADE as LINE
 
 HEAD = b"P5 160 120 255\n"
 SIZE = len(HEAD) + 160 * 120
 
 
-class Scene:
+class Stage:
     """A camera over a line, and time in the hands of a test."""
 
     def __init__(self, path: Path | None = None) -> None:
         self.time = Timebase(ManualClock())
-        self.world = World(BODIES["burger"], Walls(()), self.time)
-        self.camera = SimulatedCamera(self.world, Track([(-1.0, 0.0), (2.0, 0.0)]), path)
+        scene = Scene("line", Walls(()), line=Track([(-1.0, 0.0), (2.0, 0.0)]))
+        self.world = World(BODIES["burger"], scene, self.time)
+        self.camera = SimulatedCamera(self.world, path)
 
     def connected(self) -> socket.socket:
         found = socket.socket(socket.AF_UNIX)
@@ -53,7 +64,7 @@ def is_silent(client: socket.socket) -> bool:
 
 
 def test_pictures_come_at_their_rate_and_show_the_line() -> None:
-    scene = Scene()
+    scene = Stage()
     with scene.connected() as client:
         scene.time.advance(0.01)
         received(client, SIZE)
@@ -72,7 +83,7 @@ def test_pictures_come_at_their_rate_and_show_the_line() -> None:
 
 
 def test_it_sees_from_where_the_robot_is_now() -> None:
-    scene = Scene()
+    scene = Stage()
     scene.world.place(0.0, 0.03, 0.0)
     with scene.connected() as client:
         scene.time.advance(0.01)
@@ -88,7 +99,7 @@ def test_it_sees_from_where_the_robot_is_now() -> None:
 
 
 def test_one_who_does_not_read_misses_whole_pictures() -> None:
-    scene = Scene()
+    scene = Stage()
     with scene.connected() as client:
         scene.time.advance(30.0)
         data = b""
@@ -107,7 +118,7 @@ def test_one_who_does_not_read_misses_whole_pictures() -> None:
 
 def test_a_plug_that_is_pulled_ends_all_connections(tmp_path: Path) -> None:
     path = tmp_path / "camera"
-    scene = Scene(path)
+    scene = Stage(path)
     with scene.connected() as client:
         scene.time.advance(0.01)
         received(client, SIZE)
@@ -129,7 +140,7 @@ def test_a_plug_that_is_pulled_ends_all_connections(tmp_path: Path) -> None:
 
 
 def test_only_a_few_are_served() -> None:
-    scene = Scene()
+    scene = Stage()
     clients = []
     for _ in range(6):
         clients.append(scene.connected())

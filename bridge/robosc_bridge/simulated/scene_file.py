@@ -1,0 +1,141 @@
+"""What a scene file says: frozen structures that its checks and its documentation are made from.
+
+They are read with the same decoder as the bridge's configuration; `scene` makes a `Scene` of them.
+"""
+
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct
+
+MOST_SEGMENTS = 5_000
+"""Of all walls of a scene."""
+
+_Metres = Annotated[float, Meta(ge=-1000, le=1000)]
+_Seed = Annotated[int, Meta(ge=0, le=2**31 - 1)]
+_Point = tuple[_Metres, ...]
+# Where a text ends: Python's `$` takes a line feed after it.
+Name = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]{0,39}(?![\s\S])", title="box or box_2")]
+"""Of an obstacle, as it is told on standard input."""
+
+
+class _Section(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What all sections have."""
+
+
+class WallsPart(_Section, frozen=True):
+    """Walls that stand where they are."""
+
+    segments: Annotated[
+        tuple[tuple[_Metres, ...], ...], Meta(description="Straight walls, `[x1, y1, x2, y2]` in metres each.")
+    ] = ()
+    polylines: Annotated[
+        tuple[tuple[_Point, ...], ...],
+        Meta(description="Walls from point to point, a list of `[x, y]` each; the first again at the end closes one."),
+    ] = ()
+    rectangles: Annotated[
+        tuple[tuple[_Metres, ...], ...],
+        Meta(
+            description="Four walls, `[x, y, width, height]` each, where x, y is the corner of the least coordinates."
+        ),
+    ] = ()
+
+
+class MazePart(_Section, frozen=True):
+    """A maze with an exit, made by chance."""
+
+    columns: Annotated[int, Meta(ge=1, le=30, description="Cells along x.")]
+    rows: Annotated[int, Meta(ge=1, le=30, description="Cells along y.")]
+    cell_m: Annotated[
+        float, Meta(ge=0.3, le=5, description="Width of a cell; the middle of the first one is the origin.")
+    ] = 0.6
+    seed: Annotated[
+        _Seed | None, Meta(description="Of the choice; null: that of the run (`--seed`, `load_scene(..., seed)`).")
+    ] = None
+
+
+class PosePart(_Section, frozen=True):
+    """Where the robot starts."""
+
+    x_m: Annotated[float, Meta(ge=-1000, le=1000, description="Of the middle between its wheels.")] = 0.0
+    y_m: Annotated[float, Meta(ge=-1000, le=1000, description="Of the same.")] = 0.0
+    heading_deg: Annotated[
+        float, Meta(ge=-360, le=360, description="Counter-clockwise from the x axis, in degrees.")
+    ] = 0.0
+
+
+class GoalPart(_Section, frozen=True):
+    """Where the robot is to come; a maze brings its own."""
+
+    x_m: Annotated[float, Meta(ge=-1000, le=1000, description="Of its middle.")]
+    y_m: Annotated[float, Meta(ge=-1000, le=1000, description="Of its middle.")]
+    radius_m: Annotated[float, Meta(gt=0, le=1000, description="The robot's middle is to be within it.")]
+
+
+class LinePart(_Section, frozen=True):
+    """A line on the floor, and a camera that sees it."""
+
+    points: Annotated[tuple[_Point, ...], Meta(description="Where it goes, `[x, y]` in metres each; at least two.")]
+    kind: Annotated[
+        Literal["straight", "spline"],
+        Meta(description="Straight from point to point, or a smooth curve through them (a cubic spline)."),
+    ] = "straight"
+    is_closed: Annotated[bool, Meta(description="Whether it goes on from the last point to the first.")] = False
+    width_m: Annotated[float, Meta(ge=0.005, le=1, description="Of the line.")] = 0.05
+    shade: Annotated[int, Meta(ge=0, le=255, description="Of the line: 0 is black, 255 white.")] = 30
+
+
+class FloorPart(_Section, frozen=True):
+    """What the floor looks like."""
+
+    texture: Annotated[
+        Literal["plain", "tiles", "checkerboard", "speckle"],
+        Meta(description="`tiles` have joints of the other shade between them, `speckle` is random from cell to cell."),
+    ] = "plain"
+    shade: Annotated[int, Meta(ge=0, le=255, description="0 is black, 255 white.")] = 200
+    other_shade: Annotated[
+        int, Meta(ge=0, le=255, description="Of joints and of every other field; the farthest that a speckle goes.")
+    ] = 170
+    size_m: Annotated[
+        float, Meta(ge=0.002, le=10, description="Width of a tile, of a field, of a cell of speckle.")
+    ] = 0.3
+    joint_m: Annotated[float, Meta(gt=0, le=1, description="Width of the joints between tiles.")] = 0.01
+
+
+class ObstaclePart(_Section, frozen=True):
+    """A round thing that can be moved, put away and put back while the simulation runs."""
+
+    x_m: Annotated[float, Meta(ge=-1000, le=1000, description="Of its middle.")]
+    y_m: Annotated[float, Meta(ge=-1000, le=1000, description="Of its middle.")]
+    radius_m: Annotated[float, Meta(ge=0.005, le=100, description="Of the thing.")]
+    is_there: Annotated[bool, Meta(description="Whether it is there from the start.")] = True
+
+
+class NoisePart(_Section, frozen=True):
+    """What makes motion and sensors less than ideal; all of it by the seed of the run."""
+
+    slip_share: Annotated[
+        float, Meta(ge=0, le=0.9, description="How much of each wheel's way is lost on the floor, on average.")
+    ] = 0.0
+    slip_deviation: Annotated[
+        float, Meta(ge=0, le=0.5, description="Standard deviation of that, drawn for each wheel every 0.1 s.")
+    ] = 0.0
+    encoder_deviation: Annotated[
+        float, Meta(ge=0, le=0.5, description="Standard deviation of what encoders count, as a share; drawn as above.")
+    ] = 0.0
+    lidar_m: Annotated[float, Meta(ge=0, le=1, description="Standard deviation of what the LiDAR measures.")] = 0.0
+    camera_shades: Annotated[
+        float, Meta(ge=0, le=128, description="Standard deviation of each pixel's shade, of 255.")
+    ] = 0.0
+
+
+class SceneFile(_Section, frozen=True):
+    """A scene."""
+
+    walls: Annotated[WallsPart, Meta(description="Walls that stand where they are.")] = WallsPart()
+    maze: Annotated[MazePart | None, Meta(description="A maze with an exit, made by chance.")] = None
+    start: Annotated[PosePart, Meta(description="Where the robot starts.")] = PosePart()
+    goal: Annotated[GoalPart | None, Meta(description="Where it is to come; null: a maze's exit, or nowhere.")] = None
+    line: Annotated[LinePart | None, Meta(description="A line on the floor.")] = None
+    floor: Annotated[FloorPart, Meta(description="What the floor looks like.")] = FloorPart()
+    obstacles: Annotated[dict[Name, ObstaclePart], Meta(description="Round things that can be moved, by name.")] = {}
+    noise: Annotated[NoisePart, Meta(description="What makes motion and sensors less than ideal.")] = NoisePart()

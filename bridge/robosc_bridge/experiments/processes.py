@@ -123,7 +123,7 @@ class Program:
         pipe = subprocess.PIPE if self._is_asked else None
         with self.log.open("w", encoding="utf-8") as log, _interrupts.held():
             try:
-                process = subprocess.Popen(
+                process = subprocess.Popen(  # noqa: S603 (our own programs)
                     [sys.executable, *self._arguments],
                     env=environment(),
                     cwd=self._folder,
@@ -206,7 +206,8 @@ class Program:
     def tell(self, command: str) -> None:
         """Have it do something that it does not answer."""
         stdin = self._used.stdin
-        assert stdin is not None, "it takes commands"
+        if stdin is None:
+            raise ScenarioError(f"{self.name} takes no commands")
         try:
             stdin.write(command + "\n")
             stdin.flush()
@@ -251,15 +252,15 @@ class Program:
                 process.stdin.close()
 
     def _listen(self, process: "subprocess.Popen[str]") -> None:
-        assert process.stdout is not None
-        with suppress(ValueError), process.stdout:
-            for line in process.stdout:
-                self._answers.put(line.rstrip("\n"))
+        if process.stdout is not None:
+            with suppress(ValueError), process.stdout:
+                for line in process.stdout:
+                    self._answers.put(line.rstrip("\n"))
         self._answers.put(None)
 
 
 def finish(program: Program) -> None:
-    """Stop a program whose exit status counts.
+    """Stop a program that has not ended by itself, and whose exit status counts.
 
     Raises:
         ScenarioError: It did not end in order.

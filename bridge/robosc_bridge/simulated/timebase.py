@@ -25,7 +25,7 @@ class Timebase:
         clock: `SystemClock`: the devices live by themselves. `ManualClock`: they live when `advance` is called.
         factor: How many seconds pass in the world in one of the clock.
         patience_s: How many seconds may pass in the world after the host was heard; then it stands still until it is
-            heard again. Before the host was heard at all, the world passes. None: it never waits.
+            heard again, or for the first time. None: it never waits.
 
     Raises:
         ValueError: The factor or the patience is no positive, finite number.
@@ -42,7 +42,7 @@ class Timebase:
         self._began_s = self.clock.monotonic()
         self._patience_s = patience_s
         # By the world's time: when it waits next, and how long it has waited.
-        self._limit_s = math.inf
+        self._limit_s = math.inf if patience_s is None else patience_s
         self._waited_s = 0.0
         self._members: list[Callable[[], None]] = []
 

@@ -1,0 +1,106 @@
+"""The maze solver: a controller that leads a robot out of a maze, the wall on its right hand."""
+
+import time
+from pathlib import Path
+
+from robosc.model.structure import Deployment
+from robosc_bridge.experiments.scenario import Outcome, Say, ScenarioError
+from robosc_bridge.experiments.serial import EXAMPLES, Rig, Setting, log_faults, running, scene_of
+from robosc_bridge.experiments.tail import LineCount, latest
+from robosc_bridge.simulated.judge import judge_maze
+from robosc_bridge.simulated.motion import Motion, MotionError, read_motion
+
+MODEL = EXAMPLES / "maze_solver" / "narrow_maze.rscd"
+SCENES = ("maze-rooms", "maze-spiral", "maze-random")
+"""The mazes that come with the package; the last one is another one for each seed."""
+
+CHANNELS = {
+    "/scan": "{channel: scanner}",
+    "/rotate_left": "{channel: rotate, unit: degrees, direction: left}",
+    "/rotate_right": "{channel: rotate, unit: degrees, direction: right}",
+    "/rotate_done": "{channel: rotated, outcome: done}",
+    "/cmd_vel": "{channel: drive}",
+}
+
+WORLD_LIMIT_S = 1200.0
+"""Of the world: at 0.1 m/s that is a way of more than 80 m, turns included."""
+
+LIMIT_S = 240.0
+_LOOK_S = 0.1
+
+
+def run_maze(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: int = 0, model: Path = MODEL) -> Outcome:
+    """Let a robot out of a maze, over serial lines.
+
+    Args:
+        folder: Where everything is written; empty, or not there yet.
+        scene: Name or file of the maze.
+        speed: How many times as fast as the clock the world passes.
+        say: Takes lines of progress.
+        seed: Of what the scene leaves to chance.
+        model: Another one, with the communications of `narrow_maze.rscd`.
+
+    Raises:
+        ScenarioError: It could not be run to its end. A robot that does not find the way out is no such error, but a
+            fault of the outcome.
+    """
+    place = scene_of(scene, seed)
+    if place.goal is None:
+        raise ScenarioError(f"the scene {place.name} has no goal: there is no way out of it")
+    setting = Setting(
+        folder.resolve(), model.resolve(), Deployment.CONTROLLER, scene, place, seed, speed, "lds01", CHANNELS, {}
+    )
+    say("starting the synthesis server, the simulated robot and the bridge")
+    with running(setting) as rig:
+        _until_out(rig, say)
+        figures = rig.finish()
+    try:
+        motion = read_motion(rig.motion)
+    except MotionError as error:
+        raise ScenarioError(str(error)) from error
+    return Outcome(
+        name="maze",
+        connection="serial",
+        folder=folder,
+        event_log=rig.event_log,
+        motion=rig.motion,
+        supervisor=rig.supervisor,
+        scene=place,
+        faults=(*judge_maze(place, motion), *log_faults(rig)),
+        figures={**figures, **way_figures(motion)},
+    )
+
+
+def _until_out(rig: Rig, say: Say) -> None:
+    """Wait until the robot is there, or has had time enough."""
+    events = LineCount(rig.event_log)
+    begin_s = time.monotonic()
+    while rig.simulator.ask("goal") == "not yet":
+        rig.require()
+        now = latest(rig.motion)
+        passed_s = time.monotonic() - begin_s
+        say(
+            f"x {now.x_m:+.2f} m  y {now.y_m:+.2f} m  {events.look():5} events  "
+            f"{now.world_s:6.1f} s of the world in {passed_s:4.1f} s"
+        )
+        if now.world_s > WORLD_LIMIT_S or passed_s > LIMIT_S:
+            return
+        time.sleep(_LOOK_S)
+
+
+def way_figures(motion: Motion) -> dict[str, float]:
+    """From the first motion to the goal, else to the end of the record: seconds of the world and of the clock."""
+    begin = next((sample for sample in motion.samples if sample.linear_m_s or sample.angular_rad_s), None)
+    reached = next((event for event in motion.happenings if event.happening == "goal"), None)
+    if begin is None:
+        return {"collisions": float(motion.samples[-1].collisions) if motion.samples else 0.0}
+    end = reached or motion.samples[-1]
+    world_s, wall_s = end.world_s - begin.world_s, end.time - begin.time
+    way = [sample for sample in motion.samples if begin.world_s <= sample.world_s <= end.world_s]
+    return {
+        "world_s": world_s,
+        "wall_s": wall_s,
+        "speed": world_s / wall_s if wall_s > 0 else 0.0,
+        "way_m": sum(abs(sample.linear_m_s) for sample in way) * (world_s / max(len(way), 1)),
+        "collisions": float(motion.samples[-1].collisions),
+    }

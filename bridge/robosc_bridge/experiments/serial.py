@@ -1,0 +1,293 @@
+"""A robot on serial lines: synthesis server, client, bridge and simulated TurtleBot3 as processes of their own.
+
+The bridge obtains its supervisor from the server over gRPC and drives the robot through bytes on pseudo-terminals, as
+it would a real one. Nothing in it knows that the world passes faster; only numbers of its configuration go by that
+(`configuration`).
+"""
+
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from robosc.errors import RoboscError
+from robosc.event_logs import check_log, read_log
+from robosc.model.structure import Deployment
+from robosc.supervisor import decode
+from robosc_bridge.experiments.processes import Program, finish
+from robosc_bridge.experiments.scenario import ScenarioError
+from robosc_bridge.simulated.scene import Scene, SceneError, load_scene, scene_names
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+"""The models of the scenarios; they are part of the source tree."""
+
+PATIENCE_S = 0.5
+"""Of the world, for which it does not wait for the bridge: a robot at 0.1 m/s goes 5 cm meanwhile."""
+
+FASTEST, SLOWEST = 25.0, 0.5
+"""How many times as fast as the clock the world may pass."""
+
+_BRIDGE_LIMIT_S = 60.0
+_SYNTHESIS_LIMIT_S = 120.0
+_MOST_SUPERVISOR_BYTES = 64 * 1024 * 1024
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What is run.
+
+    Attributes:
+        folder: Where everything is written.
+        model: That the supervisor is made of.
+        deployment: Where it stands.
+        source: Name or file of the scene.
+        scene: The robot's world, as it is read from there.
+        seed: Of what the scene leaves to chance.
+        speed: How many times as fast as the clock the world passes.
+        lidar: Which the robot has. LDS-01 measures up to 3.5 m, LDS-02 up to 8 m.
+        channels: What the communications of the model are tied to, as lines of the configuration.
+        skills: Further lines of its section `skills`, by skill.
+    """
+
+    folder: Path
+    model: Path
+    deployment: Deployment
+    source: str | Path
+    scene: Scene
+    seed: int
+    speed: float
+    lidar: Literal["lds01", "lds02"]
+    channels: Mapping[str, str]
+    skills: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Rig:
+    """The processes of a run, and where they write.
+
+    Attributes:
+        setting: What is run.
+        simulator: The robot and its world.
+        bridge: What executes the supervisor.
+        address: Of the bridge's gRPC service.
+        motion: The record of the robot's motion.
+    """
+
+    setting: Setting
+    simulator: Program
+    bridge: Program
+    address: str
+    motion: Path
+
+    @property
+    def event_log(self) -> Path:
+        """The log of the execution; raises ScenarioError if there is none."""
+        found = sorted((self.setting.folder / "events").glob("*.jsonl"))
+        if len(found) != 1:
+            raise ScenarioError(f"{len(found)} event logs in {self.setting.folder / 'events'}, where one was to be")
+        return found[0]
+
+    @property
+    def supervisor(self) -> Path:
+        """As the client received it."""
+        return self.setting.folder / f"{self.setting.model.stem}.rsup"
+
+    def require(self) -> None:
+        """Raise ScenarioError if a process has ended by itself."""
+        self.bridge.require()
+        self.simulator.require()
+
+    def finish(self) -> dict[str, float]:
+        """Bring the robot to rest and end bridge and simulator; their processors' seconds, as figures.
+
+        Raises:
+            ScenarioError: One of them did not end in order.
+        """
+        used = {"bridge_cpu_s": self.bridge.cpu_s, "simulator_cpu_s": self.simulator.cpu_s}
+        finish(self.bridge)
+        finish(self.simulator)
+        return used
+
+
+def scene_of(source: str | Path, seed: int) -> Scene:
+    """A scene; raises ScenarioError if it cannot be used."""
+    try:
+        return load_scene(source, seed)
+    except SceneError as error:
+        raise ScenarioError(str(error)) from error
+
+
+def require_speed(speed: float) -> None:
+    """Raise ScenarioError if a world cannot be asked to pass so fast."""
+    if not SLOWEST <= speed <= FASTEST:
+        raise ScenarioError(f"the speed must be from {SLOWEST:g} to {FASTEST:g}, and is {speed:g}")
+
+
+def configuration(setting: Setting, base: str, scanner: str, camera: str | None) -> str:
+    """The bridge's file (YAML).
+
+    What must be soon in the world is N times as soon by the clock where the world passes N times as fast: the wheels
+    stop without the LiDAR or the loop after some second of the world at most, the acceleration that the safety layer
+    allows is N times as large by the clock, and a turn slows down earlier, since an exchange with the drive base every
+    20 ms is one of 20 N ms in the world. What it waits for without any motion stays as patient as a busy machine needs.
+
+    Args:
+        setting: What is run.
+        base: Port of the drive base.
+        scanner: Port of the LiDAR.
+        camera: Socket of the camera; None: there is none.
+    """
+    speed = setting.speed
+    # The least that the safety layer takes: twice the period, and some turns of a fast LiDAR.
+    loop_limit_s, scan_limit_s = min(max(0.8 / speed, 0.04), 0.3), min(max(1.0 / speed, 0.05), 0.6)
+    # One exchange, and one to be felt; gain times delay stays below 1/e (`robosc_bridge.skills.rotate`).
+    delay_s = min(2 * 0.02 * speed, 2 * PATIENCE_S) + 0.04
+    skills = {
+        "rotate": f"speed_rad_s: 0.6, slowest_rad_s: 0.02, tolerance_rad: 0.02, patience_s: 30, "
+        f"gain_per_s: {min(2.0, 0.36 / delay_s):.3f}, settle_s: {max(0.4 / speed, 0.06):.3f}",
+        **setting.skills,
+    }
+    if camera is not None:
+        skills["line"] = ", ".join(filter(None, (f'camera: "simulated:{camera}"', setting.skills.get("line"))))
+    lines = [
+        "robot: burger",
+        f'drive: {{driver: opencr, port: "{base}", options: {{answer_limit_s: 0.5}}}}',
+        f'scanner: {{driver: {setting.lidar}, port: "{scanner}"}}',
+        "execution: {period_s: 0.02, every: event}"
+        if setting.deployment is Deployment.CONTROLLER
+        else f"execution: {{period_s: 0.02, command_timeout_s: {max(1.0 / speed, 0.2):.3f}}}",
+        "safety:",
+        f"  overrun_s: {loop_limit_s:.3f}",
+        f"  scan_timeout_s: {scan_limit_s:.3f}",
+        f"  linear_acceleration_m_s2: {min(1.0 * speed, 50.0):g}",
+        f"  angular_acceleration_rad_s2: {min(6.0 * speed, 200.0):g}",
+        "  motor_timeout_s: 1.0",
+        "  command_timeout_s: 1.0",
+        "skills:",
+        *(f"  {name}: {{{text}}}" for name, text in skills.items()),
+        "remote: {grpc_address: 127.0.0.1:0}",
+        f'log: {{folder: "{setting.folder / "events"}"}}',
+        "channels:",
+        *(f'  "{identifier}": {text}' for identifier, text in setting.channels.items()),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+@contextmanager
+def running(setting: Setting) -> Iterator[Rig]:
+    """Everything is started, and the bridge executes its supervisor; all has ended after the block.
+
+    Raises:
+        ScenarioError: A step fails; says which.
+    """
+    require_speed(setting.speed)
+    if not setting.model.is_file():
+        raise ScenarioError(f"there is no model {setting.model}; scenarios are run in the source tree")
+    folder = setting.folder
+    folder.mkdir(parents=True, exist_ok=True)
+    if any(folder.iterdir()):
+        raise ScenarioError(f"{folder} is not empty")
+    with ExitStack() as stack:
+        server = stack.enter_context(Program("server", ("-m", "robosc_server.main", "--port", "0"), folder))
+        simulator, ports = _simulator(stack, setting)
+        synthesis_server = server.wait_for(r"listening on (\S+:\d+)$")[1]
+        client = stack.enter_context(_client(setting, synthesis_server))
+        file = folder / "bridge.yaml"
+        file.write_text(configuration(setting, ports["base"], ports["scanner"], ports.get("camera")), encoding="utf-8")
+        bridge = stack.enter_context(
+            Program(
+                "bridge",
+                _words(
+                    "-m robosc_bridge.main run",
+                    model=setting.model,
+                    deployment=setting.deployment,
+                    config=file,
+                    server=synthesis_server,
+                    keep=folder / "kept",
+                ),
+                folder,
+                is_preferred=True,
+            )
+        )
+        address = bridge.wait_for(r"the remote face listens on (\S+:\d+)$", _SYNTHESIS_LIMIT_S)[1]
+        bridge.wait_for(r" running$", _BRIDGE_LIMIT_S)
+        _wait_for_supervisor(client)
+        rig = Rig(setting, simulator, bridge, address, folder / "motion.jsonl")
+        (kept,) = (folder / "kept").glob("*.rsup")
+        if kept.read_bytes() != rig.supervisor.read_bytes():
+            raise ScenarioError("client and bridge were sent different supervisors of the same model")
+        yield rig
+
+
+def _simulator(stack: ExitStack, setting: Setting) -> tuple[Program, dict[str, str]]:
+    folder = setting.folder
+    # It has another working folder.
+    scene = setting.source if setting.source in scene_names() else str(Path(setting.source).resolve())
+    program = Program(
+        "simulator",
+        _words(
+            "-m robosc_bridge.simulated --base opencr",
+            lidar=setting.lidar,
+            scene=scene,
+            seed=setting.seed,
+            speed=setting.speed,
+            wait=PATIENCE_S,
+            motion=folder / "motion.jsonl",
+        ),
+        folder,
+        is_preferred=True,
+        is_asked=True,
+    )
+    stack.enter_context(program)
+    ports: dict[str, str] = {}
+    for expected in ("base", "scanner", *(["camera"] if setting.scene.line is not None else [])):
+        name, _, path = program.answer(_BRIDGE_LIMIT_S).partition(" ")
+        if name != expected:
+            raise ScenarioError(f"the simulator tells of {name!r} where its {expected} was to come")
+        ports[name] = path
+    return program, ports
+
+
+def _client(setting: Setting, server: str) -> Program:
+    """The client, which sends the model and keeps the supervisor that it receives."""
+    return Program(
+        "client",
+        _words(
+            "-m robosc_client.command synth",
+            setting.model,
+            server=server,
+            deployment=setting.deployment,
+            output=setting.folder / f"{setting.model.stem}.rsup",
+        ),
+        setting.folder,
+    )
+
+
+def _wait_for_supervisor(client: Program) -> None:
+    end_s = time.monotonic() + _SYNTHESIS_LIMIT_S
+    while client.status is None:
+        if time.monotonic() > end_s:
+            raise ScenarioError(f"the server had no supervisor after {_SYNTHESIS_LIMIT_S:g} s")
+        time.sleep(0.02)
+    if client.status != 0:
+        raise ScenarioError(f"the client ended with status {client.status}:\n{client.told()}")
+
+
+def _words(begin: str, *places: Path, **options: object) -> list[str]:
+    """A command's words: its beginning, files, and options with their names."""
+    return [*begin.split(), *map(str, places), *(f"--{name}={value}" for name, value in options.items())]
+
+
+def log_faults(rig: Rig) -> tuple[str, ...]:
+    """What is wrong with the event log, replayed on the supervisor: each request must have been allowed then."""
+    try:
+        data = rig.supervisor.read_bytes()
+        found = check_log(read_log(rig.event_log), decode(data), rig.setting.deployment)
+    except (RoboscError, OSError) as error:
+        return (f"the event log cannot be checked: {error}",)
+    faults = [f"log line {each.line}: {each.sentence}" for each in found.violations]
+    if not found.requests:
+        faults.append("the event log has no request at all")
+    return (*faults, *found.notes)

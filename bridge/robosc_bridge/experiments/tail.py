@@ -1,0 +1,73 @@
+"""Files that grow while a scenario runs: what stands in their last line, and how many lines they have."""
+
+import contextlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+_END_BYTES = 4096
+
+
+@dataclass(frozen=True)
+class Now:
+    """Where the robot is.
+
+    Attributes:
+        world_s: Since the simulation began.
+        x_m: Of the middle between its wheels.
+        y_m: Of the same.
+        linear_m_s: Forward.
+        angular_rad_s: Counter-clockwise.
+        collisions: How often it has come to something.
+    """
+
+    world_s: float = 0.0
+    x_m: float = 0.0
+    y_m: float = 0.0
+    linear_m_s: float = 0.0
+    angular_rad_s: float = 0.0
+    collisions: int = 0
+
+    @property
+    def is_standing(self) -> bool:
+        """Whether it does not move at all."""
+        return abs(self.linear_m_s) < 1e-3 and abs(self.angular_rad_s) < 1e-2
+
+
+_DECODER = msgspec.json.Decoder(Now)
+
+
+def latest(motion: Path) -> Now:
+    """The last whole sample of a record of motion; before there is one, a robot at rest at the origin."""
+    with contextlib.suppress(OSError), motion.open("rb") as file:
+        file.seek(max(file.seek(0, 2) - _END_BYTES, 0))
+        lines = file.read().split(b"\n")
+        # Behind the last line feed is a line that is being written; the first one may be the end of another.
+        for line in reversed(lines[:-1]):
+            if line.startswith(b'{"time":') and b'"happening"' not in line:
+                with contextlib.suppress(msgspec.DecodeError):
+                    return _DECODER.decode(line)
+    return Now()
+
+
+class LineCount:
+    """Counts the lines of a file that grows.
+
+    Args:
+        path: Of the file; it may not be there yet.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._read = 0
+        self._count = 0
+
+    def look(self) -> int:
+        """How many lines there are by now."""
+        with contextlib.suppress(OSError), self._path.open("rb") as file:
+            file.seek(self._read)
+            while data := file.read(1 << 16):
+                self._read += len(data)
+                self._count += data.count(b"\n")
+        return self._count

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from types import ModuleType
+from typing import Any
 
 from robosc.cli.output import UsageError
 
@@ -32,7 +33,7 @@ class Plugin:
     module: ModuleType | None
     problem: str = ""
 
-    def add_parser(self, commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    def add_parser(self, commands: "argparse._SubParsersAction[Any]") -> None:
         """Add the command; one that cannot be loaded takes any arguments and says why."""
         if self.module is not None:
             self.module.add_parser(commands)

@@ -1,7 +1,7 @@
 """`robosc`: check, synthesize, verify, explore and generate on this machine.
 
 Every command is a module with `add_parser` and `run`; what a command needs is imported when it runs, so
-that `robosc check` does not pay for decision diagrams.
+that `robosc check` does not pay for decision diagrams. Other packages add commands (`robosc.cli.plugins`).
 """
 
 import argparse
@@ -34,6 +34,7 @@ from robosc.cli.output import (
     print_diagnostics,
     print_json,
 )
+from robosc.cli.plugins import Plugin, wanted_plugins
 from robosc.errors import Diagnostic, LanguageError, RoboscError
 from robosc.source import visible
 
@@ -41,6 +42,12 @@ _COMMANDS = (
     new, check, format_, synth, verify, sign, explore, generate, explain_synthesis, explain, doc, plot, check_log
 )  # fmt: skip
 """In the order of `robosc --help`."""
+
+_NAMES = (
+    "new", "check", "format", "synth", "verify", "key", "sign", "explore", "generate", "explain-synthesis", "explain",
+    "doc", "plot", "check-log",
+)  # fmt: skip
+"""What they are called: nobody who calls one of them pays for a look at what other packages bring."""
 
 _EPILOG = """\
 exit status:
@@ -50,8 +57,12 @@ exit status:
 """
 
 
-def make_parser() -> Parser:
-    """The parser of the whole command line."""
+def make_parser(plugins: Sequence[Plugin] = ()) -> Parser:
+    """The parser of the whole command line.
+
+    Args:
+        plugins: Commands of other packages.
+    """
     parser = Parser(
         prog="robosc",
         description="Supervisory controllers for robots, correct by construction.",
@@ -76,6 +87,8 @@ def make_parser() -> Parser:
         check_log,
     ):
         command.add_parser(commands)
+    for plugin in plugins:
+        plugin.add_parser(commands)
     return parser
 
 
@@ -85,7 +98,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Raises:
         SystemExit: The arguments are no command's, or ask for help.
     """
-    arguments = parse(make_parser(), argv)
+    parser = make_parser(wanted_plugins(sys.argv[1:] if argv is None else argv, _NAMES))
+    arguments = parse(parser, argv)
     return guarded("robosc", lambda: int(arguments.run(arguments)), as_json=getattr(arguments, "json", False))
 
 

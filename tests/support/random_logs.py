@@ -249,3 +249,26 @@ def _change_state(dice: Random, supervisor: Supervisor, state: dict[str, Any]) -
         state[component.name]["variables"][variable.name] = dice.choice(others)
     else:
         state[component.name]["state"] = dice.choice([*(item.name for item in behaviour.states), "nowhere"])
+
+
+def walked(supervisor: Supervisor, dice: Random, steps: int, data: Callable[[Random], Any]) -> list[Entry]:
+    """A log of the interpreted system alone, led anywhere it can go: every kind of variable and data, no executor."""
+    system = InterpretedSystem(supervisor)
+    events = sorted(system._events)
+    entries: list[Entry] = []
+    for number in range(steps if events else 0):
+        event = system.enabled_silent() or dice.choice(events)
+        kind = event.rpartition(".")[2]
+        is_own = kind in ("request", "cancel", "reset") or kind.startswith("tau_")
+        if is_own and not system.enabled(event):
+            continue
+        reading = system.read(event, None if is_own else data(dice))
+        rule = system._events[event]
+        successor = system._successor(rule, reading.values.get)
+        if successor is None or successor.leaves_range:
+            continue
+        system.step(event, reading)
+        told = {"data": None if is_own else reading.data, "state": system.state()}
+        entry = {"time": float(number), "kind": "event", "event": event, "controllable": is_own, **told}
+        entries.append(json.loads(json_line(entry)))
+    return entries

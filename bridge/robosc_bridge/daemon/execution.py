@@ -49,6 +49,7 @@ class Execution:
         self._system: InterpretedSystem | None = None
         # Another run is another state, whatever its system has counted.
         self._run = 0
+        self._has_begun = False
         # Once now, so that what cannot be executed is found at the start of the program.
         _, system = self._made()
         self._names = tuple(info.name for info in requesting(system.description.communications))
@@ -61,6 +62,10 @@ class Execution:
 
     def begin(self) -> Executor | Layer:
         """A new run, from the initial state; `start` of its executor is still to be called."""
+        if self._has_begun and self._log.is_active:
+            # One log for all runs: who reads it must know that the state is the initial one again.
+            self._log.write({"time": self._clock.wall(), "kind": "restart", "what": ""})
+        self._has_begun = True
         self._run += 1 << 32
         self._robot.forget()
         self._requesters.forget()

@@ -12,7 +12,8 @@ from robosc.event_logs import check_log
 from robosc.supervisor.structure import Supervisor
 from support.random_controllers import random_controller, random_robot
 from support.random_layers import random_layer
-from support.random_logs import Entry, World, faults, mutated, read
+from support.random_logs import Entry, World, faults, mutated, read, walked
+from support.random_supervisors import random_data, random_supervisor
 
 STEPS = 50
 
@@ -73,3 +74,31 @@ def test_the_random_logs_show_everything(tmp_path: Path) -> None:
     kinds = "requ resp erro feed canc rese tau_ restart stop fault resume blocked unexpected wrong right".split()
     for what in (*kinds, "not allowed now", "stopped", "its last goal may still be under way"):
         assert total[what] >= 3, what
+
+
+@settings(deadline=None, max_examples=100)
+@given(seed=st.integers(0, 2**32))
+def test_variables_that_synthesis_leaves_out_are_followed_too(
+    seed: int, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    supervisor = random_supervisor(seed)
+    dice = Random(seed)
+    entries = walked(supervisor, dice, 40, random_data)
+    folder = tmp_path_factory.mktemp("log")
+    found = check_log(read(folder, entries), supervisor)
+    assert found.violations == ()
+    stored = [
+        (number, component.name, variable.name)
+        for number, entry in enumerate(entries)
+        for component in supervisor.model.components
+        for variable in (component.behaviour.variables if component.behaviour else ())
+        if not variable.is_synthesis and entry["event"].rpartition(".")[2] in ("request", "reset", "cancel", "error")
+    ]
+    if not stored:
+        return
+    # No data comes with these events: nothing but the expressions says what the variable is now.
+    number, component_name, name = dice.choice(stored)
+    variables = entries[number]["state"][component_name]["variables"]
+    variables[name] = {"str": 7, "bool": "no"}.get(type(variables[name]).__name__, "other")
+    lines = [item.line for item in check_log(read(folder, entries), supervisor).violations]
+    assert lines[:1] == [number + 1]

@@ -1,0 +1,107 @@
+"""`robosc evaluate` as a user calls it, with runs that were recorded before."""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from robosc.cli.main import guarded, make_parser
+from robosc.cli.plugins import Plugin
+from robosc_bridge.experiments import evaluate
+from robosc_bridge.experiments.scenario import Outcome, ScenarioError
+from support.models import EXAMPLES
+from support.recorded_runs import recorded
+
+
+@pytest.fixture
+def asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...]]:
+    """What the scenarios were asked for; over ROS 1 none can be run."""
+    found: list[tuple[Any, ...]] = []
+
+    def run_maze(folder: Path, scene: str, *, speed: float, say: Any, seed: int) -> Outcome:
+        found.append((folder.name, scene, speed, seed))
+        say("on its way")
+        return recorded(folder)
+
+    def fail(folder: Path, scene: str, **options: Any) -> Outcome:
+        raise ScenarioError("ROS 1 is not installed")
+
+    for name, run in (("maze", run_maze), ("ros1", fail)):
+        module = ModuleType(f"robosc_bridge.experiments.{name}")
+        vars(module).update(run_maze=run, MODEL=EXAMPLES / "maze_solver" / "maze_solver.rscd")
+        monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.chdir(tmp_path)
+    return found
+
+
+def call(*arguments: str) -> int:
+    """The command, as it is called through `robosc`."""
+    parser = make_parser([Plugin("evaluate", evaluate)])
+    parsed = parser.parse_args(["evaluate", *arguments])
+    return guarded("robosc", lambda: int(parsed.run(parsed)), as_json=parsed.json)
+
+
+def test_a_report_is_written(asked: list[tuple[Any, ...]], capsys: pytest.CaptureFixture[str]) -> None:
+    for number in (1, 2):
+        assert call("--experiment", "maze", "--no-cycles") == 0
+        assert Path(f"out/evaluation/maze-serial-{number}/sequence.html").is_file()
+    assert asked == [("maze-serial-1", "maze-rooms", 10.0, 0), ("maze-serial-2", "maze-rooms", 10.0, 0)]
+    assert capsys.readouterr().out.splitlines()[:4] == [
+        "maze over serial, maze-rooms: 10 events, log: no violation, motion: as required",
+        "Nothing was wrong in 1 scenario.",
+        "out/evaluation/report.html",
+        "out/evaluation/report.md",
+    ]
+    text = Path("out/evaluation/report.md").read_text(encoding="utf-8")
+    assert "maze-serial-2/sequence.png" in text
+    assert "Table I" not in text
+    assert "Figure 13" in text
+
+
+def test_a_scenario_that_cannot_be_run_is_told_beside_those_that_can(
+    asked: list[tuple[Any, ...]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ("--connection", "serial", "--connection", "ros1", "--scene", "mine.yaml", "--speed", "4", "--seed", "7")
+    assert call("--experiment", "maze", *options, "-o", "here", "--no-cycles", "--json") == 1
+    assert asked == [("maze-serial-1", "mine.yaml", 4.0, 7)]
+    found = json.loads(capsys.readouterr().out)
+    assert (found["status"], found["report"]) == ("failed", "here/report.html")
+    assert found["not_run"] == [{"experiment": "maze", "connection": "ros1", "why": "ROS 1 is not installed"}]
+    (run,) = found["runs"]
+    assert (run["events"], run["requests"], run["violations"], run["figures"]["way_m"]) == (10, 3, 0, "0.19")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "problem"),
+    [
+        (["--scene", "maze-rooms"], "--scene is the world of one experiment: name it with --experiment"),
+        (["--experiment", "maze", "-o", "taken"], "cannot write taken: File exists"),
+    ],
+)
+@pytest.mark.usefixtures("asked")
+def test_what_cannot_be_is_one_clear_message(
+    arguments: list[str], problem: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("taken").touch()
+    assert call(*arguments) == 2
+    assert capsys.readouterr().err == f"robosc: {problem}\n"
+
+
+@pytest.mark.parametrize("arguments", [["--speed", "0"], ["--speed", "nan"], ["--experiment", "golf"], ["--seed", "x"]])
+def test_arguments_that_are_wrong(arguments: list[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        call(*arguments)
+    assert caught.value.code == 2
+
+
+def test_the_plugin_is_a_command() -> None:
+    (commands,) = (
+        item
+        for item in make_parser([Plugin("evaluate", evaluate)])._actions
+        if isinstance(item, argparse._SubParsersAction)
+    )
+    assert "evaluate" in commands.choices

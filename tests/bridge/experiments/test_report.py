@@ -1,0 +1,109 @@
+"""The report of an evaluation, made of recorded runs: nothing is driven, nothing is waited for."""
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from robosc_bridge.experiments.evaluate import reported
+from robosc_bridge.experiments.evaluate_cycles import PAPER, CycleTimes, measure
+from robosc_bridge.experiments.lines_of_code import CodeSize
+from robosc_bridge.experiments.report import FailedRun, Report, ReportedRun, machine_facts, write_report
+from robosc_bridge.experiments.scenario import ScenarioError
+from support.generated import example_supervisor
+from support.recorded_runs import recorded
+
+NAMES = ("report.html", "report.md", "scenarios.csv", "figures.csv", "cycles.csv", "lines_of_code.csv")
+
+
+def report_of(*runs: ReportedRun, failures: tuple[FailedRun, ...] = ()) -> Report:
+    return Report(
+        runs,
+        failures,
+        (
+            CycleTimes("maze", "generated C, gcc -O2", False, (0.05, 0.04, 0.4, 0.01), 3000, median_us=0.04),
+            CycleTimes("maze", "generated Python, rclpy", True, None, why="rclpy is not installed"),
+        ),
+        {"maze": (CodeSize("model", 80, 1), CodeSize("cif", 120, 1), CodeSize("ros1-cpp", None, why="no layers"))},
+        machine_facts("2030-01-02"),
+    )
+
+
+def rows(file: Path) -> list[list[str]]:
+    with file.open(newline="", encoding="utf-8") as stream:
+        return list(csv.reader(stream))
+
+
+def test_a_report_of_a_recorded_run_is_complete(tmp_path: Path) -> None:
+    run = reported(recorded(tmp_path / "maze-serial-1"), tmp_path)
+    assert (run.check.violations, run.check.events, run.check.requests) == ((), 10, 3)
+    report = report_of(run)
+    assert report.has_passed
+    files = write_report(report, tmp_path)
+    assert [file.name for file in files] == [*NAMES, "lines_of_code.png"]
+    for name in ("maze-serial-1/sequence.png", "maze-serial-1/map.png", "lines_of_code.png"):
+        assert (tmp_path / name).read_bytes().startswith(b"\x89PNG"), name
+        assert f'src="{name}"' in (tmp_path / "report.html").read_text(encoding="utf-8")
+        assert f"]({name})" in (tmp_path / "report.md").read_text(encoding="utf-8")
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert "Nothing was wrong in 1 scenario." in text
+    assert "| Maze solver | serial | maze-rooms | 10 | 3 | 0 | no violation | as required |" in text
+    assert "| Maze solver | with | generated Python, rclpy | not measured: rclpy is not installed |" in text
+    assert "| Maze solver | with | the paper's | 40 | 9 | 660 | 40 | – | 3000 |" in text
+    assert "| Maze solver | without | generated C, gcc -O2 | 0.05 | 0.04 | 0.40 | 0.01 | 0.04 | 3000 |" in text
+    assert "| Maze solver | without | the paper's | 2 | 0 | 139 | 7 | – | 3000 |" in text
+    assert "| Maze solver | cif | 120 | 1.5 | 1 |" in text
+    assert "RoboSC's own counter" in text
+    # Every table of Markdown stands alone, between blank lines.
+    blocks = text.split("\n\n")
+    assert all(len({line.startswith("|") for line in block.strip().split("\n")}) == 1 for block in blocks)
+    assert rows(tmp_path / "scenarios.csv")[1] == ["maze", "serial", "maze-rooms", "10", "3", "0", "0", "0"]
+    assert rows(tmp_path / "figures.csv")[1:] == [
+        ["maze", "serial", "world_s", "0.95"], ["maze", "serial", "way_m", "0.19"],
+    ]  # fmt: skip
+    assert [row[-1] for row in rows(tmp_path / "cycles.csv")[1:]] == ["here", "the paper", "here", "the paper"]
+    assert rows(tmp_path / "lines_of_code.csv")[1:] == [
+        ["maze", "model", "80", "1"], ["maze", "cif", "120", "1"], ["maze", "ros1-cpp", "", "0"],
+    ]  # fmt: skip
+
+
+def test_what_was_wrong_is_told_and_is_no_markup(tmp_path: Path) -> None:
+    outcome = recorded(tmp_path / "maze-serial-1", faults=("it came to a <wall> | twice",))
+    text = outcome.event_log.read_text(encoding="utf-8")
+    outcome.event_log.write_text(text.replace('"rotate_left.request"', '"move.request"', 1), encoding="utf-8")
+    run = reported(outcome, tmp_path)
+    report = report_of(run, failures=(FailedRun("line", "ros1", "ROS 1 is <b>not</b> installed"),))
+    assert not report.has_passed
+    write_report(report, tmp_path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Something was wrong in 2 of 2 scenarios." in page
+    assert "it came to a &lt;wall&gt; | twice" in page
+    assert "ROS 1 is &lt;b&gt;not&lt;/b&gt; installed" in page
+    assert "Line 4 of the log: move.request was not allowed" in page
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert "it came to a \\<wall\\> \\| twice" in text
+    assert rows(tmp_path / "scenarios.csv")[2][2] == "not run: ROS 1 is <b>not</b> installed"
+
+
+def test_a_run_whose_log_cannot_be_read_is_one_that_failed(tmp_path: Path) -> None:
+    outcome = recorded(tmp_path / "maze-serial-1")
+    outcome.event_log.write_text("{}\n", encoding="utf-8")
+    with pytest.raises(ScenarioError, match="line 1: its 'time' is no number of seconds"):
+        reported(outcome, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("experiment", "model"), [("maze", "maze_solver/narrow_maze"), ("line", "line_follower/line_follower_layer")]
+)
+def test_cycles_are_measured(experiment: str, model: str) -> None:
+    found = measure(experiment, example_supervisor(model), runs=1, cycles=60)
+    assert [(times.has_middleware, times.paper) for times in found] == [
+        (False, PAPER[experiment, False]), (False, PAPER[experiment, False]), (True, PAPER[experiment, True]),
+    ]  # fmt: skip
+    for times in found:
+        if times.microseconds is None:
+            assert times.why in ("gcc is not installed", "rclpy is not installed")
+        else:
+            mean, least, most, deviation = times.microseconds
+            assert 0 <= least <= mean <= most < 1e6
+            assert (times.count, deviation >= 0, least <= times.median_us <= most) == (60, True, True)

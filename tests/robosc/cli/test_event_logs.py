@@ -1,0 +1,110 @@
+"""`robosc plot` and `robosc check-log` as a user runs them."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from robosc.cli.main import main
+from robosc.execution.event_log import json_line
+from robosc.execution.interpreter import InterpretedSystem
+from robosc.supervisor import encode
+from support.execution import Bench
+from support.generated import example_supervisor
+from support.models import EXAMPLES
+
+MODEL = str(EXAMPLES / "maze_solver" / "maze_solver.rscd")
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with the maze solver's supervisor and a log of it, to work in."""
+    monkeypatch.chdir(tmp_path)
+    supervisor = example_supervisor("maze_solver/maze_solver")
+    (tmp_path / "maze.rsup").write_bytes(encode(supervisor))
+    bench = Bench(InterpretedSystem(supervisor))
+    bench.receive("/scan", {"ranges": [0.2] * 360})
+    bench.tick(2)
+    bench.receive("/rotate_done")
+    bench.tick()
+    bench.executor.restart()
+    (tmp_path / "maze.jsonl").write_text("".join(map(json_line, bench.log.entries)), encoding="utf-8")
+    return tmp_path
+
+
+def change(folder: Path, old: str, new: str) -> None:
+    file = folder / "maze.jsonl"
+    text = file.read_text(encoding="utf-8")
+    assert old in text
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+
+@pytest.mark.parametrize("model", ["maze.rsup", MODEL])
+def test_a_right_log_passes(model: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check-log", "maze.jsonl", "--model", model]) == 0
+    told = "passed against the supervisor of MazeSolver: 6 events, 2 of them requests, 1 restarts"
+    assert capsys.readouterr().out == f"maze.jsonl: {told}\n"
+
+
+def test_a_wrong_log_fails_with_the_line(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    change(folder, '"rotate_left.request"', '"move.request"')
+    assert main(["check-log", "maze.jsonl", "--model", "maze.rsup"]) == 1
+    wrong, last = capsys.readouterr().out.splitlines()
+    assert wrong.startswith("maze.jsonl:4: move.request was not allowed: its requirements do not hold; the state after")
+    assert "Rotator is in idle, not in " in wrong
+    told = "failed: 1 violations against the supervisor of MazeSolver: 6 events, 2 of them requests, 1 restarts"
+    assert last == f"maze.jsonl: {told}"
+
+
+def test_for_machines(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    change(folder, '"scan_front.response"', '"scan_back.response"')
+    with (folder / "maze.jsonl").open("a") as file:
+        file.write('{"time":')
+    assert main(["check-log", "maze.jsonl", "--model", "maze.rsup", "--deployment", "layer", "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert found | {"violations": ...} == {
+        "status": "failed", "model": "MazeSolver", "events": 6, "requests": 2, "blocked": 0, "unjudged": 0,
+        "restarts": 1, "dropped": 0, "notes": ["line 8, the last one, is cut off and was left out"],
+        "violation_count": 1, "violations": ...,
+    }  # fmt: skip
+    assert [(item["line"], item["message"]) for item in found["violations"]] == [
+        (1, "scan_back.response is no event of the model")
+    ]
+
+
+def test_a_plot_is_drawn(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plot", "maze.jsonl"]) == 0
+    assert capsys.readouterr().out == "maze.png: 6 events of 5 kinds, 0.000 s to 0.300 s\n"
+    assert (folder / "maze.png").read_bytes().startswith(b"\x89PNG")
+    arguments = ["--from", "0.05", "--to", "0.15", "--event", "*.request", "--title", "Left", "--json"]
+    assert main(["plot", "maze.jsonl", "-o", "left.svg", *arguments]) == 0
+    assert json.loads(capsys.readouterr().out) == {
+        "file": "left.svg", "events": 1, "marks": 1, "rows": ["rotate_left.request"], "begin_s": 0.05, "end_s": 0.15,
+        "notes": [],
+    }  # fmt: skip
+    assert "Left" in (folder / "left.svg").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "problem"),
+    [
+        (["plot", "none.jsonl"], 2, "cannot read none.jsonl: No such file or directory"),
+        (["plot", "maze.rsup"], 2, "maze.rsup, line 1: "),
+        (["plot", "maze.jsonl", "-o", "maze.jsonl"], 2, "maze.jsonl is the log itself"),
+        (["plot", "maze.jsonl", "-o", "maze.gif"], 2, "plots are .png, .svg, .html files"),
+        (["plot", "maze.jsonl", "-o", "no/maze.png"], 2, "cannot write no/maze.png: No such file or directory"),
+        (["plot", "maze.jsonl", "--event", "halt"], 2, "no event of the log is called 'halt'"),
+        (["plot", "maze.jsonl", "--from", "9"], 2, "no event in the time window"),
+        (["check-log", "maze.jsonl", "--model", "none.rscd"], 2, "there is no file none.rscd"),
+        (["check-log", "maze.jsonl", "--model", "none.rsup"], 2, "cannot read none.rsup"),
+        (["check-log", "none.jsonl", "--model", "maze.rsup"], 2, "cannot read none.jsonl"),
+        (["check-log", MODEL, "--model", "maze.rsup"], 2, "line 1: no entry of an event log"),
+    ],
+)
+def test_what_cannot_be_is_one_clear_message(
+    folder: Path, arguments: list[str], status: int, problem: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == status
+    told = capsys.readouterr()
+    assert (told.out, told.err.count("\n")) == ("", 1)
+    assert problem in told.err

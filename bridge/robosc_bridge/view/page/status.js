@@ -51,8 +51,8 @@ function causesOf(update) {
     causes.push({ kind: "reason", lead: "Nothing moves:", told: reason.text + until });
   }
   for (const stop of update.stops ?? []) causes.push({ kind: "stop", lead: "Nothing is requested:", told: stop });
-  for (const warning of update.warnings ?? []) causes.push({ kind: "warning", lead: "Warning:", told: warning.text ?? warning });
   if (causes.length === 0) causes.push({ kind: "fine", lead: "", told: "Nothing keeps the robot from moving." });
+  for (const warning of update.warnings ?? []) causes.push({ kind: "warning", lead: "Warning:", told: warning.text ?? warning });
   return causes;
 }
 

@@ -2,7 +2,7 @@
 
 import { announce } from "./announce.js";
 import { byId, make, mark, quoted, say } from "./dom.js";
-import { told } from "./told.js";
+import { isReplay, told } from "./told.js";
 
 const SOURCES = { bridge: "bridge", ros2: "ROS 2", log: "recorded run" };
 
@@ -51,7 +51,7 @@ function causesOf(update) {
     causes.push({ kind: "reason", lead: "Nothing moves:", told: reason.text + until });
   }
   for (const stop of update.stops ?? []) causes.push({ kind: "stop", lead: "Nothing is requested:", told: stop });
-  if (causes.length === 0) causes.push({ kind: "fine", lead: "", told: "Nothing keeps the robot from moving." });
+  if (causes.length === 0 && !isReplay()) causes.push({ kind: "fine", lead: "", told: "Nothing keeps the robot from moving." });
   for (const warning of update.warnings ?? []) causes.push({ kind: "warning", lead: "Warning:", told: warning.text ?? warning });
   return causes;
 }

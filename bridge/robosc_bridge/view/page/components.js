@@ -1,0 +1,164 @@
+// A card for each component: its graph, its variables, and its messages, services and actions.
+
+import { byId, make, mark, quoted, say, show } from "./dom.js";
+import { count, value } from "./format.js";
+import { Graph } from "./graph.js";
+import { told } from "./told.js";
+
+const SERVED = new Set(["service", "action"]);
+const WIDE_PX = 430;
+const KINDS = { controllable: "controllable", uncontrollable: "uncontrollable", silent: "silent" };
+
+class Card {
+  constructor(component, communications, index, enlarge) {
+    const id = `component-${index}`;
+    this.component = component;
+    this.state = make("bdi", { class: "card-state" });
+    this.graph = component.graph ? new Graph(component.name, component.graph, id) : null;
+    // Small print helps nobody: a wide graph takes the room of two cards.
+    const isWide = (component.graph?.width ?? 0) > WIDE_PX;
+    this.frame = make("div", { class: "card-graph" });
+    this.variables = new Map();
+    this.variablesList = make("dl", { class: "variables", hidden: true });
+    this.places = new Map();
+    this.element = make("article", { class: isWide ? "card is-wide" : "card", "aria-labelledby": id, "data-component": component.name },
+      this.headline(id, enlarge), this.frame, this.variablesList, this.communicationsList(communications));
+    if (this.graph) {
+      this.frame.append(this.graph.element);
+      this.element.append(transitionsTable(component.graph));
+    } else {
+      this.frame.remove();
+      this.element.append(make("p", { class: "quiet" }, "No behaviour of its own."));
+    }
+  }
+
+  headline(id, enlarge) {
+    const parts = [make("h3", { id }, quoted(this.component.name)), this.state];
+    if (this.graph) {
+      const button = make("button", { type: "button", class: "plain icon", "aria-label": `Enlarge the graph of ${this.component.name}` }, "⤢");
+      button.addEventListener("click", () => enlarge(this, button));
+      parts.push(button);
+    }
+    return make("div", { class: "card-head" }, ...parts);
+  }
+
+  communicationsList(communications) {
+    const list = make("ul", { class: "communications" });
+    for (const item of communications) {
+      const place = SERVED.has(item.kind) ? make("span", { class: "place", "data-place": "" }) : null;
+      const tied = [item.identifier, item.channel && `channel ${item.channel}`].filter(Boolean).join(", ");
+      const line = make("li", { title: tied || null },
+        make("span", { class: "what" }, item.kind), " ", quoted(item.name), ...(place ? [" ", place] : []));
+      if (place) this.places.set(item.name, place);
+      list.append(line);
+    }
+    return list;
+  }
+
+  paint(shown, places) {
+    const state = shown?.state ?? null;
+    say(this.state, state ?? (this.graph ? "not known" : ""));
+    this.graph?.setActive(state);
+    this.paintVariables(shown?.variables ?? {});
+    for (const [name, place] of this.places) {
+      const location = places[name] ?? "not known";
+      say(place, location);
+      mark(place, "data-place", location);
+    }
+  }
+
+  paintVariables(variables) {
+    const names = Object.keys(variables);
+    if (names.length !== this.variables.size || names.some((name) => !this.variables.has(name))) {
+      this.variables = new Map(names.map((name) => [name, make("bdi")]));
+      this.variablesList.replaceChildren(
+        ...names.map((name) => make("div", {}, make("dt", {}, quoted(name)), make("dd", {}, this.variables.get(name)))),
+      );
+      show(this.variablesList, names.length > 0);
+    }
+    for (const name of names) say(this.variables.get(name), value(variables[name]));
+  }
+}
+
+function transitionsTable(graph) {
+  const rows = graph.edges.map((edge) =>
+    make("tr", {}, ...[edge.from, edge.label || "–", KINDS[edge.kind] ?? "", edge.to].map((cell) => make("td", {}, quoted(cell)))));
+  const heads = ["From", "Event", "Kind", "To"].map((word) => make("th", { scope: "col" }, word));
+  return make("details", { class: "transitions" },
+    make("summary", {}, `${count(graph.edges.length, "transition", "transitions")} as a table`),
+    make("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Transitions" },
+      make("table", {}, make("thead", {}, make("tr", {}, ...heads)), make("tbody", {}, ...rows))));
+}
+
+/** @returns {object} What main.js calls. */
+export function startComponents() {
+  let cards = new Map();
+  let taken = new Map();
+  const enlarge = startLarge();
+  const filter = byId("components-filter");
+
+  const narrow = () => {
+    const wanted = filter.value.trim().toLowerCase();
+    let shown = 0;
+    for (const [name, card] of cards) {
+      const fits = name.toLowerCase().includes(wanted);
+      show(card.element, fits);
+      shown += fits;
+    }
+    say(byId("components-count"), shown === cards.size ? String(cards.size) : `${shown} of ${cards.size}`);
+    show(byId("cards-none"), shown === 0 && cards.size > 0);
+  };
+  filter.addEventListener("input", narrow);
+
+  return {
+    build() {
+      const { components = [], communications = [] } = told.definition;
+      const byComponent = Map.groupBy(communications, (item) => item.component);
+      cards = new Map(components.map((item, i) => [item.name, new Card(item, byComponent.get(item.name) ?? [], i, enlarge)]));
+      byId("cards").replaceChildren(...[...cards.values()].map((card) => card.element));
+      narrow();
+    },
+    paint() {
+      const components = told.update?.components ?? {};
+      const places = told.update?.communications ?? {};
+      for (const [name, card] of cards) {
+        card.paint(components[name], places);
+        if (taken.has(name)) card.graph?.take(taken.get(name));
+      }
+      taken = new Map();
+    },
+    /** What was taken so far was so on another robot. */
+    forget() {
+      taken = new Map();
+    },
+    take(entries) {
+      for (const entry of entries) {
+        for (const { component, id } of entry.transitions ?? []) {
+          const ids = taken.get(component) ?? [];
+          // Of what happens between two frames nobody sees more than this.
+          if (ids.length >= 64) ids.shift();
+          ids.push(id);
+          taken.set(component, ids);
+        }
+      }
+    },
+  };
+}
+
+/** A graph in full size. The drawing itself moves there and back, so that it goes on living. */
+function startLarge() {
+  const dialog = byId("large");
+  let origin = null;
+  byId("large-close").addEventListener("click", () => dialog.close());
+  dialog.addEventListener("close", () => {
+    origin.card.frame.append(origin.card.graph.element);
+    origin.button.focus();
+    origin = null;
+  });
+  return (card, button) => {
+    origin = { card, button };
+    say(byId("large-title"), card.component.name);
+    byId("large-body").replaceChildren(card.graph.element);
+    dialog.showModal();
+  };
+}

@@ -1,0 +1,55 @@
+// Whether what is shown is so now. If not, the whole page says so, and says how old it is.
+
+import { announce } from "./announce.js";
+import { SILENT_MS } from "./connection.js";
+import { byId, mark, say, show } from "./dom.js";
+import { ago } from "./format.js";
+import { ageS, told } from "./told.js";
+
+const OLD_S = 2;
+
+const SENTENCES = {
+  connecting: () => "Connecting to the server.",
+  lost: () => "Connection lost: nothing shown here is live.",
+  silent: () => "The server is silent: nothing shown here is live.",
+  gone: () => `The source is lost: ${told.gone ?? "no reason was told"}`,
+  old: () => "The bridge's loop hangs: nothing shown here is live.",
+};
+const WORDS = { connecting: "connecting", lost: "no connection", silent: "silent", gone: "source lost", old: "hangs", waiting: "waiting" };
+
+/** One of the names above; "waiting": connected, without a definition yet; "live". */
+function freshness(connection) {
+  if (!connection.isOpen) return told.definition === null ? "connecting" : "lost";
+  if (connection.silenceMs > SILENT_MS) return "silent";
+  if (told.gone !== null) return "gone";
+  if (told.definition === null) return "waiting";
+  return told.definition.source === "bridge" && ageS() > OLD_S ? "old" : "live";
+}
+
+/**
+ * Keeps the page true about its age.
+ *
+ * @param {() => {isOpen: boolean, silenceMs: number}} connection The connection.
+ * @returns {() => string} To be called when something may have changed and several times a second; what it is now.
+ */
+export function startFreshness(connection) {
+  let last = "connecting";
+  return () => {
+    const now = freshness(connection());
+    mark(document.documentElement, "data-freshness", now);
+    const isStale = now in SENTENCES;
+    show(byId("stale"), isStale);
+    say(byId("stale-what"), isStale ? SENTENCES[now]() : "");
+    say(byId("stale-age"), isStale && told.update !== null ? `The state below is ${ago(ageS())} old.` : "");
+    say(byId("link-word"), now === "live" ? liveWord() : WORDS[now]);
+    if (now === "live" && last !== "live") announce("link", "Connected.");
+    last = now;
+    return now;
+  };
+}
+
+function liveWord() {
+  if (told.definition.source === "log") return "recorded";
+  if (told.update === null) return "connected";
+  return told.definition.source === "ros2" && ageS() > OLD_S ? `live, last change ${ago(ageS())} ago` : "live";
+}

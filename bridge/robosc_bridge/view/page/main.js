@@ -1,0 +1,115 @@
+// Ties the parts of the page to what the server tells.
+
+import { startComponents } from "./components.js";
+import { Connection } from "./connection.js";
+import { paints, touch } from "./frame.js";
+import { startFreshness } from "./freshness.js";
+import { startMap } from "./map.js";
+import { startOrders } from "./orders.js";
+import { forgetColours } from "./picture.js";
+import { startReplay } from "./replay.js";
+import { startRequests } from "./requests.js";
+import { paintRobot, paintStatus } from "./status.js";
+import { startStream } from "./stream.js";
+import { startTheme } from "./theme.js";
+import { forget, told } from "./told.js";
+import { takeToken } from "./token.js";
+
+let connection = null;
+const orders = startOrders(() => connection, takeToken());
+const components = startComponents();
+const requests = startRequests();
+const stream = startStream();
+const map = startMap();
+const replay = startReplay((message) => connection.send(message));
+const lookAtFreshness = startFreshness(() => connection);
+
+let known = "";
+let wasLost = false;
+
+const receive = {
+  definition(message) {
+    forget();
+    told.definition = message;
+    const now = JSON.stringify(message);
+    if (wasLost) stream.note("The connection is back. What happened meanwhile is not here.");
+    wasLost = false;
+    // After an interruption it is mostly the same robot: what a reader has opened and chosen stays.
+    if (now !== known) {
+      known = now;
+      components.forget();
+      map.clear();
+      touch("definition");
+    }
+    touch("robot", "update", "map", "position");
+  },
+  update(message) {
+    told.update = message;
+    told.updateMs = performance.now();
+    map.updated();
+    orders.updated();
+    touch("update", "map");
+  },
+  events({ entries, lost }) {
+    stream.add(entries ?? [], lost ?? 0);
+    components.take(entries ?? []);
+    touch("taken");
+  },
+  scan(message) {
+    told.scan = message;
+    touch("map");
+  },
+  position(message) {
+    if (told.position && message.time_s < told.position.time_s) {
+      stream.backTo(message.time_s);
+      map.clear();
+    }
+    told.position = message;
+    touch("position");
+  },
+  refused: (message) => orders.answered(message),
+  done: (message) => orders.answered(message),
+  gone({ why }) {
+    told.gone = String(why ?? "");
+    wasLost = true;
+    stream.note(`The source is lost: ${told.gone}`);
+  },
+};
+
+paints("definition", components.build);
+paints("definition", requests.build);
+paints("definition", map.build);
+paints("definition", replay.build);
+paints("robot", paintRobot);
+paints("robot", orders.paint);
+paints("update", paintStatus);
+paints("update", components.paint);
+paints("update", requests.paint);
+paints("taken", components.paint);
+paints("stream", stream.paint);
+paints("map", map.paint);
+paints("position", replay.paint);
+
+startTheme(() => {
+  forgetColours();
+  touch("map");
+});
+
+connection = new Connection(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/stream`, {
+  onMessage(message) {
+    if (Object.hasOwn(receive, message.type)) receive[message.type](message);
+    lookAtFreshness();
+  },
+  onChange() {
+    if (connection === null) return;
+    if (!connection.isOpen && told.definition !== null) {
+      wasLost = true;
+      stream.note("The connection is lost.");
+    }
+    orders.changed();
+    lookAtFreshness();
+  },
+  onLook: () => connection && lookAtFreshness(),
+});
+lookAtFreshness();
+touch("stream", "map");

@@ -1,0 +1,60 @@
+// Every request of the model: enabled, or in words why not.
+
+import { byId, make, mark, quoted, say, show } from "./dom.js";
+import { told } from "./told.js";
+
+class Request {
+  constructor(event) {
+    this.event = event;
+    this.word = make("span", { class: "request-word" });
+    this.why = make("bdi", { class: "request-why" });
+    this.all = make("ul", { class: "whys" });
+    this.key = null;
+    this.element = make("li", { class: "request", "data-request": event, "data-enabled": "unknown" },
+      make("details", {}, make("summary", {}, quoted(event, "request-name"), " ", this.word, " ", this.why), this.all));
+  }
+
+  /** @param {boolean | null} isEnabled null: not known. @param {string[]} why In sentences. */
+  paint(isEnabled, why) {
+    const key = JSON.stringify([isEnabled, why]);
+    if (key === this.key) return;
+    this.key = key;
+    mark(this.element, "data-enabled", isEnabled ?? "unknown");
+    say(this.word, isEnabled === null ? "? not known" : isEnabled ? "✓ enabled" : "✕ not now");
+    say(this.why, why.join(" "));
+    // The line stays when the reason goes: nothing jumps when a request becomes enabled and stops being so.
+    if (why.length > 0) this.element.classList.add("has-why");
+    const lines = why.length > 0 ? why : [isEnabled ? "Nothing holds it back." : "No reason was told."];
+    this.all.replaceChildren(...lines.map((line) => make("li", {}, quoted(line))));
+  }
+}
+
+/** @returns {{build: () => void, paint: () => void}} What main.js calls. */
+export function startRequests() {
+  let requests = [];
+  const filter = byId("requests-filter");
+  const narrow = () => {
+    const wanted = filter.value.trim().toLowerCase();
+    for (const request of requests) show(request.element, request.event.toLowerCase().includes(wanted));
+  };
+  filter.addEventListener("input", narrow);
+
+  return {
+    build() {
+      requests = (told.definition.requests ?? []).map((event) => new Request(event));
+      byId("requests").replaceChildren(...requests.map((request) => request.element));
+      show(byId("requests-none"), requests.length === 0);
+      narrow();
+    },
+    paint() {
+      const { update } = told;
+      const enabled = new Set(update?.enabled ?? []);
+      const disabled = new Map((update?.disabled ?? []).map((item) => [item.event, item.why ?? []]));
+      for (const request of requests) {
+        const isEnabled = update === null ? null : enabled.has(request.event);
+        request.paint(isEnabled, isEnabled ? [] : (disabled.get(request.event) ?? []));
+      }
+      say(byId("requests-count"), update === null ? "" : `${enabled.size} of ${requests.length} enabled`);
+    },
+  };
+}

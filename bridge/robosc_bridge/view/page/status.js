@@ -1,0 +1,77 @@
+// The header and the status panel: what the bridge is doing, and in words why nothing moves.
+
+import { announce } from "./announce.js";
+import { byId, make, mark, quoted, say } from "./dom.js";
+import { told } from "./told.js";
+
+const SOURCES = { bridge: "bridge", ros2: "ROS 2", log: "recorded run" };
+
+/** The definition is new. */
+export function paintRobot() {
+  const { definition } = told;
+  if (definition === null) return;
+  say(byId("robot"), definition.robot);
+  const deployment = definition.deployment === "layer" ? "supervision layer" : "controller";
+  say(byId("about"), `${deployment} · ${SOURCES[definition.source] ?? definition.source} · ${definition.version}`);
+  document.title = `${definition.robot} – RoboSC live view`;
+}
+
+let lastState = null;
+let lastCauses = null;
+
+/** The update is new. */
+export function paintStatus() {
+  const { update } = told;
+  const state = update?.state || "not known";
+  say(byId("state-word"), state);
+  mark(byId("state"), "data-state", update?.state || "unknown");
+  if (update === null) {
+    lastState = lastCauses = null;
+    byId("causes").replaceChildren();
+    byId("devices").replaceChildren();
+    return;
+  }
+  const causes = causesOf(update);
+  const key = JSON.stringify(causes);
+  if (key !== lastCauses) {
+    byId("causes").replaceChildren(...causes.map(causeLine));
+    announce("causes", causes.map(({ lead, told: said }) => `${lead} ${said}`).join(" "));
+  }
+  if (lastState !== null && state !== lastState) announce("state", `State: ${state}.`);
+  lastState = state;
+  lastCauses = key;
+  paintDevices(update.devices ?? {});
+}
+
+function causesOf(update) {
+  const causes = [];
+  if (update.problem) causes.push({ kind: "fault", lead: "Fault:", told: update.problem });
+  for (const reason of update.reasons ?? []) {
+    const until = reason.holds_until_reset ? " (until reset)" : "";
+    causes.push({ kind: "reason", lead: "Nothing moves:", told: reason.text + until });
+  }
+  for (const stop of update.stops ?? []) causes.push({ kind: "stop", lead: "Nothing is requested:", told: stop });
+  for (const warning of update.warnings ?? []) causes.push({ kind: "warning", lead: "Warning:", told: warning.text ?? warning });
+  if (causes.length === 0) causes.push({ kind: "fine", lead: "", told: "Nothing keeps the robot from moving." });
+  return causes;
+}
+
+const SIGNS = { fault: "✕", reason: "■", stop: "■", warning: "▲", fine: "✓" };
+
+function causeLine({ kind, lead, told: said }) {
+  const sign = make("span", { class: "sign", "aria-hidden": "true" }, SIGNS[kind]);
+  return make("li", { class: `cause is-${kind}` }, sign, make("span", {}, make("strong", {}, lead), lead && " ", quoted(said)));
+}
+
+let lastDevices = "";
+
+function paintDevices(devices) {
+  const key = JSON.stringify(devices);
+  if (key === lastDevices) return;
+  lastDevices = key;
+  byId("devices").replaceChildren(
+    ...Object.entries(devices).map(([name, works]) =>
+      make("li", { class: `chip ${works ? "is-there" : "is-missing"}` }, quoted(name), works ? " works" : " is not there"),
+    ),
+  );
+}

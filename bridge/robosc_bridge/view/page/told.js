@@ -1,0 +1,31 @@
+// What the server has told last. Parts of the page read it; main.js alone writes it.
+
+/** Whatever is not there is as if nothing was told about it. */
+export const told = {
+  /** The `definition`; null: not yet. */
+  definition: null,
+  /** The latest `update`; null: not yet. */
+  update: null,
+  /** When it came, by performance.now(). */
+  updateMs: 0,
+  /** The latest `scan`. */
+  scan: null,
+  /** The latest `position` of a replay. */
+  position: null,
+  /** Why the source is lost; null: it is not. */
+  gone: null,
+};
+
+/** Forgets what was told about the robot, for a new definition. */
+export function forget() {
+  Object.assign(told, { update: null, updateMs: 0, scan: null, position: null, gone: null });
+}
+
+/** Whether a recorded run is shown. */
+export const isReplay = () => told.definition?.source === "log";
+
+/** How old the state is that is shown, in seconds. */
+export function ageS() {
+  if (told.update === null) return 0;
+  return (told.update.age_s ?? 0) + (performance.now() - told.updateMs) / 1000;
+}

@@ -1,0 +1,104 @@
+"""The stop button and the commands: what is sent, and what the page says became of it."""
+
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser
+
+from support.browser import Visit, visit
+from support.live_view import TOKEN, StandIn
+from support.view_messages import definition, update
+
+ANSWER_IS = "(words) => document.querySelector('#stop-answer').textContent === words"
+STOPPED = {"code": "operator_stop", "text": "An operator has stopped the robot.", "holds_until_reset": True}
+
+
+@pytest.fixture
+def server() -> Iterator[StandIn]:
+    with StandIn([definition(), update()]) as standing_in:
+        yield standing_in
+
+
+@pytest.fixture
+def seen(browser: Browser, server: StandIn) -> Iterator[Visit]:
+    with visit(browser, server.address) as opened:
+        server.wait_for_pages(1)
+        yield opened
+
+
+def test_stop_needs_no_token_and_says_that_it_was_heard(server: StandIn, seen: Visit) -> None:
+    button = seen.page.get_by_role("button", name="STOP")
+    button.click()
+    assert server.wait_for_messages(1) == [{"type": "stop"}]
+    server.send(update(reasons=[STOPPED]))
+    seen.wait(ANSWER_IS, "STOP was heard: the robot is stopped by an operator.")
+    assert not seen.page.locator("#commands").is_visible()
+    assert "token" in seen.text("#commands-why")
+
+
+@pytest.mark.parametrize("focus", ["body", "#stream-filter", "#map", "#stream", "dialog"])
+def test_escape_stops_wherever_the_keyboard_is(server: StandIn, seen: Visit, focus: str) -> None:
+    seen.wait("() => !document.querySelector('#stop').hidden")
+    if focus == "dialog":
+        seen.page.get_by_role("button", name="Enlarge the graph of Base").click()
+    elif focus != "body":
+        seen.page.locator(focus).focus()
+    seen.page.keyboard.press("Escape")
+    assert server.wait_for_messages(1) == [{"type": "stop"}]
+    server.send({"type": "done", "what": "stop"})
+    seen.wait(ANSWER_IS, "STOP was heard.")
+
+
+def test_a_stop_that_nobody_confirms_is_told(server: StandIn, seen: Visit) -> None:
+    seen.page.get_by_role("button", name="STOP").click()
+    server.wait_for_messages(1)
+    seen.wait(ANSWER_IS, "STOP was not confirmed within 2 s. Use the switch on the robot.")
+
+
+def test_a_stop_without_a_connection_is_told_and_sent_later(server: StandIn, seen: Visit) -> None:
+    seen.wait("() => !document.querySelector('#stop').hidden")
+    server.away()
+    seen.wait("() => document.documentElement.dataset.freshness === 'lost'")
+    seen.page.get_by_role("button", name="STOP").click()
+    seen.wait("() => document.querySelector('#stop-answer').textContent.startsWith('STOP was NOT sent')")
+    assert server.received == []
+    server.back()
+    assert server.wait_for_messages(1) == [{"type": "stop"}]
+
+
+def test_commands_carry_the_token_and_are_answered(browser: Browser, server: StandIn) -> None:
+    with visit(browser, f"{server.address}?token={TOKEN}") as seen:
+        for i, command in enumerate(("start", "standby", "resume", "reset")):
+            seen.page.get_by_role("button", name=command.capitalize(), exact=True).click()
+            heard = server.wait_for_messages(i + 1)
+            assert heard[-1] == {"type": "command", "command": command, "token": TOKEN}
+            server.send({"type": "done", "what": command})
+            seen.wait(ANSWER_IS, f"{command}: done.")
+        seen.page.get_by_role("button", name="Start", exact=True).click()
+        server.wait_for_messages(5)
+        server.send({"type": "refused", "what": "start", "why": "The scanner is not there."})
+        seen.wait(ANSWER_IS, "start: refused. The scanner is not there.")
+
+
+def test_the_token_leaves_the_address_and_outlives_a_reload(browser: Browser, server: StandIn) -> None:
+    with visit(browser, f"{server.address}?token={TOKEN}") as seen:
+        seen.wait("() => !document.querySelector('#commands').hidden")
+        assert seen.page.url == server.address
+        seen.page.reload()
+        seen.page.get_by_role("button", name="Reset", exact=True).click()
+        heard = server.wait_for_messages(1)
+        assert heard[0]["token"] == TOKEN
+
+
+def test_who_can_only_watch_is_offered_nothing(browser: Browser) -> None:
+    with (
+        StandIn([definition(can_command=False), update()]) as server,
+        visit(browser, f"{server.address}?token={TOKEN}") as seen,
+    ):
+        seen.wait("() => document.querySelector('#robot').textContent === 'Carrier'")
+        assert not seen.page.get_by_role("button", name="STOP").is_visible()
+        assert not seen.page.locator("#commands").is_visible()
+        assert seen.text("#commands-why") == "This view only watches: it can neither stop nor command the robot."
+        seen.page.keyboard.press("Escape")
+        seen.page.evaluate("() => new Promise((done) => setTimeout(done, 100))")
+        assert server.received == []

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import json
+import logging
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -27,6 +28,8 @@ from robosc_bridge.terminal.client import Wish as ClientWish
 from robosc_bridge.view.definition import DefinitionError, Robot, robot_of, shape_of
 from robosc_bridge.view.facts import Drive, Happenings, LaserScan, Notice, SourceKind, Status, Talk
 from robosc_bridge.view.sources import RefusedError, Sink, SourceLostError, SourceWrongError, Wish, not_replayed
+
+_log = logging.getLogger(__name__)
 
 RATE_HZ = 25.0
 """Most responses of the bridge a second; what it tells is at most so old."""
@@ -240,7 +243,9 @@ def _supervisor(told: Any) -> Supervisor | None:
     try:
         return decode(told.supervisor) if told.supervisor else None
     except RoboscError as error:
-        raise DefinitionError(f"the bridge's supervisor cannot be read: {error}") from error
+        # A later bridge may have another format: all but the reasons is shown.
+        _log.warning("the bridge's supervisor cannot be read, so that reasons are not known: %s", error)
+        return None
 
 
 def status_of(snapshot: Snapshot) -> Status:

@@ -22,7 +22,7 @@ let lastCauses = null;
 /** The update is new. */
 export function paintStatus() {
   const { update } = told;
-  const state = update?.state || "not known";
+  const state = update?.state || (isReplay() ? "recorded" : "not known");
   say(byId("state-word"), state);
   mark(byId("state"), "data-state", update?.state || "unknown");
   if (update === null) {

@@ -132,6 +132,16 @@ export function startStream() {
   });
   byId("stream-save").addEventListener("click", () => save(entries.all));
 
+  // Where a recorded run is turned back, what comes again takes the place of what was there; where it is turned on, the
+  // stream begins anew with what the server tells of the time before.
+  const jumpTo = (first) => {
+    if (first.number <= entries.highest) entries.takeBack((entry) => entry.number >= first.number);
+    const before = first.number - 1 - Math.max(entries.highest, 0);
+    if (before <= 0) return;
+    entries.clear();
+    entries.add([{ kind: "lost", time_s: first.time_s, text: `The replay jumped here: ${count(first.number - 1, "entry", "entries")} before it` }]);
+  };
+
   const paintRows = () => {
     const { shown } = entries;
     spacer.style.height = `${shown.length * rowHeight}px`;
@@ -182,10 +192,7 @@ export function startStream() {
   return {
     /** Entries of a batch; before them `lost` are missing. */
     add(batch, lost) {
-      if (isReplay() && batch.length > 0 && batch[0].number <= entries.highest) {
-        // The recorded run was turned back: what comes again takes the place of what was there.
-        entries.takeBack((entry) => entry.number >= batch[0].number);
-      }
+      if (isReplay() && batch.length > 0) jumpTo(batch[0]);
       if (lost > 0) added(entries.addLost(lost, batch[0]?.time_s ?? Date.now() / 1000));
       for (const entry of batch) addKind(groupOf(entry));
       added(entries.add(batch));

@@ -13,6 +13,8 @@ from collections.abc import Iterator, Mapping
 from random import Random
 from typing import Any
 
+from msgspec import structs
+
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor import Supervisor
@@ -82,12 +84,12 @@ def large_model(components: int = 60) -> str:
         }}
     }}
     requirement Motor{number - 1}.moving disables hold{number}""")
-    return "robot Large {\n    interface holding use Trigger from std_srvs" + "".join(parts) + "\n}\n"
+    return "robot Large {\n    interface holding use Hold from large_msgs" + "".join(parts) + "\n}\n"
 
 
 def supervisor_without_synthesis(text: str) -> Supervisor:
     """A model as its own supervisor, where its requirements are all that is needed."""
-    return Supervisor(model_of(text), Deployment.CONTROLLER, (), CERTIFICATE)
+    return Supervisor(model_of(text), Deployment.CONTROLLER, (), structs.replace(CERTIFICATE, states="1"))
 
 
 class LiveRobot:

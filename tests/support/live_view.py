@@ -84,7 +84,7 @@ class StandIn:
     def wait_for_messages(self, count: int) -> list[Any]:
         """All that pages have sent, once it is so many."""
         self._wait(lambda: len(self.received) >= count)
-        return self.received
+        return list(self.received)
 
     def wait_for_pages(self, count: int) -> None:
         """Until so many pages are connected."""

@@ -8,9 +8,11 @@ from typing import Any
 from google.protobuf.struct_pb2 import Struct
 
 from robosc._version import __version__
+from robosc.errors import UnsupportedModelError
 from robosc.execution.event_log import Entry, plain
 from robosc.expressions import ObjectType
 from robosc.model.structure import Communication, CommunicationKind, Model
+from robosc.supervisor import Supervisor, encode
 from robosc.targets.ros.state_topic import state_topic
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_api.v1 import bridge_pb2_grpc
@@ -42,6 +44,9 @@ WatchResponse = pb.WatchResponse
 CommandResponse = pb.CommandResponse
 BridgeServiceServicer = bridge_pb2_grpc.BridgeServiceServicer
 add_service = bridge_pb2_grpc.add_BridgeServiceServicer_to_server
+
+MAXIMUM_SUPERVISOR_BYTES = 8 * 2**20
+"""A larger supervisor is not told: a watcher takes 16 MiB in a message, and has to do without reasons then."""
 
 MAXIMUM_TEXT = 1000
 """Characters of a name, identifier, id or reason in what a program tells."""
@@ -92,7 +97,16 @@ def definition(operations: Operations) -> pb.GetDefinitionResponse:
             for component, numbers in parts
             for state, number in numbers.items()
         ],
+        supervisor=_supervisor(operations.supervisor),
     )
+
+
+def _supervisor(supervisor: Supervisor) -> bytes:
+    try:
+        content = encode(supervisor)
+    except UnsupportedModelError:
+        return b""  # It was made here, and is too large for a file.
+    return content if len(content) <= MAXIMUM_SUPERVISOR_BYTES else b""
 
 
 def _fields(model: Model, item: Communication) -> list[str]:
@@ -157,6 +171,9 @@ def _snapshot(snapshot: Snapshot) -> pb.Snapshot:
             for name, item in snapshot.components.items()
         ],
         enabled=snapshot.enabled,
+        communications=[
+            pb.CommunicationState(name=name, location=location) for name, location in snapshot.communications.items()
+        ],
         has_scan=snapshot.scan is not None,
         overruns=snapshot.overruns,
     )

@@ -100,6 +100,10 @@ class BridgeClient:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the connection, and every call that is under way; may be called again, from any thread."""
         self._channel.close()
 
     def stop(self) -> None:

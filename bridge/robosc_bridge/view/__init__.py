@@ -2,11 +2,31 @@
 
 Sources (a bridge in this process or over gRPC, the topic `/state` of a ROS 2 node, an event log) tell what happens in
 one form; a server hands it to all pages that are open. The page itself lies in the folder `page`. aiohttp and igraph
-come with the extra `view`; they are imported only where a page is served.
+come with the extra `view`; they are imported only where a page is served. The names here are imported on use, so that
+the command line can tell of the command without loading any of it.
 """
 
-from robosc_bridge.view.face import ViewFace
-from robosc_bridge.view.settings import ViewSettings, settings_of
-from robosc_bridge.view.sources import ViewError
+import importlib
+from typing import TYPE_CHECKING, Any
 
-__all__ = ["ViewError", "ViewFace", "ViewSettings", "settings_of"]
+if TYPE_CHECKING:
+    from robosc_bridge.view.face import ViewFace
+    from robosc_bridge.view.settings import ADDRESS, ViewSettings, settings_of
+    from robosc_bridge.view.sources import ViewError
+
+_HOMES = {
+    "ADDRESS": "settings",
+    "ViewError": "sources",
+    "ViewFace": "face",
+    "ViewSettings": "settings",
+    "settings_of": "settings",
+}
+
+__all__ = ["ADDRESS", "ViewError", "ViewFace", "ViewSettings", "settings_of"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name from its module on first use."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)

@@ -47,7 +47,7 @@ REQUEST_LIMIT_S = 10.0
 SEND_LIMIT_S = 30.0
 """A page that takes no byte for so long is cut off."""
 
-PING_S = 5.0
+PING_S = 10.0
 """A page that does not answer to a ping within half of it is gone."""
 
 BATCH_S = 0.02

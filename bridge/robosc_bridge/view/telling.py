@@ -99,11 +99,11 @@ class Teller:
             happenings: What happened.
             first: Number of its first entry; None: the next one.
         """
-        if happenings.lost:
-            self._number += happenings.lost
-            self._lights.forget()
         if first is not None:
             self._number = first - 1
+        elif happenings.lost:
+            self._number += happenings.lost
+            self._lights.forget()
         return [self._entry(entry) for entry in happenings.entries]
 
     def begin(self, components: Mapping[str, Any]) -> None:

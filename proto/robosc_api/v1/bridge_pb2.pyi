@@ -72,20 +72,22 @@ class GetDefinitionRequest(_message.Message):
     def __init__(self) -> None: ...
 
 class GetDefinitionResponse(_message.Message):
-    __slots__ = ("robot", "version", "is_layer", "communications", "definition", "transitions")
+    __slots__ = ("robot", "version", "is_layer", "communications", "definition", "transitions", "supervisor")
     ROBOT_FIELD_NUMBER: _ClassVar[int]
     VERSION_FIELD_NUMBER: _ClassVar[int]
     IS_LAYER_FIELD_NUMBER: _ClassVar[int]
     COMMUNICATIONS_FIELD_NUMBER: _ClassVar[int]
     DEFINITION_FIELD_NUMBER: _ClassVar[int]
     TRANSITIONS_FIELD_NUMBER: _ClassVar[int]
+    SUPERVISOR_FIELD_NUMBER: _ClassVar[int]
     robot: str
     version: str
     is_layer: bool
     communications: _containers.RepeatedCompositeFieldContainer[Communication]
     definition: str
     transitions: _containers.RepeatedCompositeFieldContainer[EventTransition]
-    def __init__(self, robot: _Optional[str] = ..., version: _Optional[str] = ..., is_layer: _Optional[bool] = ..., communications: _Optional[_Iterable[_Union[Communication, _Mapping]]] = ..., definition: _Optional[str] = ..., transitions: _Optional[_Iterable[_Union[EventTransition, _Mapping]]] = ...) -> None: ...
+    supervisor: bytes
+    def __init__(self, robot: _Optional[str] = ..., version: _Optional[str] = ..., is_layer: _Optional[bool] = ..., communications: _Optional[_Iterable[_Union[Communication, _Mapping]]] = ..., definition: _Optional[str] = ..., transitions: _Optional[_Iterable[_Union[EventTransition, _Mapping]]] = ..., supervisor: _Optional[bytes] = ...) -> None: ...
 
 class Communication(_message.Message):
     __slots__ = ("name", "component", "kind", "identifier", "channel", "fields")
@@ -126,7 +128,7 @@ class GetStatusResponse(_message.Message):
     def __init__(self, snapshot: _Optional[_Union[Snapshot, _Mapping]] = ...) -> None: ...
 
 class Snapshot(_message.Message):
-    __slots__ = ("number", "time", "age_s", "state", "problem", "reasons", "warnings", "stops", "devices", "components", "enabled", "drive", "has_scan", "overruns")
+    __slots__ = ("number", "time", "age_s", "state", "problem", "reasons", "warnings", "stops", "devices", "components", "enabled", "drive", "has_scan", "overruns", "communications")
     NUMBER_FIELD_NUMBER: _ClassVar[int]
     TIME_FIELD_NUMBER: _ClassVar[int]
     AGE_S_FIELD_NUMBER: _ClassVar[int]
@@ -141,6 +143,7 @@ class Snapshot(_message.Message):
     DRIVE_FIELD_NUMBER: _ClassVar[int]
     HAS_SCAN_FIELD_NUMBER: _ClassVar[int]
     OVERRUNS_FIELD_NUMBER: _ClassVar[int]
+    COMMUNICATIONS_FIELD_NUMBER: _ClassVar[int]
     number: int
     time: _timestamp_pb2.Timestamp
     age_s: float
@@ -155,7 +158,16 @@ class Snapshot(_message.Message):
     drive: DriveState
     has_scan: bool
     overruns: int
-    def __init__(self, number: _Optional[int] = ..., time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., age_s: _Optional[float] = ..., state: _Optional[_Union[BridgeState, str]] = ..., problem: _Optional[str] = ..., reasons: _Optional[_Iterable[_Union[Notice, _Mapping]]] = ..., warnings: _Optional[_Iterable[_Union[Notice, _Mapping]]] = ..., stops: _Optional[_Iterable[str]] = ..., devices: _Optional[_Iterable[_Union[DeviceState, _Mapping]]] = ..., components: _Optional[_Iterable[_Union[ComponentState, _Mapping]]] = ..., enabled: _Optional[_Iterable[str]] = ..., drive: _Optional[_Union[DriveState, _Mapping]] = ..., has_scan: _Optional[bool] = ..., overruns: _Optional[int] = ...) -> None: ...
+    communications: _containers.RepeatedCompositeFieldContainer[CommunicationState]
+    def __init__(self, number: _Optional[int] = ..., time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., age_s: _Optional[float] = ..., state: _Optional[_Union[BridgeState, str]] = ..., problem: _Optional[str] = ..., reasons: _Optional[_Iterable[_Union[Notice, _Mapping]]] = ..., warnings: _Optional[_Iterable[_Union[Notice, _Mapping]]] = ..., stops: _Optional[_Iterable[str]] = ..., devices: _Optional[_Iterable[_Union[DeviceState, _Mapping]]] = ..., components: _Optional[_Iterable[_Union[ComponentState, _Mapping]]] = ..., enabled: _Optional[_Iterable[str]] = ..., drive: _Optional[_Union[DriveState, _Mapping]] = ..., has_scan: _Optional[bool] = ..., overruns: _Optional[int] = ..., communications: _Optional[_Iterable[_Union[CommunicationState, _Mapping]]] = ...) -> None: ...
+
+class CommunicationState(_message.Message):
+    __slots__ = ("name", "location")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    LOCATION_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    location: str
+    def __init__(self, name: _Optional[str] = ..., location: _Optional[str] = ...) -> None: ...
 
 class Notice(_message.Message):
     __slots__ = ("code", "text", "holds_until_reset")

@@ -63,7 +63,8 @@ def parts(**states: str) -> Any:
     return {name: {"state": state, "variables": {}} for name, state in states.items()}
 
 
-ALIGHT = "[...document.querySelectorAll('.edge-halo')].filter((halo) => halo.getAnimations().length > 0).length"
+ALIGHT = 'document.querySelectorAll(\'.edge-halo:is([data-glow="6"], [data-glow="5"], [data-glow="4"])\').length'
+OUT = "document.querySelectorAll('.edge-halo[data-glow=\"0\"]').length"
 STATE_IS = "(word) => document.querySelector('#state-word').textContent === word"
 
 
@@ -132,7 +133,7 @@ def test_the_transition_taken_last_is_lit_in_each_component(server: StandIn, see
     words = str(seen.page.locator("[data-component=Base] desc").text_content())
     assert words.startswith("2 states, 3 transitions. Active state: driving.")
     assert words.endswith("Last transition: move.request, from driving to driving.")
-    seen.wait(f"() => {ALIGHT} === 0")
+    seen.wait(f"() => {OUT} === 3")
 
 
 def test_only_the_latest_of_many_updates_counts(server: StandIn, seen: Visit) -> None:

@@ -36,5 +36,10 @@ export function value(thing) {
   return String(thing);
 }
 
+const grouped = new Intl.NumberFormat("en");
+
+/** A whole number with its thousands apart. */
+export const whole = (number) => grouped.format(number);
+
 /** "1 entry", "2 entries". */
-export const count = (number, one, many) => `${number.toLocaleString("en")} ${number === 1 ? one : many}`;
+export const count = (number, one, many) => `${whole(number)} ${number === 1 ? one : many}`;

@@ -2,11 +2,9 @@
 
 import { draw, say } from "./dom.js";
 import { head, rounded, route } from "./geometry.js";
+import { light } from "./glow.js";
 
-const FADING_MS = 1800;
 const SIGNS = { controllable: "◆ ", uncontrollable: "○ ", silent: "" };
-
-const calm = matchMedia("(prefers-reduced-motion: reduce)");
 
 export class Graph {
   /** @param {string} name Of the component. @param {object} graph Its layout. @param {string} id Prefix of ids. */
@@ -77,29 +75,19 @@ export class Graph {
   take(ids) {
     for (const id of new Set(ids)) {
       const found = this.edges.get(id);
-      if (found && !calm.matches) {
-        found.halo.getAnimations().forEach((animation) => animation.cancel());
-        found.halo.animate([{ opacity: 1 }, { opacity: 0 }], { duration: FADING_MS, easing: "ease-out" });
-      }
+      if (found) light(found.halo);
     }
     const newest = this.edges.get(ids[ids.length - 1]);
     if (!newest) return;
-    this.light(this.last, false);
-    this.light(newest, true);
-    this.last = newest;
+    this.markLast(newest);
     say(this.words, this.describe());
   }
 
-  light(found, isLast) {
-    found?.line.classList.toggle("is-last", isLast);
-    found?.label.classList.toggle("is-last", isLast);
-  }
-
-  /** Nothing is active and nothing was taken. */
-  clear() {
-    this.setActive(null);
-    this.light(this.last, false);
-    this.last = null;
+  markLast(found) {
+    if (found === this.last) return;
+    for (const part of [this.last?.line, this.last?.label]) part?.classList.remove("is-last");
+    for (const part of [found.line, found.label]) part.classList.add("is-last");
+    this.last = found;
   }
 
   describe() {

@@ -19,6 +19,8 @@ export function startMap() {
   const pointers = new Map();
   let isFollowing = true;
   let wordsMs = -Infinity;
+  // Asked of the document once a change, since each question makes it lay itself out.
+  let size = [canvas.clientWidth, canvas.clientHeight];
 
   const change = () => touch("map");
   const follow = (isOn) => {
@@ -84,17 +86,27 @@ export function startMap() {
     pointers.set(event.pointerId, now);
   });
   for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, (event) => pointers.delete(event.pointerId));
-  new ResizeObserver(change).observe(canvas);
+  new ResizeObserver(() => {
+    size = [canvas.clientWidth, canvas.clientHeight];
+    change();
+  }).observe(canvas);
 
+  let wordsTimer = null;
+  // Once a second is as quick as somebody reads; what came last is said in the end.
   const words = () => {
-    if (performance.now() - wordsMs < WORDS_EVERY_MS) {
-      setTimeout(change, WORDS_EVERY_MS);
+    const restMs = wordsMs + WORDS_EVERY_MS - performance.now();
+    if (restMs > 0) {
+      wordsTimer ??= setTimeout(sayNow, restMs);
       return;
     }
+    sayNow();
+  };
+  const sayNow = () => {
+    clearTimeout(wordsTimer);
+    wordsTimer = null;
     if (poseOf() !== null) wordsMs = performance.now();
     say(byId("map-told"), inWords());
   };
-  let said = null;
 
   return {
     build() {
@@ -114,21 +126,17 @@ export function startMap() {
     paint() {
       const pose = poseOf();
       const ratio = window.devicePixelRatio || 1;
-      const { clientWidth, clientHeight } = canvas;
-      if (canvas.width !== Math.round(clientWidth * ratio) || canvas.height !== Math.round(clientHeight * ratio)) {
-        canvas.width = Math.round(clientWidth * ratio);
-        canvas.height = Math.round(clientHeight * ratio);
+      const [width, height] = size;
+      if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+        canvas.width = Math.round(width * ratio);
+        canvas.height = Math.round(height * ratio);
       }
-      Object.assign(view, { width: clientWidth, height: clientHeight });
+      Object.assign(view, { width, height });
       if (isFollowing && pose) Object.assign(view, { x: pose[0], y: pose[1] });
       const context = canvas.getContext("2d");
       context.setTransform(ratio, 0, 0, ratio, 0, 0);
       paintMap(context, view, { scene: told.definition?.scene, path: path.points, scan: told.scan, pose });
-      const key = JSON.stringify([pose, told.scan === null]);
-      if (key !== said) {
-        said = key;
-        words();
-      }
+      words();
     },
   };
 }

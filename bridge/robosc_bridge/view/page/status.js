@@ -2,7 +2,7 @@
 
 import { announce } from "./announce.js";
 import { byId, make, mark, quoted, say } from "./dom.js";
-import { told } from "./told.js";
+import { isReplay, told } from "./told.js";
 
 const SOURCES = { bridge: "bridge", ros2: "ROS 2", log: "recorded run" };
 
@@ -22,7 +22,7 @@ let lastCauses = null;
 /** The update is new. */
 export function paintStatus() {
   const { update } = told;
-  const state = update?.state || "not known";
+  const state = update?.state || (isReplay() ? "recorded" : "not known");
   say(byId("state-word"), state);
   mark(byId("state"), "data-state", update?.state || "unknown");
   if (update === null) {
@@ -51,8 +51,8 @@ function causesOf(update) {
     causes.push({ kind: "reason", lead: "Nothing moves:", told: reason.text + until });
   }
   for (const stop of update.stops ?? []) causes.push({ kind: "stop", lead: "Nothing is requested:", told: stop });
+  if (causes.length === 0 && !isReplay()) causes.push({ kind: "fine", lead: "", told: "Nothing keeps the robot from moving." });
   for (const warning of update.warnings ?? []) causes.push({ kind: "warning", lead: "Warning:", told: warning.text ?? warning });
-  if (causes.length === 0) causes.push({ kind: "fine", lead: "", told: "Nothing keeps the robot from moving." });
   return causes;
 }
 

@@ -2,7 +2,7 @@
 
 import { byId, make, mark, quoted, say, show } from "./dom.js";
 import { Entries, groupOf } from "./entries.js";
-import { clock, count } from "./format.js";
+import { clock, count, whole } from "./format.js";
 import { touch } from "./frame.js";
 import { isReplay } from "./told.js";
 
@@ -21,7 +21,20 @@ export function startStream() {
   let selected = null;
   let shiftRows = 0;
 
-  const rowHeight = () => Number.parseFloat(getComputedStyle(box).getPropertyValue("--row")) || 24;
+  // Asked of the document only when they may have changed, since each question makes it lay itself out.
+  let rowHeight = 25;
+  let boxHeight = 0;
+  let top = 0;
+  const measure = () => {
+    rowHeight = Number.parseFloat(getComputedStyle(box).getPropertyValue("--row")) || 25;
+    boxHeight = box.clientHeight;
+    top = box.scrollTop;
+  };
+  measure();
+  const scrollTo = (wanted) => {
+    top = Math.max(Math.min(wanted, entries.shown.length * rowHeight - boxHeight), 0);
+    if (box.scrollTop !== top) box.scrollTop = top;
+  };
 
   const change = () => touch("stream");
   const added = (cut) => {
@@ -70,16 +83,17 @@ export function startStream() {
     const { shown } = entries;
     if (shown.length === 0) return;
     const at = selected === null ? -1 : indexOf(shown, selected);
-    const next = Math.min(Math.max(at < 0 ? (step > 0 ? 0 : shown.length - 1) : at + step, 0), shown.length - 1);
+    // From nothing, or from what a filter hides, one begins at what is in view.
+    const from = at >= 0 ? at + step : Number.isFinite(step) ? Math.floor(top / rowHeight) : step;
+    const next = Math.min(Math.max(from, 0), shown.length - 1);
     select(shown[next]);
-    const height = rowHeight();
-    if (next * height < box.scrollTop) box.scrollTop = next * height;
-    else if ((next + 1) * height > box.scrollTop + box.clientHeight) box.scrollTop = (next + 1) * height - box.clientHeight;
+    if (next * rowHeight < top) scrollTo(next * rowHeight);
+    else if ((next + 1) * rowHeight > top + boxHeight) scrollTo((next + 1) * rowHeight - boxHeight);
     isFollowing = next === shown.length - 1;
   };
 
   box.addEventListener("keydown", (event) => {
-    const page = Math.max(Math.floor(box.clientHeight / rowHeight()) - 1, 1);
+    const page = Math.max(Math.floor(boxHeight / rowHeight) - 1, 1);
     const steps = { ArrowDown: 1, ArrowUp: -1, PageDown: page, PageUp: -page, Home: -Infinity, End: Infinity };
     if (!(event.key in steps) || event.ctrlKey || event.altKey || event.metaKey) return;
     event.preventDefault();
@@ -87,10 +101,14 @@ export function startStream() {
   });
 
   box.addEventListener("scroll", () => {
-    isFollowing = box.scrollTop + box.clientHeight >= spacer.offsetHeight - rowHeight();
+    top = box.scrollTop;
+    isFollowing = top + boxHeight >= Number.parseFloat(spacer.style.height) - rowHeight;
     change();
   }, { passive: true });
-  new ResizeObserver(change).observe(box);
+  new ResizeObserver(() => {
+    measure();
+    change();
+  }).observe(box);
 
   byId("stream-filter").addEventListener("input", (event) => {
     entries.filter.text = event.target.value.trim().toLowerCase();
@@ -114,15 +132,24 @@ export function startStream() {
   });
   byId("stream-save").addEventListener("click", () => save(entries.all));
 
+  // Where a recorded run is turned back, what comes again takes the place of what was there; where it is turned on, the
+  // stream begins anew with what the server tells of the time before.
+  const jumpTo = (first) => {
+    if (first.number <= entries.highest) entries.takeBack((entry) => entry.number >= first.number);
+    const before = first.number - 1 - Math.max(entries.highest, 0);
+    if (before <= 0) return;
+    entries.clear();
+    entries.add([{ kind: "lost", time_s: first.time_s, text: `The replay jumped here: ${count(first.number - 1, "entry", "entries")} before it` }]);
+  };
+
   const paintRows = () => {
     const { shown } = entries;
-    const height = rowHeight();
-    spacer.style.height = `${shown.length * height}px`;
-    if (isFollowing && !entries.isPaused) box.scrollTop = shown.length * height;
-    else if (shiftRows > 0) box.scrollTop -= shiftRows * height;
+    spacer.style.height = `${shown.length * rowHeight}px`;
+    if (isFollowing && !entries.isPaused) scrollTo(Infinity);
+    else if (shiftRows > 0) scrollTo(top - shiftRows * rowHeight);
     shiftRows = 0;
-    const first = Math.max(Math.floor(box.scrollTop / height) - OVERSCAN, 0);
-    const last = Math.min(Math.ceil((box.scrollTop + box.clientHeight) / height) + OVERSCAN, shown.length);
+    const first = Math.max(Math.floor(top / rowHeight) - OVERSCAN, 0);
+    const last = Math.min(Math.ceil((top + boxHeight) / rowHeight) + OVERSCAN, shown.length);
     const wanted = new Set();
     for (let i = first; i < last; i += 1) wanted.add(shown[i].serial);
     for (const [serial, row] of rows) {
@@ -137,7 +164,7 @@ export function startStream() {
         rows.set(entry.serial, row);
         spacer.append(row);
       }
-      row.style.top = `${i * height}px`;
+      row.style.top = `${i * rowHeight}px`;
       mark(row, "aria-posinset", i + 1);
       mark(row, "aria-setsize", shown.length);
       mark(row, "aria-selected", entry === selected);
@@ -149,10 +176,10 @@ export function startStream() {
   const paintWords = () => {
     const { all, shown, isPaused, waiting, lost, released } = entries;
     const isNarrowed = shown.length !== all.length && !isPaused;
-    say(byId("stream-count"), isNarrowed ? `${count(shown.length, "entry", "entries")} of ${all.length.toLocaleString("en")}` : count(shown.length, "entry", "entries"));
+    say(byId("stream-count"), isNarrowed ? `${count(shown.length, "entry", "entries")} of ${whole(all.length)}` : count(shown.length, "entry", "entries"));
     const pause = byId("stream-pause");
     mark(pause, "aria-pressed", isPaused);
-    say(pause, isPaused ? `Go on (${waiting.toLocaleString("en")} new)` : "Pause");
+    say(pause, isPaused ? `Go on (${whole(waiting)} new)` : "Pause");
     show(byId("stream-latest"), !isFollowing && !isPaused);
     const missing = [
       lost > 0 ? `${count(lost, "entry was", "entries were")} lost on the way: they came too quickly.` : "",
@@ -165,10 +192,7 @@ export function startStream() {
   return {
     /** Entries of a batch; before them `lost` are missing. */
     add(batch, lost) {
-      if (isReplay() && batch.length > 0 && batch[0].number <= entries.highest) {
-        // The recorded run was turned back: what comes again takes the place of what was there.
-        entries.takeBack((entry) => entry.number >= batch[0].number);
-      }
+      if (isReplay() && batch.length > 0) jumpTo(batch[0]);
       if (lost > 0) added(entries.addLost(lost, batch[0]?.time_s ?? Date.now() / 1000));
       for (const entry of batch) addKind(groupOf(entry));
       added(entries.add(batch));

@@ -1,0 +1,270 @@
+"""`robosc view`: the live view of a bridge, of a ROS 2 node, or of an event log."""
+
+import argparse
+import os
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from robosc.cli.arguments import add_engine_options, read_bundle
+from robosc.cli.output import CommandError, ExitCode, UsageError
+from robosc.model.structure import Deployment
+
+if TYPE_CHECKING:
+    from robosc.supervisor import Supervisor
+    from robosc_bridge.view.definition import Robot
+    from robosc_bridge.view.settings import ViewSettings
+    from robosc_bridge.view.sources import Source
+
+_ADDRESS = "127.0.0.1:8066"
+
+_DESCRIPTION = """\
+Serve a web page that shows a robot under its supervisor: the automata with the states that they are in, variables,
+services and actions, which requests are enabled and why the others are not, and every event. The address to open is
+printed, with a token that lets its page command the robot; stopping it needs none.
+"""
+
+_EPILOG = """\
+exit status:
+  0  ended by Ctrl-C or a signal
+  1  there is no supervisor of the model
+  2  wrong use; a file that cannot be read; an address that cannot be served
+"""
+
+
+def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "view",
+        help="show a robot in a web page, live or from its event log",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    source = parser.add_argument_group("what is shown").add_mutually_exclusive_group(required=True)
+    source.add_argument("--bridge", type=_address, metavar="HOST:PORT", help="a bridge, by its gRPC service")
+    source.add_argument("--ros2", action="store_true", help="a generated ROS 2 node, by its topic /state")
+    source.add_argument("--log", type=Path, metavar="FILE", help="an event log, which is replayed; needs --model")
+    parser.add_argument("--namespace", default="", metavar="NAME", help="with --ros2: what stands before /state")
+    parser.add_argument(
+        "--model",
+        type=Path,
+        metavar="FILE",
+        help="with --log or --ros2: the model (.rscd), which is synthesized, or its supervisor (.rsup); without it the "
+        "page of a node cannot tell which requests are enabled",
+    )
+    parser.add_argument(
+        "--deployment",
+        choices=[str(deployment) for deployment in Deployment],
+        help="where the supervisor stands (default: as a .rsup file says; for a model: controller)",
+    )
+    for short, name, what in (("-L", "library", "libraries"), ("-I", "interface", "ROS packages")):
+        parser.add_argument(
+            short,
+            f"--{name}-path",
+            action="append",
+            default=[],
+            type=Path,
+            metavar="DIR",
+            help=f"another folder with {what} of the model, as for 'robosc synth' (may be repeated)",
+        )
+    add_engine_options(parser)
+    _add_serving(parser)
+    _add_client(parser)
+    parser.set_defaults(run=run)
+
+
+def _add_serving(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("the page")
+    group.add_argument(
+        "--address",
+        type=_address,
+        default=_ADDRESS,
+        metavar="HOST:PORT",
+        help="where it is served (default: %(default)s)",
+    )
+    group.add_argument(
+        "--name",
+        action="append",
+        default=[],
+        metavar="HOST",
+        help="a further name by which browsers reach it (may be repeated)",
+    )
+    group.add_argument("--open", action="store_true", help="open it in a browser")
+    group.add_argument("--tls-certificate", type=Path, metavar="FILE", help="certificate chain (PEM): serve with TLS")
+    group.add_argument("--tls-key", type=Path, metavar="FILE", help="its private key (PEM)")
+    group.add_argument(
+        "--insecure-beyond-loopback",
+        action="store_true",
+        help="serve without TLS where other machines reach it, on a network that you trust",
+    )
+
+
+def _add_client(parser: argparse.ArgumentParser) -> None:
+    """How the bridge is reached: what `robosc_api.security.add_client_arguments` adds.
+
+    Written again, since that would load gRPC for the help of every command.
+    """
+    group = parser.add_argument_group("security")
+    group.add_argument("--tls", action="store_true", help="with TLS, believing the usual certificate authorities")
+    group.add_argument(
+        "--ca",
+        type=Path,
+        metavar="FILE",
+        default=_from_environment("ROBOSC_CA"),
+        help="with TLS, believing these certificates alone (PEM; default: $ROBOSC_CA)",
+    )
+    group.add_argument("--certificate", type=Path, metavar="FILE", help="own certificate chain (PEM)")
+    group.add_argument("--key", type=Path, metavar="FILE", help="its private key (PEM)")
+    group.add_argument(
+        "--token-file",
+        type=Path,
+        metavar="FILE",
+        default=_from_environment("ROBOSC_TOKEN_FILE"),
+        help="file with the own token (default: $ROBOSC_TOKEN_FILE)",
+    )
+
+
+def _from_environment(name: str) -> Path | None:
+    value = os.environ.get(name)
+    return Path(value) if value else None
+
+
+_ADDRESS_PATTERN = re.compile(r"(\[[0-9A-Fa-f:.%]+\]|[A-Za-z0-9._-]+):([0-9]{1,5})\Z")
+
+
+def _address(text: str) -> str:
+    match = _ADDRESS_PATTERN.match(text)
+    if not match or int(match[2]) > 65535:
+        raise argparse.ArgumentTypeError(f"not HOST:PORT: '{text}'")
+    return text
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Serve the page until a signal comes.
+
+    Raises:
+        CommandError: It cannot be served, or there is nothing to show.
+    """
+    from robosc_bridge.view.extra import require_view
+    from robosc_bridge.view.sources import ViewError
+
+    if arguments.log is not None and arguments.model is None:
+        raise UsageError("--log needs --model: the model that the log is of")
+    if arguments.model is not None and arguments.bridge is not None:
+        raise UsageError("--model goes with --log or --ros2: a bridge tells its model itself")
+    if arguments.namespace and not arguments.ros2:
+        raise UsageError("--namespace goes with --ros2")
+    try:
+        require_view()
+        make, is_shared, robot = _source(arguments)
+        return _serve(arguments, make, robot, is_shared=is_shared)
+    except ViewError as error:
+        raise CommandError(str(error), ExitCode.USAGE) from error
+
+
+def _source(arguments: argparse.Namespace) -> "tuple[Callable[[], Source], bool, Robot | None]":
+    """What makes the source, whether all pages share one, and the robot where it is known."""
+    if arguments.bridge is not None:
+        from robosc_api.security import SecurityError, check_credentials, credentials_of
+        from robosc_bridge.view.remote_bridge import RemoteBridge
+
+        credentials = credentials_of(arguments)
+        try:
+            check_credentials(credentials)
+        except SecurityError as error:
+            raise UsageError(str(error)) from error
+        return lambda: RemoteBridge(arguments.bridge, credentials), True, None
+    supervisor = None if arguments.model is None else _supervisor(arguments)
+    if arguments.ros2:
+        from robosc_bridge.view.ros2_topic import StateTopic
+
+        _require_ros2()
+        return lambda: StateTopic(arguments.namespace, supervisor), True, None
+    from robosc_bridge.view.replay import Recording, Replay
+
+    assert supervisor is not None  # noqa: S101  # `run` has seen to that.
+    recording = Recording(_log(arguments.log), supervisor)
+    return lambda: Replay(recording), False, recording.robot
+
+
+def _require_ros2() -> None:
+    try:
+        import rclpy  # noqa: F401
+    except ImportError as error:
+        raise UsageError("there is no ROS 2 here: install one and source it, or install robosc[ros2]") from error
+
+
+def _log(path: Path) -> Any:
+    from robosc.event_logs import LogError, read_log
+
+    try:
+        found = read_log(path)
+    except OSError as error:
+        raise UsageError(f"cannot read {path}: {error.strerror or error}") from error
+    except LogError as error:
+        raise UsageError(str(error)) from error
+    for note in found.notes():
+        sys.stderr.write(f"robosc: {note}\n")
+    return found
+
+
+def _supervisor(arguments: argparse.Namespace) -> "Supervisor":
+    from robosc.cli import synth
+    from robosc.cli.sign import read_supervisor
+    from robosc.supervisor import decode
+
+    if arguments.model.suffix == ".rsup":
+        return decode(read_supervisor(arguments.model))
+    arguments.deployment = arguments.deployment or str(Deployment.CONTROLLER)
+    bundle = read_bundle(arguments)
+    # It is looked at, not executed.
+    made = synth.make(arguments, bundle, allow_livelock=True)
+    if made.supervisor is None:
+        synth.report_problems(made, bundle)
+        raise CommandError(f"there is no supervisor of {arguments.model}", ExitCode.FAILED)
+    return made.supervisor
+
+
+def _settings(arguments: argparse.Namespace) -> "ViewSettings":
+    from robosc_api.security import ServerSecurity
+    from robosc_bridge.view.settings import ViewSettings
+
+    security = ServerSecurity(
+        certificate=arguments.tls_certificate,
+        key=arguments.tls_key,
+        insecure_beyond_loopback=arguments.insecure_beyond_loopback,
+    )
+    return ViewSettings(arguments.address, security, tuple(arguments.name))
+
+
+def _serve(
+    arguments: argparse.Namespace, make: "Callable[[], Source]", robot: "Robot | None", *, is_shared: bool
+) -> int:
+    import asyncio
+    import signal
+
+    from robosc_bridge.view.server import ViewServer
+
+    async def serve() -> None:
+        end = asyncio.Event()
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            loop.add_signal_handler(number, end.set)
+        server = ViewServer(_settings(arguments), make, is_shared=is_shared, robot=robot)
+        await server.start()
+        try:
+            sys.stdout.write(f"{server.url}\n")
+            sys.stdout.flush()
+            if arguments.open:
+                import webbrowser
+
+                await asyncio.to_thread(webbrowser.open, server.url)
+            await end.wait()
+        finally:
+            await server.stop()
+
+    asyncio.run(serve())
+    return ExitCode.OK

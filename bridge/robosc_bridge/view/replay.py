@@ -1,0 +1,266 @@
+"""The source for an event log: any of its moments, and all of it again as it happened, at any speed.
+
+The log tells the state of the components after each event. Where services and actions are follows from the events:
+each leads to one location of its protocol, wherever it comes from.
+"""
+
+import asyncio
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import Any
+
+from robosc.automata.plants import communication_plant
+from robosc.event_logs import LoggedRun
+from robosc.model.structure import CommunicationKind, Model
+from robosc.supervisor import Supervisor
+from robosc_bridge.daemon.states import Command
+from robosc_bridge.view.definition import robot_of
+from robosc_bridge.view.facts import Happenings, LogSpan, SourceKind, Status
+from robosc_bridge.view.sources import Pause, Play, RefusedError, Seek, Sink, ViewError, Wish
+
+HISTORY = 200
+"""Entries before the place that is gone to which are told again."""
+
+MOST_AT_ONCE = 2000
+"""Entries that are told in one step of a replay; those before them count as lost."""
+
+STEP_S = 0.04
+"""Between two steps of a replay."""
+
+_CALLED = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """The state after some entries.
+
+    Attributes:
+        components: State and variables of each component.
+        communications: Location of each service and action.
+        problem: The fault that was told last, until a restart.
+        stops: Why nothing was requested, until that ended.
+    """
+
+    components: Mapping[str, Any]
+    communications: Mapping[str, str]
+    problem: str = ""
+    stops: tuple[str, ...] = ()
+
+
+class Recording:
+    """A log with the state at each of its moments; many may replay it at once.
+
+    Args:
+        run: The log.
+        supervisor: It was written under, with its model.
+        scene: For the map.
+
+    Raises:
+        ViewError: The log is empty, or one of another model.
+    """
+
+    def __init__(self, run: LoggedRun, supervisor: Supervisor, scene: Any = None) -> None:
+        if not run.entries:
+            raise ViewError("the log has no entries")
+        self.documents = [entry.document for entry in run.entries]
+        # A clock that was set back would hide what came after it.
+        self.times_s = list(accumulate((entry.time_s for entry in run.entries), max))
+        self._frames = _frames(run, supervisor.model)
+        span = LogSpan(self.begin_s, self.end_s, len(self.documents))
+        self.robot = robot_of(supervisor, SourceKind.LOG, version="", can_command=False, log=span, scene=scene)
+
+    @property
+    def begin_s(self) -> float:
+        """Time of the first entry."""
+        return self.times_s[0]
+
+    @property
+    def end_s(self) -> float:
+        """Time of the last entry."""
+        return self.times_s[-1]
+
+    def count(self, time_s: float) -> int:
+        """How many entries have happened by a time."""
+        return bisect_right(self.times_s, time_s)
+
+    def frame(self, number: int) -> Frame:
+        """The state after so many entries."""
+        return self._frames[number]
+
+
+def _frames(run: LoggedRun, model: Model) -> list[Frame]:
+    known = {event for item in model.communications for event in item.events} | set(model.taus)
+    leads_to = {
+        edge.event: (item.name, edge.target)
+        for item in model.communications
+        if item.kind in _CALLED
+        for edge in communication_plant(item).edges
+    }
+    names = {component.name for component in model.components if component.behaviour}
+    first = Frame(_initial(model), {item.name: "idle" for item in model.communications if item.kind in _CALLED})
+    frames, frame = [first], first
+    for entry in run.entries:
+        match entry.kind:
+            case "event":
+                if entry.event not in known or entry.state.keys() != names:
+                    raise ViewError(
+                        f"line {entry.line}: the model has no such event or state: give the log's own model"
+                    )
+                places = frame.communications
+                if entry.event in leads_to:
+                    name, location = leads_to[entry.event]
+                    places = places if places[name] == location else {**places, name: location}
+                frame = Frame(entry.state, places, frame.problem, frame.stops)
+            case "restart":
+                frame = first
+            case "fault":
+                frame = Frame(frame.components, frame.communications, entry.text("what"), frame.stops)
+            case "stop":
+                frame = Frame(frame.components, frame.communications, frame.problem, (entry.text("what"),))
+            case "resume":
+                frame = Frame(frame.components, frame.communications, frame.problem)
+        frames.append(frame)
+    return frames
+
+
+def _initial(model: Model) -> Mapping[str, Any]:
+    return {
+        component.name: {
+            "state": component.behaviour.initial,
+            "variables": {variable.name: variable.initial for variable in component.behaviour.variables},
+        }
+        for component in model.components
+        if component.behaviour
+    }
+
+
+class Player:
+    """Where a replay is; knows no clock.
+
+    Args:
+        recording: What is replayed.
+
+    Attributes:
+        time_s: Where it is, in the log's time.
+        speed: Seconds of the log in a second.
+        is_playing: Whether it goes on by itself.
+    """
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+        self.time_s = recording.begin_s
+        self.speed = 1.0
+        self.is_playing = False
+
+    def steer(self, wish: Wish) -> None:
+        """Move, go on or stand still."""
+        recording = self._recording
+        match wish:
+            case Seek(time_s=time_s):
+                self.time_s = min(max(time_s, recording.begin_s), recording.end_s)
+            case Play(speed=speed):
+                self.speed, self.is_playing = speed, True
+                if self.time_s >= recording.end_s:
+                    self.time_s = recording.begin_s
+            case Pause():
+                self.is_playing = False
+
+    def advance(self, passed_s: float) -> None:
+        """Some time has passed."""
+        if self.is_playing:
+            self.time_s = min(self.time_s + passed_s * self.speed, self._recording.end_s)
+            self.is_playing = self.time_s < self._recording.end_s
+
+
+class Replay:
+    """A replay for one page.
+
+    Args:
+        recording: What is replayed.
+    """
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+        self._player = Player(recording)
+        self._is_steered = asyncio.Event()
+        self._wishes: list[Wish] = []
+
+    async def run(self, sink: Sink) -> None:
+        """Tell where the log is, until cancelled."""
+        loop = asyncio.get_running_loop()
+        player = self._player
+        await sink.define(self._recording.robot)
+        told = self._go_to(sink)
+        last_s = loop.time()
+        while True:
+            if player.is_playing:
+                await asyncio.sleep(STEP_S)
+            else:
+                await self._is_steered.wait()
+                last_s = loop.time()
+            now_s = loop.time()
+            player.advance(now_s - last_s)
+            last_s = now_s
+            wishes, self._wishes = self._wishes, []
+            self._is_steered.clear()
+            before_s = player.time_s
+            for wish in wishes:
+                player.steer(wish)
+            if player.time_s != before_s or any(isinstance(wish, Seek) for wish in wishes):
+                told = self._go_to(sink)
+            else:
+                told = self._go_on(sink, told)
+
+    async def order(self, command: Command, by: str) -> None:
+        """Not here: it is over.
+
+        Raises:
+            RefusedError: Always.
+        """
+        raise RefusedError("what is replayed cannot be commanded")
+
+    def steer(self, wish: Wish) -> None:
+        """Move in the log; done with the next step."""
+        if len(self._wishes) >= MOST_AT_ONCE:
+            del self._wishes[0]
+        self._wishes.append(wish)
+        self._is_steered.set()
+
+    def _go_to(self, sink: Sink) -> int:
+        """Tell a place anew, with what came before it; returns how many entries were told."""
+        count = self._recording.count(self._player.time_s)
+        first = max(count - HISTORY, 0)
+        self._tell_position(sink)
+        sink.begin(self._recording.frame(first).components)
+        entries: Sequence[Any] = self._recording.documents[first:count]
+        if entries:
+            sink.happened(Happenings(entries), first + 1)
+        sink.show(self._status(count))
+        return count
+
+    def _go_on(self, sink: Sink, told: int) -> int:
+        """Tell what happened since the last step."""
+        count = self._recording.count(self._player.time_s)
+        if count > told:
+            first = max(told, count - MOST_AT_ONCE)
+            sink.begin(self._recording.frame(first).components)
+            entries: Sequence[Any] = self._recording.documents[first:count]
+            sink.happened(Happenings(entries, first - told), first + 1)
+        self._tell_position(sink)
+        sink.show(self._status(count))
+        return max(count, told)
+
+    def _tell_position(self, sink: Sink) -> None:
+        sink.moved(self._player.time_s, self._player.speed, is_playing=self._player.is_playing)
+
+    def _status(self, count: int) -> Status:
+        frame = self._recording.frame(count)
+        return Status(
+            time_s=self._player.time_s,
+            problem=frame.problem,
+            stops=frame.stops,
+            components=frame.components,
+            communications=frame.communications,
+        )

@@ -1,0 +1,178 @@
+"""The page before the real server: what it shows equals the state of the robot, or of its log at any of its moments."""
+
+import asyncio
+import json
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser
+
+from robosc.event_logs import read_log
+from robosc.execution.event_log import json_line, plain
+from robosc_bridge.daemon.states import Command
+from robosc_bridge.view.replay import Recording, Replay
+from support.browser import Visit, visit
+from support.generated import example_supervisor
+from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed
+from support.view_servers import served
+
+# In the browser: state and variables of each component, places of services and actions, and the enabled requests.
+SHOWN = """() => {
+  const text = (element) => element.textContent.trim();
+  const pair = (line) => [text(line.querySelector("dt")), text(line.querySelector("dd"))];
+  const components = {};
+  const places = {};
+  for (const card of document.querySelectorAll(".card")) {
+    const lines = [...card.querySelectorAll(".variables > div")];
+    const active = [...card.querySelectorAll(".state.is-active")].map((state) => state.dataset.state);
+    if (active.length > 0) {
+      components[card.dataset.component] = {
+        state: active.join(),
+        variables: Object.fromEntries(lines.map(pair)),
+      };
+    }
+    for (const place of card.querySelectorAll(".place")) {
+      places[text(place.parentElement.querySelector("bdi"))] = text(place);
+    }
+  }
+  const enabled = [...document.querySelectorAll('.request[data-enabled="true"]')].map((item) => item.dataset.request);
+  return { components, places, enabled };
+}"""
+EQUALS = f"(wanted) => JSON.stringify(({SHOWN})()) === wanted"
+
+
+NEWEST = """(number) => {
+  const numbers = [...document.querySelectorAll(".row")].map((row) => Number(row.dataset.number));
+  return Math.max(...numbers) === number;
+}"""
+
+
+def _in_words(value: Any) -> str:
+    if isinstance(value, float):
+        # To a browser 0.0 and 0 are one number.
+        return f"{value:g}"
+    return value if isinstance(value, str) else json.dumps(value)
+
+
+def wanted(components: Any, places: Any, enabled: list[str]) -> str:
+    """What `SHOWN` is to be, as the browser writes it."""
+    told = {
+        name: {
+            "state": part["state"],
+            "variables": {variable: _in_words(value) for variable, value in part["variables"].items()},
+        }
+        for name, part in components.items()
+    }
+    return json.dumps({"components": told, "places": places, "enabled": enabled}, separators=(",", ":"))
+
+
+def state_of(robot: LiveRobot) -> str:
+    requests = [f"{name}.request" for name in robot.snapshot().enabled]
+    return wanted(plain(robot.system.state()), dict(robot.locations()), requests)
+
+
+def shows(seen: Visit, state: str) -> None:
+    seen.wait("(count) => document.querySelectorAll('.card').length >= count", 1)
+    try:
+        seen.wait(EQUALS, state)
+    except Exception:
+        assert json.dumps(seen.page.evaluate(SHOWN), separators=(",", ":")) == state
+        raise
+
+
+def entries_shown(seen: Visit) -> list[Any]:
+    with seen.page.expect_download() as download:
+        seen.page.get_by_role("button", name="Save").click()
+    return [json.loads(line) for line in download.value.path().read_text(encoding="utf-8").splitlines()]
+
+
+@pytest.mark.parametrize("name", ["maze_solver/maze_solver", "navigation/navigation", "sixty components"])
+def test_the_page_equals_a_robot_that_lives(browser: Browser, name: str) -> None:
+    is_large = name == "sixty components"
+    robot = LiveRobot(supervisor_without_synthesis(large_model(60)) if is_large else example_supervisor(name))
+    with viewed(robot) as face, visit(browser, face.url) as seen:
+        shows(seen, state_of(robot))
+        taken: list[str] = []
+        for _ in range(5):
+            taken += [robot.step() for _ in range(40)]
+            shows(seen, state_of(robot))
+        seen.wait("(count) => document.querySelector('#stream-count').textContent.startsWith(`${count} `)", len(taken))
+        assert [item["event"] for item in entries_shown(seen)] == taken
+        seen.picture(f"real-{name.partition('/')[0].replace(' ', '-')}")
+        assert seen.errors == []
+
+
+def test_a_stop_reaches_the_robot_and_commands_follow(browser: Browser) -> None:
+    robot = LiveRobot(example_supervisor("maze_solver/maze_solver"))
+    answer = "(words) => document.querySelector('#stop-answer').textContent.startsWith(words)"
+    with viewed(robot) as face, visit(browser, f"http://{face.address}/") as seen:
+        seen.wait("() => !document.querySelector('#stop').hidden")
+        seen.page.keyboard.press("Escape")
+        seen.wait(answer, "STOP was heard")
+        assert [order.command for order in robot.orders] == [Command.STOP]
+        seen.wait("() => document.querySelector('#causes').textContent.includes('An operator has stopped the robot.')")
+        seen.page.goto(face.url)
+        for command in (Command.RESUME, Command.STANDBY, Command.START, Command.RESET):
+            seen.page.get_by_role("button", name=command.capitalize(), exact=True).click()
+            seen.wait(answer, f"{command}: done.")
+        assert [order.command for order in robot.orders[1:]] == ["resume", "standby", "start", "reset"]
+        robot.refusal = "the scanner is not there"
+        seen.page.get_by_role("button", name="Start", exact=True).click()
+        seen.wait(answer, "start: refused. the scanner is not there")
+        assert seen.errors == []
+
+
+@contextmanager
+def replayed(recording: Recording) -> Iterator[str]:
+    """The address of a log's live view; its server runs in a thread of its own."""
+    loop = asyncio.new_event_loop()
+    thread = threading.Thread(target=loop.run_forever)
+    thread.start()
+
+    def do(work: Any) -> Any:
+        return asyncio.run_coroutine_threadsafe(work, loop).result(20.0)
+
+    context = served(lambda: Replay(recording), is_shared=False, robot=recording.robot)
+    try:
+        yield do(context.__aenter__()).url
+        do(context.__aexit__(None, None, None))
+    finally:
+        loop.call_soon_threadsafe(loop.stop)
+        thread.join()
+        loop.close()
+
+
+def test_the_page_equals_a_log_at_any_moment(browser: Browser, tmp_path: Path) -> None:
+    supervisor = example_supervisor("navigation/navigation")
+    robot = LiveRobot(supervisor)
+    subscription = robot.feed.subscribe(lambda: None)
+    states = [state_of(robot)]
+    for _ in range(300):
+        robot.step()
+        states.append(state_of(robot))
+    log = tmp_path / "log.jsonl"
+    # An event each second, so that each has a place of its own on the slider.
+    entries = [{**entry, "time": 1_750_000_000.0 + i} for i, entry in enumerate(subscription.take().entries, start=1)]
+    log.write_text("".join(map(json_line, entries)), encoding="utf-8")
+    with replayed(Recording(read_log(log), supervisor)) as address, visit(browser, address) as seen:
+        seen.wait("() => !document.querySelector('#replay').hidden")
+        slider = seen.page.get_by_role("slider", name="Time in the log")
+        for number in (1, 40, 7, 299, 150, 151, 300):
+            slider.fill(str(number - 1))
+            shows(seen, states[number])
+            seen.wait(NEWEST, number)
+            numbers = [item["number"] for item in entries_shown(seen) if "number" in item]
+            assert numbers == list(range(numbers[0], number + 1))
+        slider.fill("290")
+        shows(seen, states[291])
+        seen.page.get_by_label("Speed").select_option("20")
+        seen.page.get_by_role("button", name="Play").click()
+        shows(seen, states[300])
+        seen.wait("() => document.querySelector('#replay-play').textContent === 'Play'")
+        assert not seen.page.get_by_role("button", name="STOP").is_visible()
+        seen.picture("real-replay")
+        assert seen.errors == []

@@ -1,0 +1,201 @@
+"""Fifty events a second on a robot of sixty components, through a real server: none is missed, and none twice."""
+
+import asyncio
+import json
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from robosc.execution.event_log import plain
+from robosc_bridge.remote import RemoteSettings, serve
+from robosc_bridge.view.hub import MAXIMUM_EVENTS
+from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed
+from support.pages_open import LIMIT_S, OpenPage, opened
+from support.view_servers import remotely_viewed
+
+RATE_HZ, EVENTS = 50.0, 150
+
+
+def large_robot() -> LiveRobot:
+    return LiveRobot(supervisor_without_synthesis(large_model(60)))
+
+
+@contextmanager
+def happening(robot: LiveRobot, count: int, rate_hz: float) -> Iterator[list[str]]:
+    """So many events, at a rate, in a thread like that of the control loop."""
+    taken: list[str] = []
+    end = threading.Event()
+
+    def live() -> None:
+        for number in range(count):
+            if end.wait(1.0 / rate_hz if rate_hz else 0.0):
+                return
+            taken.append(robot.step())
+            assert number < count
+
+    thread = threading.Thread(target=live)
+    thread.start()
+    try:
+        yield taken
+    finally:
+        end.set()
+        thread.join()
+
+
+async def seen(page: OpenPage, count: int) -> None:
+    """All entries, and an update after them."""
+    while len(page.entries()) + page.lost() < count:
+        await page.next()
+
+
+def is_final(robot: LiveRobot) -> Callable[[dict[str, Any]], bool]:
+    def fits(message: dict[str, Any]) -> bool:
+        if message["type"] != "update":
+            return False
+        state = message["components"], message["communications"]
+        return bool(
+            json.loads(json.dumps(state)) == json.loads(json.dumps([plain(robot.system.state()), robot.locations()]))
+        )
+
+    return fits
+
+
+def check_whole(page: OpenPage, robot: LiveRobot, taken: list[str]) -> None:
+    entries = page.entries()
+    assert [entry["event"] for entry in entries] == taken
+    assert [entry["number"] for entry in entries] == list(range(1, len(taken) + 1))
+    assert page.lost() == 0
+    shown = page.messages[-1]
+    names = [
+        item.name for item in robot.supervisor.model.communications if f"{item.name}.request" in shown_requests(page)
+    ]
+    enabled = [f"{names[number]}.request" for number in robot.system.enabled_requests()]
+    assert shown["enabled"] == enabled
+    assert {item["event"] for item in shown["disabled"]} == set(shown_requests(page)) - set(enabled)
+    assert all(item["why"] for item in shown["disabled"])
+
+
+def shown_requests(page: OpenPage) -> list[str]:
+    requests: list[str] = page.messages[0]["requests"]
+    return requests
+
+
+def test_every_event_comes_once_and_in_its_order() -> None:
+    robot = large_robot()
+
+    async def look(url: str) -> None:
+        async with opened(url) as page:
+            assert (await page.next())["type"] == "definition"
+            await page.told("update")
+            with happening(robot, EVENTS, RATE_HZ) as taken:
+                await seen(page, EVENTS)
+            await page.until(is_final(robot))
+            check_whole(page, robot, taken)
+
+    with viewed(robot) as face:
+        asyncio.run(look(face.url))
+
+
+def test_the_same_over_grpc() -> None:
+    robot = large_robot()
+    face = serve(robot.operations, RemoteSettings("127.0.0.1:0"))
+
+    async def look() -> None:
+        async with remotely_viewed(face.address) as server, opened(server.url) as page:
+            assert (await page.next())["type"] == "definition"
+            await page.told("update")
+            with happening(robot, EVENTS, RATE_HZ) as taken:
+                await seen(page, EVENTS)
+            await page.until(is_final(robot))
+            check_whole(page, robot, taken)
+
+    try:
+        asyncio.run(look())
+    finally:
+        face.stop()
+
+
+def test_the_lit_transitions_lead_from_state_to_state() -> None:
+    robot = large_robot()
+
+    async def look(url: str) -> None:
+        async with opened(url) as page:
+            definition = await page.next()
+            await page.told("update")
+            edges = {
+                (component["name"], edge["id"]): edge
+                for component in definition["components"]
+                for edge in component["graph"]["edges"]
+            }
+            states = {name: part["state"] for name, part in robot.system.state().items()}
+            with happening(robot, 60, 500.0):
+                await seen(page, 60)
+            lit = 0
+            for entry in page.entries():
+                for transition in entry["transitions"]:
+                    edge = edges[transition["component"], transition["id"]]
+                    # What happens before the first one of a component cannot be told.
+                    assert edge["from"] == states[transition["component"]]
+                    states[transition["component"]] = edge["to"]
+                    lit += 1
+            assert lit >= 40
+            assert states == {name: part["state"] for name, part in robot.system.state().items()}
+
+    with viewed(robot) as face:
+        asyncio.run(look(face.url))
+
+
+def test_who_does_not_read_loses_entries_is_told_how_many_and_is_heard_all_the_same() -> None:
+    robot = LiveRobot(supervisor_without_synthesis(large_model(3)))
+    # So large that the buffers on the way hold few of them.
+    note = {"time": time.time(), "kind": "device", "what": "x" * 250}
+    count = 12 * MAXIMUM_EVENTS
+
+    async def look(url: str) -> None:
+        async with opened(url) as page:
+            await page.told("update")
+            # No byte is taken off the connection from now on.
+            connection = page.socket._response.connection
+            assert connection is not None and connection.transport is not None
+            connection.transport.pause_reading()
+            for number in range(count):
+                robot.feed.tell(note)
+                if number % 200 == 0:
+                    await asyncio.sleep(0.001)
+            await page.send(type="stop")
+            begin_s = time.monotonic()
+            while not robot.orders:
+                assert time.monotonic() - begin_s < LIMIT_S
+                await asyncio.sleep(0.001)
+            connection.transport.resume_reading()
+            await seen(page, count)
+            numbers = [entry["number"] for entry in page.entries()]
+            assert page.lost() > 0
+            assert numbers == sorted(set(numbers))
+            assert len(numbers) + page.lost() == count
+            assert numbers[-1] == count
+            # The latest state is never lost.
+            await page.until(lambda message: "OPERATOR_STOP" in json.dumps(message.get("reasons")))
+
+    with viewed(robot) as face:
+        asyncio.run(look(face.url))
+
+
+def test_a_reader_that_is_gone_without_a_word_holds_up_nobody() -> None:
+    robot = large_robot()
+
+    async def look(url: str) -> None:
+        host, _, rest = url.removeprefix("http://").partition(":")
+        port = int(rest.partition("/")[0])
+        with socket.create_connection((host, port)) as silent:
+            silent.sendall(b"GET /stream HTTP/1.1\r\nHost: ")
+            async with opened(url) as page:
+                await page.told("update")
+                with happening(robot, 20, 100.0):
+                    await seen(page, 20)
+
+    with viewed(robot) as face:
+        asyncio.run(look(face.url))

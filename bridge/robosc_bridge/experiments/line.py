@@ -16,7 +16,7 @@ from robosc_bridge.experiments.processes import Program, finish
 from robosc_bridge.experiments.scenario import Outcome, Say, ScenarioError
 from robosc_bridge.experiments.serial import EXAMPLES, Rig, Setting, log_faults, running, scene_of
 from robosc_bridge.experiments.tail import LineCount, Now, latest
-from robosc_bridge.simulated.judge import judge_line
+from robosc_bridge.simulated.judge import Halt, judge_line
 from robosc_bridge.simulated.motion import Motion, MotionError, read_motion
 from robosc_bridge.simulated.scene import Scene
 from robosc_bridge.terminal.client import BridgeClient, RefusedError, UnreachableError, Wish
@@ -107,12 +107,12 @@ class _Play:
     """What happens to the robot, one after the other.
 
     Attributes:
-        stops: From when to when it had to stand still, in seconds of the world.
+        stops: When it had to stand still.
         faults: What it should have done, and did not within the time that it had.
     """
 
     def __init__(self, rig: Rig, follower: Program, say: Say) -> None:
-        self.stops: list[tuple[float, float]] = []
+        self.stops: list[Halt] = []
         self.faults: list[str] = []
         self._rig = rig
         self._follower = follower
@@ -156,7 +156,7 @@ class _Play:
             elif begin_s is None:
                 begin_s = now.world_s
             elif now.world_s - begin_s >= HELD_S:
-                self.stops.append((begin_s, now.world_s))
+                self.stops.append(Halt(begin_s, now.world_s, what))
                 let_go()
                 return
 

@@ -37,6 +37,8 @@ _IN_REAL_TIME = (
     "tests/bridge/remote/test_whole.py",
     "tests/bridge/terminal/test_teleop.py",
     "tests/end_to_end/test_demo.py",
+    "tests/end_to_end/test_twin_ros1.py",
+    "tests/end_to_end/test_twin_ros2.py",
     "tests/test_tutorial.py",
 )
 

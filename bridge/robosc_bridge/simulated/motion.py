@@ -1,6 +1,6 @@
 """The record of a robot's motion: where it was, how fast, and what happened to it, as JSON Lines.
 
-A sample every 50 ms of the world, and what happens when it happens; each line is written at once:
+A sample every 50 ms of the world and one at the end, and what happens when it happens; each line is written at once:
 
     {"time": 1767225600.05, "world_s": 0.05, "x_m": 0.0, "y_m": 0.0, "heading_rad": 0.0, "linear_m_s": 0.1, ...}
     {"time": 1767225612.4, "world_s": 12.4, "happening": "goal", "x_m": 1.2, "y_m": 0.61}
@@ -118,9 +118,11 @@ class MotionRecorder:
             world.watch(self._step, self._happen)
 
     def close(self) -> None:
-        """Watch no more; the world has lived until now."""
+        """Watch no more, and write where the robot is at the end."""
         with self._world.time.lock:
             self._world.catch_up()
+            if self._steps % _EVERY:
+                self._write(self._sample(self._world.lived_s, self._steps % _EVERY * STEP_S))
             self._world.unwatch(self._step, self._happen)
 
     def _step(self, world_s: float) -> None:
@@ -128,7 +130,7 @@ class MotionRecorder:
         if self._steps % _EVERY == 0:
             self._write(self._sample(world_s))
 
-    def _sample(self, world_s: float) -> Sample:
+    def _sample(self, world_s: float, since_s: float = SAMPLE_S) -> Sample:
         world = self._world
         x_m, y_m, heading_rad = self._last
         self._last = (world.x_m, world.y_m, world.heading_rad)
@@ -139,8 +141,8 @@ class MotionRecorder:
             round(world.x_m, _DIGITS),
             round(world.y_m, _DIGITS),
             round(world.heading_rad, _DIGITS),
-            round(ahead_m / SAMPLE_S, _DIGITS),
-            round((world.heading_rad - heading_rad) / SAMPLE_S, _DIGITS),
+            round(ahead_m / since_s, _DIGITS),
+            round((world.heading_rad - heading_rad) / since_s, _DIGITS),
             world.collisions,
         )
 

@@ -1,5 +1,6 @@
 """The simulator as a program of its own, and what can be told to it."""
 
+import re
 import signal
 import socket
 import subprocess
@@ -10,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from robosc.execution.clock import ManualClock
-from robosc_bridge.simulated import Faults, SimulatedTurtleBot3
+from robosc_bridge.simulated import Faults, SimulatedTurtleBot3, read_motion, scene_names
 from robosc_bridge.simulated.__main__ import main
 from robosc_bridge.simulated.commands import UnknownCommandError, obey
 from support.wire import Host, wait_until
@@ -83,6 +84,39 @@ def test_with_a_line_it_serves_a_camera_as_well(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [track]
 
 
+def test_a_scene_is_served_and_its_motion_recorded(tmp_path: Path) -> None:
+    scene, motion = tmp_path / "yard.yaml", tmp_path / "motion.jsonl"
+    scene.write_text("goal: {x_m: 1, y_m: 0, radius_m: 0.2}\nobstacles: {box: {x_m: 3, y_m: 0, radius_m: 0.1}}\n")
+    program = Program("--scene", str(scene), "--motion", str(motion))
+    with program.process as process:
+        assert [program.output.readline().split()[0] for _ in range(2)] == ["base", "scanner"]
+        assert program.ask("goal") == "not yet"
+        program.tell("obstacle box 2 1")
+        program.tell("pose 1 0 0")
+        assert re.fullmatch(r"reached [0-9.]+", program.ask("goal"))
+        process.terminate()
+        assert process.wait(10) == 0
+    found = read_motion(motion)
+    assert [event.happening for event in found.happenings] == ["obstacle", "goal"]
+    assert (found.samples[0].x_m, found.samples[-1].x_m) == (0.0, 1.0)
+
+
+def test_scenes_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--list-scenes"]) == 0
+    assert capsys.readouterr().out.split() == list(scene_names())
+
+
+def test_a_maze_on_the_command_line_has_an_exit() -> None:
+    program = Program("--maze", "3x2")
+    with program.process as process:
+        program.output.readline()
+        program.output.readline()
+        program.tell("pose 2 2 0")
+        assert program.ask("goal").startswith("reached")
+        process.terminate()
+        assert process.wait(10) == 0
+
+
 def test_it_goes_on_when_its_input_ends() -> None:
     program = Program("--lidar", "lds01")
     with program.process as process:
@@ -101,6 +135,10 @@ def test_it_goes_on_when_its_input_ends() -> None:
         (["--walls", "/nowhere"], "No such file"),
         (["--maze", "0x2"], "one cell"),
         (["--line", "/nowhere"], "No such file"),
+        (["--scene", "nowhere"], "there is no scene and no file 'nowhere'"),
+        (["--scene", "/dev/null"], "is not a regular file"),
+        (["--scene", "room", "--line", "oval"], "--line does not go with --scene"),
+        (["--motion", "/nowhere/motion"], "No such file"),
         (["--line", "/dev/null"], "at least two points"),
         (["--camera-link", "/dev/null"], "something at /dev/null already"),
     ],

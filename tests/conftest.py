@@ -40,6 +40,8 @@ _IN_REAL_TIME = (
     "tests/end_to_end/test_line_follower_demo.py",
     "tests/end_to_end/test_serial_line.py",
     "tests/end_to_end/test_serial_maze.py",
+    "tests/end_to_end/test_twin_ros1.py",
+    "tests/end_to_end/test_twin_ros2.py",
     "tests/test_tutorial.py",
 )
 

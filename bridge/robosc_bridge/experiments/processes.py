@@ -12,7 +12,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType, TracebackType
@@ -92,6 +92,8 @@ class Program:
         folder: Where its log is written, and its working folder.
         is_preferred: Whether it goes before other programs, where that is permitted: it lives by the computer's clock.
         is_asked: Whether it takes commands; its output is answers then, and no part of its log.
+        interpreter: Of the program; None: that of this process.
+        variables: Its environment; None: that of this process, as `environment` has it.
 
     Raises:
         ScenarioError: It cannot be started.
@@ -109,6 +111,8 @@ class Program:
         *,
         is_preferred: bool = False,
         is_asked: bool = False,
+        interpreter: str | None = None,
+        variables: Mapping[str, str] | None = None,
     ) -> None:
         self.name = name
         self.log = folder / f"{name}.log"
@@ -116,6 +120,8 @@ class Program:
         self._folder = folder
         self._is_preferred = is_preferred
         self._is_asked = is_asked
+        self._interpreter = interpreter or sys.executable
+        self._variables = variables
         self._answers: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._process: subprocess.Popen[str] | None = None
 
@@ -124,8 +130,8 @@ class Program:
         with self.log.open("w", encoding="utf-8") as log, _interrupts.held():
             try:
                 process = subprocess.Popen(  # noqa: S603 (our own programs)
-                    [sys.executable, *self._arguments],
-                    env=environment(),
+                    [self._interpreter, *self._arguments],
+                    env=environment() if self._variables is None else dict(self._variables),
                     cwd=self._folder,
                     stdin=pipe or subprocess.DEVNULL,
                     stdout=pipe or log,

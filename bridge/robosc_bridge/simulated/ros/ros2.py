@@ -88,7 +88,9 @@ class Ros2Face:
             self._to_tf = node.create_publisher(TFMessage, "/tf", 100)
             latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
             self._to_static = node.create_publisher(TFMessage, "/tf_static", latched)
-            self._to_static.publish(TFMessage(transforms=[self._mounting(frame) for frame in robot.frames]))
+            self._to_static.publish(
+                TFMessage(transforms=[mounting(TransformStamped(), frame) for frame in robot.frames])
+            )
         if is_stamped:
             node.create_subscription(TwistStamped, "/cmd_vel", lambda message: self._obey(message.twist), 10)
         else:
@@ -105,8 +107,13 @@ class Ros2Face:
         self._rclpy.try_shutdown(context=self._context)
 
     def attend(self, longest_s: float) -> None:
-        """Obey velocities; comes back after one, or after so long at most."""
+        """Obey velocities, all that have come; comes back after some, or after so long at most."""
+        before = self._robot.commands
         self._executor.spin_once(timeout_sec=longest_s)
+        # Those that have waited come together: the world must not go on in between as if each were new.
+        while self._robot.commands > before:
+            before = self._robot.commands
+            self._executor.spin_once(timeout_sec=0.0)
 
     def _obey(self, twist: Any) -> None:
         self._pacer.catch_up()
@@ -125,7 +132,7 @@ class Ros2Face:
             case Odometry():
                 self._to_odometry.publish(_odometry(odometry_type(), reading))
                 if self._to_tf is not None:
-                    self._to_tf.publish(self._tf_type(transforms=[self._moved(reading)]))
+                    self._to_tf.publish(self._tf_type(transforms=[moved(self._transform_type(), reading)]))
             case Picture():
                 self._to_picture.publish(_picture(image_type(), reading))
             case Battery(stamp_s, voltage_v):
@@ -133,21 +140,25 @@ class Ros2Face:
                 _set_time(message.header.stamp, stamp_s)
                 self._to_battery.publish(message)
 
-    def _moved(self, reading: Odometry) -> Any:
-        found = self._transform_type(child_frame_id=FOOTPRINT)
-        _set_header(found.header, reading.stamp_s, ODOM)
-        place = found.transform
-        place.translation.x, place.translation.y = reading.x_m, reading.y_m
-        place.rotation.z, place.rotation.w = _turned(reading.heading_rad)
-        return found
 
-    def _mounting(self, frame: Mounted) -> Any:
-        found = self._transform_type(child_frame_id=frame.child)
-        _set_header(found.header, 0.0, frame.parent)
-        place = found.transform
-        place.translation.x, place.translation.z = frame.x_m, frame.z_m
-        place.rotation.y, place.rotation.w = _turned(frame.pitch_rad)
-        return found
+def moved(message: Any, reading: Odometry) -> Any:
+    """The robot in the frame of its odometry, as a `TransformStamped`."""
+    message.child_frame_id = FOOTPRINT
+    _set_header(message.header, reading.stamp_s, ODOM)
+    place = message.transform
+    place.translation.x, place.translation.y = reading.x_m, reading.y_m
+    place.rotation.z, place.rotation.w = _turned(reading.heading_rad)
+    return message
+
+
+def mounting(message: Any, frame: Mounted) -> Any:
+    """A part of the robot in another one, as a `TransformStamped`."""
+    message.child_frame_id = frame.child
+    _set_header(message.header, 0.0, frame.parent)
+    place = message.transform
+    place.translation.x, place.translation.z = frame.x_m, frame.z_m
+    place.rotation.y, place.rotation.w = _turned(frame.pitch_rad)
+    return message
 
 
 def _turned(angle_rad: float) -> tuple[float, float]:

@@ -53,7 +53,7 @@ class Face(Protocol):
         """Send what the robot shows."""
 
     def attend(self, longest_s: float) -> None:
-        """Obey velocities; comes back after one, or after so long at most.
+        """Obey velocities; comes back after some, or after so long at most.
 
         Raises:
             ServingError: There is nobody any more to serve.

@@ -3,7 +3,7 @@
 Usage: run.py [NAME...]      (all of them without an argument)
 
 Names: cold-start, conditions, execution, language, synthesis; of the bridge: decoders, drive-bases, loop-period,
-reaction, endurance.
+reaction, endurance, twin.
 """
 
 import sys
@@ -18,6 +18,7 @@ import drive_bases
 import endurance
 import loop_period
 import reaction
+import twin
 
 import cold_start
 import conditions
@@ -36,6 +37,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "loop-period": loop_period.table,
     "reaction": reaction.table,
     "synthesis": synthesis.table,
+    "twin": twin.table,
 }
 
 

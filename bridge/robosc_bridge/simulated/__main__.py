@@ -152,7 +152,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     place.add_argument("--room", type=_size, default=(4.0, 3.0), metavar="XxY", help="a room in metres; default: 4x3")
     place.add_argument(
-        "--maze", type=_size, metavar="COLUMNSxROWS", help="a maze of 0.6 m cells from the first to its exit"
+        "--maze", type=_size, metavar="COLUMNSxROWS", help="a maze of 1 m cells from the first to its exit"
     )
     place.add_argument("--walls", type=Path, metavar="FILE", help="walls from a file, `x1 y1 x2 y2` in metres a line")
     parser.add_argument(

@@ -159,7 +159,7 @@ class Lidar(ABC):
         """What is measured at clockwise angles from the front; 0: nothing."""
         angles = -np.radians(np.asarray(device_degrees))
         directions = np.stack((np.cos(angles), np.sin(angles)), axis=1)
-        return self._measured(self._world.cast(np.zeros_like(directions), directions))
+        return self._measured(self._world.cast(None, directions))
 
     def _measured(self, lengths_m: Floats) -> list[int]:
         if self._noise_m:

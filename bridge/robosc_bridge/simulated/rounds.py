@@ -17,31 +17,35 @@ class Rounds:
 
     def __init__(self, discs: Iterable[tuple[float, float, float]]) -> None:
         self.discs = tuple(discs)
-        table = np.array(self.discs, dtype=np.float64).reshape(-1, 3)
-        self._middles: Floats = np.ascontiguousarray(table[:, :2])
-        self._squares: Floats = table[:, 2] ** 2
 
     def cast(self, origins: Floats, directions: Floats) -> Floats:
         """How far rays go until the edge of a disc; who stands in one sees it from within.
 
         Args:
-            origins: Shape (n, 2), metres.
+            origins: Shape (n, 2), or (1, 2) where all rays begin at one point, in metres.
             directions: Shape (n, 2), of any length but zero.
 
         Returns:
             Shape (n,): in lengths of each direction; infinity where none is met.
         """
         if not self.discs:
-            return np.full(len(origins), np.inf)
-        # |origin + t direction - middle|^2 = radius^2, a quadratic in t.
-        apart = self._middles[None, :, :] - origins[:, None, :]
-        squares = (directions**2).sum(axis=1)[:, None]
-        along = (apart * directions[:, None, :]).sum(axis=2)
-        rest = (apart**2).sum(axis=2) - self._squares
-        under = along**2 - squares * rest
-        root = np.sqrt(np.maximum(under, 0.0))
-        lengths = np.where(rest > 0.0, along - root, along + root) / squares
-        found: Floats = np.where((under >= 0.0) & (lengths >= 0.0), lengths, np.inf).min(axis=1)
+            return np.full(len(directions), np.inf)
+        along_x, along_y = directions[:, 0], directions[:, 1]
+        squares = along_x**2 + along_y**2
+        found = np.full(len(directions), np.inf)
+        for x_m, y_m, radius_m in self.discs:
+            # |origin + t direction - middle|^2 = radius^2, a quadratic in t.
+            apart_x, apart_y = x_m - origins[:, 0], y_m - origins[:, 1]
+            along = apart_x * along_x + apart_y * along_y
+            rest = apart_x**2 + apart_y**2 - radius_m**2
+            under = along**2 - squares * rest
+            met = np.flatnonzero((under >= 0.0) & ((along > 0.0) | (rest <= 0.0)))
+            # Few rays meet it.
+            if met.size:
+                root = np.sqrt(under[met])
+                is_outside = np.broadcast_to(rest > 0.0, along.shape)[met]
+                lengths = np.where(is_outside, along[met] - root, along[met] + root) / squares[met]
+                found[met] = np.minimum(found[met], lengths)
         return found
 
     def nearest(self, x_m: float, y_m: float) -> tuple[float, int]:

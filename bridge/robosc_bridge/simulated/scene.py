@@ -19,8 +19,10 @@ from robosc_bridge.configuration.problems import Path as Place
 from robosc_bridge.simulated.floor import Point, Track, spline
 from robosc_bridge.simulated.scene_file import MOST_SEGMENTS, LinePart, MazePart, SceneFile, WallsPart
 from robosc_bridge.simulated.textures import PLAIN, Texture
-from robosc_bridge.simulated.walls import Segment, Walls, open_maze
+from robosc_bridge.simulated.walls import CELL_M, Segment, Walls, open_maze
 
+# Of a cell: the robot is out of the gap before it is there.
+_GOAL_SHARE = 0.35
 _FOLDER = Path(__file__).parent / "scenes"
 
 
@@ -114,7 +116,7 @@ class Scene:
     noise: Noise = IDEAL
 
 
-def maze_scene(columns: int, rows: int, *, cell_m: float = 0.6, seed: int = 0) -> Scene:
+def maze_scene(columns: int, rows: int, *, cell_m: float = CELL_M, seed: int = 0) -> Scene:
     """A maze by chance, from its first cell to its exit.
 
     Args:
@@ -127,7 +129,7 @@ def maze_scene(columns: int, rows: int, *, cell_m: float = 0.6, seed: int = 0) -
         ValueError: There is no cell.
     """
     walls, exit_m = open_maze(columns, rows, cell_m, seed)
-    return Scene(f"maze {columns}x{rows} seed {seed}", walls, goal=Goal(*exit_m, cell_m / 2))
+    return Scene(f"maze {columns}x{rows} seed {seed}", walls, goal=Goal(*exit_m, cell_m * _GOAL_SHARE))
 
 
 @cache
@@ -191,7 +193,7 @@ class _Maker:
         if said.maze is not None:
             walls, exit_m = self._maze(said.maze)
             segments += walls.segments
-            goal = goal or Goal(*exit_m, said.maze.cell_m / 2)
+            goal = goal or Goal(*exit_m, said.maze.cell_m * _GOAL_SHARE)
         if len(segments) > MOST_SEGMENTS:
             self._fail(f"there are {len(segments)} walls; there may be {MOST_SEGMENTS}", ("walls",))
         start, floor, noise = said.start, said.floor, said.noise

@@ -47,7 +47,7 @@ class MazePart(_Section, frozen=True):
     rows: Annotated[int, Meta(ge=1, le=30, description="Cells along y.")]
     cell_m: Annotated[
         float, Meta(ge=0.3, le=5, description="Width of a cell; the middle of the first one is the origin.")
-    ] = 0.6
+    ] = 1.0
     seed: Annotated[
         _Seed | None, Meta(description="Of the choice; null: that of the run (`--seed`, `load_scene(..., seed)`).")
     ] = None

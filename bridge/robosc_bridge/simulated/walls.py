@@ -5,8 +5,10 @@ A wall map as text has one segment per line, `x1 y1 x2 y2` in metres; `#` begins
 
 import math
 import random
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from collections.abc import Set as AbstractSet
+from itertools import groupby
+from operator import itemgetter
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +18,11 @@ Floats = npt.NDArray[np.float64]
 Opening = frozenset[tuple[int, int]]
 """Two cells of a maze with no wall between them."""
 
+CELL_M = 1.0
+"""Width of a maze's ways: what the example of a maze solver is made for."""
+
 _PARALLEL = 1e-12
+_AT_ONCE = 32
 
 
 class Walls:
@@ -34,8 +40,9 @@ class Walls:
         table = np.array(self.segments, dtype=np.float64).reshape(-1, 4)
         if not np.isfinite(table).all():
             raise ValueError("a wall's coordinates must be finite numbers")
-        self._starts: Floats = table[:, :2]
-        self._edges: Floats = table[:, 2:] - table[:, :2]
+        self._starts: Floats = np.ascontiguousarray(table[:, :2])
+        self._ends: Floats = np.ascontiguousarray(table[:, 2:])
+        self._edges: Floats = self._ends - self._starts
         self._squares: Floats = np.maximum((self._edges**2).sum(axis=1), 1e-18)
 
     def cast(self, origins: Floats, directions: Floats) -> Floats:
@@ -63,6 +70,46 @@ class Walls:
         found: Floats = np.where(is_hit, lengths, np.inf).min(axis=1)
         return found
 
+    def cast_from(self, x_m: float, y_m: float, directions: Floats) -> Floats:
+        """The same for rays that all begin at one point, several times as fast.
+
+        A ray meets a wall whose ends are on different sides of it. With s1 and s2, the cross products of its direction
+        with the ways to both ends, and s, that of the two ways, it does so at t = s / (s2 - s1). The greatest 1/t is
+        looked for: what is behind has one below zero, and no division by zero is left.
+
+        Args:
+            x_m: Of the point.
+            y_m: Of the point.
+            directions: Shape (n, 2), of any length but zero.
+
+        Returns:
+            Shape (n,): in lengths of each direction; infinity where no wall is met.
+        """
+        if not self.segments:
+            return np.full(len(directions), np.inf)
+        point = np.array((x_m, y_m))
+        to_starts, to_ends = self._starts - point, self._ends - point
+        crosses = to_starts[:, 0] * to_ends[:, 1] - to_starts[:, 1] * to_ends[:, 0]
+        is_on = np.abs(crosses) < _PARALLEL
+        if is_on.any():
+            # In line with a wall, and maybe on it: rare enough to be looked at pair by pair.
+            return self.cast(np.broadcast_to(point, directions.shape), directions)
+        across = np.stack((-directions[:, 1], directions[:, 0]))
+        nearest = np.zeros(len(directions))
+        # Not all at once: what does not fit into the processor's cache is several times as slow.
+        for first in range(0, len(crosses), _AT_ONCE):
+            part = slice(first, first + _AT_ONCE)
+            # Shape (walls, rays): the search for the greatest goes along rows then.
+            beside_starts, beside_ends = to_starts[part] @ across, to_ends[part] @ across
+            inverse = beside_ends - beside_starts
+            inverse /= crosses[part, None]
+            beside_starts *= beside_ends
+            np.copyto(inverse, 0.0, where=beside_starts > 0.0)
+            np.maximum(nearest, inverse.max(axis=0), out=nearest)
+        with np.errstate(divide="ignore"):
+            found: Floats = np.where(nearest > 0.0, 1.0 / nearest, np.inf)
+        return found
+
     def distance_m(self, x_m: float, y_m: float) -> float:
         """From a point to the nearest wall; infinity if there is none."""
         if not self.segments:
@@ -85,7 +132,7 @@ def room(width_m: float, height_m: float) -> Walls:
     )
 
 
-def maze(columns: int, rows: int, cell_m: float = 0.6, seed: int = 0) -> Walls:
+def maze(columns: int, rows: int, cell_m: float = CELL_M, seed: int = 0) -> Walls:
     """A grid maze in which there is exactly one way between any two cells (a random depth-first tree).
 
     The middle of the first cell is the origin; columns go along x, rows along y.
@@ -102,7 +149,7 @@ def maze(columns: int, rows: int, cell_m: float = 0.6, seed: int = 0) -> Walls:
     return _grid(columns, rows, cell_m, _tree(columns, rows, seed))
 
 
-def open_maze(columns: int, rows: int, cell_m: float = 0.6, seed: int = 0) -> tuple[Walls, tuple[float, float]]:
+def open_maze(columns: int, rows: int, cell_m: float = CELL_M, seed: int = 0) -> tuple[Walls, tuple[float, float]]:
     """The same maze with an exit: the last cell has no wall towards greater y.
 
     All of its walls hang together, so that who keeps one of them on the right hand comes to the exit (the wall
@@ -153,14 +200,21 @@ def _grid(columns: int, rows: int, cell_m: float, opened: AbstractSet[Opening]) 
 
     found: list[Segment] = []
     for column in range(columns + 1):
-        for row in range(rows):
-            if frozenset(((column - 1, row), (column, row))) not in opened:
-                found.append((*corner(column, row), *corner(column, row + 1)))
-    for column in range(columns):
-        for row in range(rows + 1):
-            if frozenset(((column, row - 1), (column, row))) not in opened:
-                found.append((*corner(column, row), *corner(column + 1, row)))
+        is_wall = [frozenset(((column - 1, row), (column, row))) not in opened for row in range(rows)]
+        found += [(*corner(column, first), *corner(column, end)) for first, end in _runs(is_wall)]
+    for row in range(rows + 1):
+        is_wall = [frozenset(((column, row - 1), (column, row))) not in opened for column in range(columns)]
+        found += [(*corner(first, row), *corner(end, row)) for first, end in _runs(is_wall)]
     return Walls(found)
+
+
+def _runs(flags: Iterable[bool]) -> Iterator[tuple[int, int]]:
+    """Where those begin and end that are true: a long wall is quicker to meet than many short ones."""
+    places = groupby(enumerate(flags), key=itemgetter(1))
+    for is_run, run in places:
+        indices = [index for index, _ in run]
+        if is_run:
+            yield indices[0], indices[-1] + 1
 
 
 def parse_walls(text: str) -> Walls:

@@ -24,6 +24,8 @@ _STRONGEST_RAD_S2 = 150.0
 _FRICTION_RAD_S2 = 60.0
 # A body that has left a wall by so much has left it; less is the same collision.
 _APART_M = 0.005
+_DEGREES = np.radians(np.arange(360.0))
+_TURN = np.stack((np.cos(_DEGREES), np.sin(_DEGREES)), axis=1)
 
 
 @dataclass
@@ -288,11 +290,11 @@ class World:
         to_round_m, place = self._rounds.nearest(x_m, y_m)
         return (to_round_m, self._there[place].name) if to_round_m < to_wall_m else (to_wall_m, "")
 
-    def cast(self, origins: Floats, directions: Floats) -> Floats:
+    def cast(self, origins: Floats | None, directions: Floats) -> Floats:
         """How far rays of the laser go, in its own axes (x forward, y left).
 
         Args:
-            origins: Shape (n, 2): in metres from the laser's middle.
+            origins: Shape (n, 2): in metres from the laser's middle; None: all are there.
             directions: Shape (n, 2).
 
         Returns:
@@ -301,11 +303,16 @@ class World:
         with self.time.lock:
             self.catch_up()
             cosine, sine = math.cos(self.heading_rad), math.sin(self.heading_rad)
-            turn = np.array(((cosine, sine), (-sine, cosine)))
-            middle = np.array((self.x_m + cosine * self.body.scanner_x_m, self.y_m + sine * self.body.scanner_x_m))
+            x_m, y_m = self.x_m + cosine * self.body.scanner_x_m, self.y_m + sine * self.body.scanner_x_m
             rounds = self._rounds
-        starts, along = origins @ turn + middle, directions @ turn
-        found = self.walls.cast(starts, along)
+        turn = np.array(((cosine, sine), (-sine, cosine)))
+        along = directions @ turn
+        if origins is None:
+            found = self.walls.cast_from(x_m, y_m, along)
+            starts = np.array(((x_m, y_m),))
+        else:
+            starts = origins @ turn + np.array((x_m, y_m))
+            found = self.walls.cast(starts, along)
         return np.minimum(found, rounds.cast(starts, along)) if rounds.discs else found
 
     def ranges(self, angles_rad: Sequence[float]) -> tuple[float, ...]:
@@ -319,4 +326,12 @@ class World:
         """
         angles = np.asarray(angles_rad, dtype=np.float64)
         directions = np.stack((np.cos(angles), np.sin(angles)), axis=1)
-        return tuple(float(value) for value in self.cast(np.zeros_like(directions), directions))
+        return tuple(self.cast(None, directions).tolist())
+
+    def scan(self) -> Floats:
+        """What an ideal laser would measure now in a whole turn.
+
+        Returns:
+            Shape (360,): counter-clockwise from the front, in metres; infinity where nothing is met.
+        """
+        return self.cast(None, _TURN)

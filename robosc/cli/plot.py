@@ -39,6 +39,11 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         metavar="NAME",
         help="show this event only (may be repeated); * stands for anything, as in '*.request'",
     )
+    parser.add_argument(
+        "--changes",
+        action="store_true",
+        help="leave out events that say nothing new: they carry what they carried before, and change no state",
+    )
     parser.add_argument("--title", default=None, help="what stands above it (default: the log's name)")
     parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
     parser.set_defaults(run=run)
@@ -73,7 +78,13 @@ def run(arguments: argparse.Namespace) -> int:
     title = log.stem if arguments.title is None else arguments.title
     try:
         drawn = draw_sequence(
-            run_, output, begin_s=arguments.begin_s, end_s=arguments.end_s, events=arguments.event, title=title[:200]
+            run_,
+            output,
+            begin_s=arguments.begin_s,
+            end_s=arguments.end_s,
+            events=arguments.event,
+            only_changes=arguments.changes,
+            title=title[:200],
         )
     except PlotError as error:
         raise UsageError(str(error)) from error

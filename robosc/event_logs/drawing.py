@@ -56,6 +56,7 @@ def draw_sequence(
     begin_s: float | None = None,
     end_s: float | None = None,
     events: Sequence[str] = (),
+    only_changes: bool = False,
     title: str = "",
 ) -> Drawn:
     """Draw a log. The same log gives the same file.
@@ -66,6 +67,7 @@ def draw_sequence(
         begin_s: Begin of the time window, in seconds since the begin of the log; None: the first event.
         end_s: Its end; None: the last event.
         events: Names, or patterns such as `*.request`, of the events to show; empty: all.
+        only_changes: Whether events are left out that carry what they carried before and leave the state as it was.
         title: What stands above it.
 
     Raises:
@@ -77,7 +79,7 @@ def draw_sequence(
     suffix = target.suffix.lower()
     if suffix not in SUFFIXES:
         raise PlotError(f"{target}: plots are {', '.join(SUFFIXES)} files")
-    sequence = sequence_of(run, begin_s, end_s, events)
+    sequence = sequence_of(run, begin_s, end_s, events, only_changes=only_changes)
     if suffix == ".html":
         content, drawn = _drawer("page", "plotly").page(sequence, title)
     else:

@@ -124,7 +124,11 @@ class Replay:
 
     def is_possible(self, event: str) -> bool:
         """Whether the plants can do it."""
-        return self._semantics.enabled(self.state, event)
+        if self._events[event]:
+            return self._semantics.enabled(self.state, event)
+        # Data never blocks what the environment does, and there may be too many choices of it to try them all.
+        unknown = tuple((path, None) for path, _ in self._inputs[event])
+        return self._semantics.target_with(self.state, event, unknown) is not None
 
     def refusal(self, event: str) -> str:
         """Why a controllable event is not allowed now, in words; empty: it is."""

@@ -99,7 +99,12 @@ class EventSequence:
 
 
 def sequence_of(
-    run: LoggedRun, begin_s: float | None = None, end_s: float | None = None, events: Sequence[str] = ()
+    run: LoggedRun,
+    begin_s: float | None = None,
+    end_s: float | None = None,
+    events: Sequence[str] = (),
+    *,
+    only_changes: bool = False,
 ) -> EventSequence:
     """The events of a log in a time window.
 
@@ -108,6 +113,7 @@ def sequence_of(
         begin_s: The window's begin, in seconds since the begin of the log; None: the first event.
         end_s: Its end; None: the last event.
         events: Names, or patterns such as `*.request`, of the events to show; empty: all.
+        only_changes: Whether events are left out that say nothing new.
 
     Raises:
         PlotError: There is nothing to show.
@@ -117,7 +123,7 @@ def sequence_of(
     happened = run.events
     if not happened:
         raise PlotError("the log tells of no event")
-    chosen = _chosen(happened, events)
+    chosen = _chosen(_news(happened) if only_changes else happened, events)
     inside = [
         (entry.time_s - run.begin_s, entry)
         for entry in chosen
@@ -130,6 +136,8 @@ def sequence_of(
     first_s = min(time_s for time_s, _ in inside) if begin_s is None else begin_s
     last_s = max(time_s for time_s, _ in inside) if end_s is None else end_s
     shown, notes = _most_frequent([entry for _, entry in inside])
+    if only_changes:
+        notes = ("events that repeat what was known already are left out", *notes)
     interruptions = tuple(
         Interruption(entry.time_s - run.begin_s, f"{entry.kind}: {entry.text('what')}".removesuffix(": ")[:80])
         for entry in run.entries
@@ -145,6 +153,19 @@ def sequence_of(
         count=len(inside),
         notes=(*run.notes(), *notes),
     )
+
+
+def _news(happened: Iterable[LogEntry]) -> list[LogEntry]:
+    """The events that say something new: they carry other data than the time before, or have changed the state."""
+    found: list[LogEntry] = []
+    last: dict[str, LogEntry] = {}
+    before: LogEntry | None = None
+    for entry in happened:
+        earlier = last.get(entry.event)
+        if earlier is None or before is None or entry.data != earlier.data or entry.state != before.state:
+            found.append(entry)
+        last[entry.event] = before = entry
+    return found
 
 
 def _chosen(happened: Iterable[LogEntry], patterns: Sequence[str]) -> list[LogEntry]:

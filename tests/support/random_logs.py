@@ -71,7 +71,12 @@ class World:
     @property
     def entries(self) -> list[Entry]:
         """The log so far, as a file would hold it."""
-        return [json.loads(json_line(entry)) for entry in self.bench.log.entries]
+        return self.of(self.bench)
+
+    @staticmethod
+    def of(bench: Bench | LayerBench) -> list[Entry]:
+        """The log of an executor, as a file would hold it."""
+        return [json.loads(json_line(entry)) for entry in bench.log.entries]
 
     def run(self, steps: int) -> list[Entry]:
         """Let things happen; the log."""

@@ -287,7 +287,8 @@ def reported(outcome: "Outcome", folder: Path) -> "ReportedRun":
         check = check_log(log, decode(outcome.supervisor.read_bytes()))
         sequence, page = outcome.folder / "sequence.png", outcome.folder / "sequence.html"
         for path in (sequence, page):
-            draw_sequence(log, path, title=f"{outcome.name} over {outcome.connection}")
+            # As in the paper: what says nothing new would hide the rest.
+            draw_sequence(log, path, only_changes=True, title=f"{outcome.name} over {outcome.connection}")
         map_ = _map(outcome)
     except (LogError, PlotError, InvalidSupervisorError, MotionError) as error:
         raise ScenarioError(str(error)) from error

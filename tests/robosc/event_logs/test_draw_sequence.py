@@ -48,6 +48,27 @@ def test_time_window_and_events_are_chosen() -> None:
     assert [row.event for row in sequence_of(SHORT, events=("move.request",)).rows] == ["move.request"]
 
 
+def test_what_says_nothing_new_can_be_left_out() -> None:
+    told = [
+        ("a", 1, "x"),
+        ("a", 1, "x"),
+        ("a", 2, "x"),
+        ("b", None, "x"),
+        ("b", None, "y"),
+        ("a", 2, "y"),
+        ("a", 2, "x"),
+    ]
+    run = LoggedRun(
+        tuple(
+            LogEntry(line, float(line), "event", name, False, {"data": data, "state": {"A": {"state": state}}})
+            for line, (name, data, state) in enumerate(told, 1)
+        )
+    )
+    sequence = sequence_of(run, only_changes=True)
+    assert {row.event: row.lines for row in sequence.rows} == {"a": (1, 3, 7), "b": (4, 5)}
+    assert sequence.notes == ("events that repeat what was known already are left out",)
+
+
 @pytest.mark.parametrize(
     ("chosen", "problem"),
     [

@@ -42,8 +42,12 @@ class Node:
         event = self._dice.choice(events)
         if event.endswith(".request") and not self.system.enabled(event):
             return None
-        data = self._dice.randint(0, 3)
-        return event if self.system.step(event, self.system.read(event, data)) is not None else None
+        return event if self.take(event, self._dice.randint(0, 3)) else None
+
+    def take(self, event: str, data: int = 0) -> bool:
+        """Let an event happen; False: the state does not take it."""
+        reading = self.system.read(event, data) if event.endswith((".response", ".feedback")) else None
+        return self.system.step(event, reading) is not None
 
     def enabled(self) -> list[str]:
         names = [f"{item.name}.request" for item in self._model.communications]
@@ -85,7 +89,7 @@ def test_many_events_in_one_text_are_told_one_by_one(large: Supervisor, tmp_path
     node, reader = Node(large, tmp_path), StateReader(large)
     reader.read(node.system.report(), 1.0)
     for event in ("seen0.response", "go1.request", "halt1.request", "seen0.response"):
-        assert node.system.step(event, node.system.read(event, 0)) is not None
+        assert node.take(event)
     _, _, entries = reader.read(node.system.report(), 1.0)
     assert [entry["event"] for entry in entries] == ["seen0.response", "go1.request", "halt1.request", "seen0.response"]
 

@@ -47,6 +47,7 @@ def test_a_bridge_that_ends_is_told_and_found_again(robot: LiveRobot, monkeypatc
                 again = serve(robot.operations, RemoteSettings(face.address))
                 try:
                     await page.told("definition")
+                    await page.told("update")
                     robot.step()
                     await page.until(lambda message: message["type"] == "events" and message["entries"])
                 finally:

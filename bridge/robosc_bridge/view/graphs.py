@@ -96,26 +96,29 @@ def layers_of(nodes: Sequence[Node], arrows: Sequence[Arrow]) -> dict[str, int]:
             after[arrow.source].append(arrow.target)
     starts = sorted(nodes, key=lambda node: not node.is_initial)
     forward: dict[str, list[str]] = {name: [] for name in after}
-    done: list[str] = []
-    seen: dict[str, bool] = {}  # Whether a state is on the way that is being searched.
+    # By state the search that has found it, and whether it is on the way that is being searched.
+    seen: dict[str, bool] = {}
+    found_in: dict[str, str] = {}
     for start in starts:
         if start.name in seen:
             continue
         way = [(start.name, iter(after[start.name]))]
         seen[start.name] = True
+        found_in[start.name] = start.name
         while way:
             name, rest = way[-1]
             following = next(rest, None)
             if following is None:
                 way.pop()
                 seen[name] = False
-                done.append(name)
-            elif seen.get(following):
+            elif seen.get(following) or found_in.get(following, start.name) != start.name:
+                # Back to where the search came from, or, of a state that cannot be reached, to one that can.
                 forward[following].append(name)
             else:
                 forward[name].append(following)
                 if following not in seen:
                     seen[following] = True
+                    found_in[following] = start.name
                     way.append((following, iter(after[following])))
     layers = dict.fromkeys(after, 0)
     for name in _ordered(forward):

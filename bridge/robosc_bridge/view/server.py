@@ -69,6 +69,9 @@ _BACKLOG = 16
 _SWEEP_S = 1.0
 _CLOSE_LIMIT_S = 2.0
 
+_STOPS: set[asyncio.Task[None]] = set()
+"""Stops that are under way: somebody must hold them, and the pages that wanted them may be gone."""
+
 _Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
@@ -127,7 +130,14 @@ class ViewServer:
         await self._runner.setup()
         loop = asyncio.get_running_loop()
         try:
-            self._server = await loop.create_server(self._connected, host, port, ssl=context, backlog=_BACKLOG)
+            self._server = await loop.create_server(
+                self._connected,
+                host,
+                port,
+                ssl=context,
+                backlog=_BACKLOG,
+                ssl_handshake_timeout=None if context is None else REQUEST_LIMIT_S,
+            )
         except OSError as error:
             await self._runner.cleanup()
             raise ViewError(f"the live view cannot listen on {settings.address}: {_os_text(error)}") from error
@@ -158,7 +168,8 @@ class ViewServer:
         """A protocol for one more connection, or one that ends it at once."""
         assert self._runner is not None  # noqa: S101  # Nobody connects before `start`.
         server = self._runner.server
-        if server is None or len(server.connections) >= MAXIMUM_CONNECTIONS:
+        # Those that were accepted just now are no connections of the server's yet.
+        if server is None or len({*server.connections, *self._silent}) >= MAXIMUM_CONNECTIONS:
             return _Full()
         handler = server()
         self._silent[handler] = asyncio.get_running_loop().time() + REQUEST_LIMIT_S
@@ -295,7 +306,7 @@ class _Session:
                 return
 
     def close(self) -> None:
-        """The page has left: commands that wait for an answer are taken back."""
+        """The page has left: commands that wait for an answer are taken back. Stops are not commands."""
         for task in self._tasks:
             task.cancel()
 
@@ -308,8 +319,7 @@ class _Session:
             return self._is_in_time()
         match wanted:
             case Stop():
-                self._start(Command.STOP)
-                return self._is_in_time() or len(self._tasks) < BURST
+                self._stop()
             case Order(command=command, token=token):
                 self._order(command, token)
             case wish:
@@ -328,6 +338,12 @@ class _Session:
             self._start(command)
             return
         self._viewer.answer(refused_text(str(command), why))
+
+    def _stop(self) -> None:
+        # Begun before anything else is looked at, and ended by nobody: also of a page that is closed at once.
+        task = asyncio.Task(self._do(Command.STOP), loop=asyncio.get_running_loop(), eager_start=True)
+        _STOPS.add(task)
+        task.add_done_callback(_STOPS.discard)
 
     def _start(self, command: Command) -> None:
         task = asyncio.create_task(self._do(command))

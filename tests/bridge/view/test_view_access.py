@@ -1,0 +1,327 @@
+"""Who is let in: by name, by page and by token; and the bounds of what may be asked for."""
+
+import asyncio
+import contextlib
+import socket
+import ssl
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import aiohttp
+import pytest
+
+from robosc_api.security import ServerSecurity
+from robosc_bridge.daemon.states import Command
+from robosc_bridge.view import ViewError, ViewFace, ViewSettings
+from robosc_bridge.view import server as server_module
+from robosc_bridge.view.access import Access
+from robosc_bridge.view.page_files import FOLDER, TOKEN_PLACE, read_page
+from robosc_bridge.view.requests import MAXIMUM_BYTES
+from robosc_bridge.view.server import BURST, HEADERS, MAXIMUM_VIEWERS
+from support.certificates import Authority
+from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed
+from support.pages_open import opened, token_of
+
+
+@pytest.fixture
+def robot() -> LiveRobot:
+    return LiveRobot(supervisor_without_synthesis(large_model(3)))
+
+
+@pytest.fixture
+def face(robot: LiveRobot) -> Iterator[ViewFace]:
+    with viewed(robot) as found:
+        yield found
+
+
+def got(url: str, path: str, **headers: str) -> tuple[int, str, dict[str, str]]:
+    """Status, text and headers of an answer."""
+
+    async def ask() -> tuple[int, str, dict[str, str]]:
+        async with (
+            aiohttp.ClientSession() as session,
+            session.get(url.partition("/?")[0] + path, headers=headers) as answer,
+        ):
+            return answer.status, await answer.text(), dict(answer.headers)
+
+    return asyncio.run(ask())
+
+
+def refused_status(url: str, **headers: str) -> int:
+    """Of a stream that is not opened."""
+
+    async def ask() -> int:
+        try:
+            async with opened(url, **headers):
+                return 101
+        except aiohttp.WSServerHandshakeError as error:
+            return error.status
+
+    return asyncio.run(ask())
+
+
+def test_the_token_stands_only_in_the_page_that_was_opened_with_it(face: ViewFace) -> None:
+    token = token_of(face.url)
+    status, text, headers = got(face.url, f"/?token={token}")
+    assert status == 200
+    assert TOKEN_PLACE.replace('""', f'"{token}"') in text
+    assert {name: headers[name] for name in HEADERS} == HEADERS
+    assert "no-store" in headers["Cache-Control"]
+    status, text, _ = got(face.url, "/")
+    assert status == 200
+    assert token not in text
+    assert TOKEN_PLACE in text
+    for wrong in ("x", token[:-1], f"{token}&token={token}", "%00", "x" * 3000):
+        status, text, headers = got(face.url, f"/?token={wrong}")
+        assert status == 403
+        assert token not in text
+        assert headers["Referrer-Policy"] == "no-referrer"
+
+
+def test_each_start_has_another_token(robot: LiveRobot) -> None:
+    with viewed(robot) as one, viewed(robot) as other:
+        assert token_of(one.url) != token_of(other.url)
+        assert len(token_of(one.url)) >= 43
+
+
+def test_only_the_files_of_the_page_are_served(face: ViewFace) -> None:
+    for name, (kind, data) in read_page().assets.items():
+        status, text, headers = got(face.url, f"/page/{name}")
+        assert (status, text) == (200, data.decode())
+        assert headers["Content-Type"].startswith(kind)
+        assert headers["X-Content-Type-Options"] == "nosniff"
+    paths = ["/page/index.html", "/page/../server.py", "/page/..%2fserver.py", "/page/%2e%2e/server.py", "/page/", "/x"]
+    for path in [*paths, "/page/main.js%00", "//etc/passwd", "/stream/"]:
+        assert got(face.url, path)[0] == 404, path
+    assert FOLDER.is_dir()
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", "evil.example:{port}", "127.0.0.1", "localhost:1", "[::1", "", "1.2.3.4:{port}"]
+)
+def test_another_name_is_not_answered(face: ViewFace, host: str) -> None:
+    port = face.address.rpartition(":")[2]
+    status, text, _ = got(face.url, "/", Host=host.format(port=port))
+    assert status in (400, 421), host
+    assert TOKEN_PLACE not in text
+    assert refused_status(face.url, Host=host.format(port=port)) in (400, 421, 403)
+
+
+def test_names_of_this_machine_are_answered(face: ViewFace) -> None:
+    port = face.address.rpartition(":")[2]
+    for name in ("localhost", "127.0.0.1", "LOCALHOST", "[::1]"):
+        assert got(face.url, "/", Host=f"{name}:{port}")[0] == 200
+
+
+def test_a_stream_is_for_pages_of_this_server(face: ViewFace) -> None:
+    base = face.url.partition("/?")[0]
+    assert refused_status(face.url) == 101
+    for origin in ("http://evil.example", "null", base.replace("http", "https"), f"{base}0", f"{base}/", ""):
+        assert refused_status(face.url, Origin=origin) == 403, origin
+
+
+def test_a_server_beyond_this_machine_takes_numbers_and_its_own_names() -> None:
+    access = Access("0.0.0.0", 8066, is_secure=True, names=["robot.example"])
+    for host in ("192.168.1.7:8066", "robot.example:8066", "[fe80::1]:8066", f"{socket.gethostname()}:8066"):
+        assert access.is_ours(host), host
+    for host in (
+        "evil.example:8066",
+        "192.168.1.7",
+        "robot.example:8067",
+        None,
+        "",
+        "a b:8066",
+        "robot.example:8066:1",
+    ):
+        assert not access.is_ours(host), host
+    assert access.is_own_page("https://robot.example:8066", "robot.example:8066")
+    assert not access.is_own_page("http://robot.example:8066", "robot.example:8066")
+    assert access.address.startswith("https://127.0.0.1:8066/?token=")
+    assert Access("example.org", 443, is_secure=True).is_ours("example.org")
+
+
+@pytest.mark.parametrize("token", [None, "", "x", 7, ["x"], "é" * 43, "x" * 10**3])
+def test_a_command_needs_the_token_and_a_stop_none(face: ViewFace, robot: LiveRobot, token: object) -> None:
+    async def look() -> None:
+        async with opened(face.url) as page:
+            await page.send(type="command", command="standby", token=token)
+            told = await page.told("refused")
+            assert told["what"] == "standby"
+            assert "token" in told["why"]
+            await page.send(type="stop")
+            assert (await page.told("done"))["what"] == "stop"
+
+    asyncio.run(look())
+    assert [order.command for order in robot.orders] == [Command.STOP]
+
+
+def test_with_the_token_the_robot_is_commanded(face: ViewFace, robot: LiveRobot) -> None:
+    async def look() -> None:
+        async with opened(face.url) as page:
+            for command in ("standby", "start", "resume", "reset"):
+                await page.send(type="command", command=command, token=token_of(face.url))
+                assert (await page.told("done"))["what"] == command
+            robot.refusal = "the motors are hot"
+            await page.send(type="command", command="start", token=token_of(face.url))
+            assert (await page.told("refused"))["why"] == "the motors are hot"
+
+    asyncio.run(look())
+    assert [str(order.command) for order in robot.orders] == ["standby", "start", "resume", "reset", "start"]
+    assert all("127.0.0.1" in order.by for order in robot.orders)
+
+
+def test_a_command_is_taken_back_when_its_page_leaves(face: ViewFace, robot: LiveRobot) -> None:
+    robot.refusal = None  # Nobody answers.
+
+    async def look() -> None:
+        async with opened(face.url) as page:
+            await page.send(type="command", command="resume", token=token_of(face.url))
+            while not robot.orders:
+                await asyncio.sleep(0.002)
+        while len(robot.orders) < 2:
+            await asyncio.sleep(0.002)
+
+    asyncio.run(asyncio.wait_for(look(), 20))
+    assert [order.command for order in robot.orders] == [Command.RESUME, Command.STOP]
+
+
+WRONG: list[Any] = [
+    "",
+    "x",
+    "[]",
+    "3",
+    "[" * 4000,
+    '{"type":"seek"}',
+    '{"type":"seek","time_s":NaN}',
+    '{"type":"play","speed":true}',
+    '{"type":"play","speed":0}',
+    '{"type":"play","speed":1e400}',
+    '{"type":"command","command":"quit","token":"x"}',
+    '{"type":"command","command":["stop"]}',
+    '{"type":["stop"]}',
+    '{"type":"seek","time_s":5}',
+    '{"type":"pause"}',
+]
+
+
+def test_what_makes_no_sense_is_refused_and_nothing_more(face: ViewFace, robot: LiveRobot) -> None:
+    async def look() -> None:
+        async with opened(face.url) as page:
+            for text in WRONG:
+                await page.socket.send_str(text)
+                told = await page.told("refused")
+                assert told["why"].isprintable()
+            await page.told("update")
+
+    asyncio.run(look())
+    assert robot.orders == []
+
+
+def test_large_binary_and_too_many_requests_end_the_stream(face: ViewFace, robot: LiveRobot) -> None:
+    async def code(*sent: Any) -> int | None:
+        async with opened(face.url) as page:
+            for item in sent:
+                await (page.socket.send_bytes(item) if isinstance(item, bytes) else page.socket.send_str(item))
+            while True:
+                message = await asyncio.wait_for(page.socket.receive(), 20)
+                if message.type is not aiohttp.WSMsgType.TEXT:
+                    return page.socket.close_code
+
+    assert asyncio.run(code("x" * (MAXIMUM_BYTES + 1))) == aiohttp.WSCloseCode.MESSAGE_TOO_BIG
+    assert asyncio.run(code(b"x")) == aiohttp.WSCloseCode.UNSUPPORTED_DATA
+    assert asyncio.run(code(*['{"type":"pause"}'] * (3 * BURST))) == aiohttp.WSCloseCode.POLICY_VIOLATION
+    # Each stop of one who hammers on the button counts, as long as the stream is open.
+    assert asyncio.run(code(*['{"type":"stop"}'] * (3 * BURST))) == aiohttp.WSCloseCode.POLICY_VIOLATION
+    assert len(robot.orders) >= BURST
+    assert {order.command for order in robot.orders} == {Command.STOP}
+
+
+def test_a_stop_of_a_page_that_closes_at_once_counts(face: ViewFace, robot: LiveRobot) -> None:
+    async def look() -> None:
+        async with opened(face.url) as page:
+            await page.send(type="stop")
+        while not robot.orders:
+            await asyncio.sleep(0.002)
+
+    asyncio.run(asyncio.wait_for(look(), 20))
+
+
+def test_there_is_a_limit_of_pages_and_of_connections(
+    face: ViewFace, robot: LiveRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def pages() -> None:
+        monkeypatch.setattr(server_module, "MAXIMUM_VIEWERS", 3)
+        async with opened(face.url), opened(face.url), opened(face.url):
+            with pytest.raises(aiohttp.WSServerHandshakeError) as error:
+                async with opened(face.url):
+                    pass
+            assert error.value.status == 503
+        async with opened(face.url) as page:
+            await page.told("update")
+
+    asyncio.run(pages())
+    assert MAXIMUM_VIEWERS > 3
+    monkeypatch.setattr(server_module, "MAXIMUM_CONNECTIONS", 2)
+    host, _, port = face.address.rpartition(":")
+    with (
+        socket.create_connection((host, int(port))),
+        socket.create_connection((host, int(port))),
+        pytest.raises(aiohttp.ClientError),
+    ):
+        got(face.url, "/")
+
+
+def test_who_asks_for_nothing_is_cut_off(robot: LiveRobot, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server_module, "REQUEST_LIMIT_S", 0.3)
+    with viewed(robot) as face:
+        host, _, port = face.address.rpartition(":")
+        for sent in (b"", b"GET / HTTP/1.1\r\nHost: 127.0"):
+            with socket.create_connection((host, int(port))) as silent:
+                silent.settimeout(20)
+                silent.sendall(sent)
+                with contextlib.suppress(ConnectionResetError):
+                    assert silent.recv(1) == b""
+
+
+def test_with_tls(robot: LiveRobot, tmp_path: Path) -> None:
+    authority = Authority(tmp_path)
+    certificate, key = authority.sign("localhost")
+    settings = ViewSettings("127.0.0.1:0", ServerSecurity(certificate=certificate, key=key))
+    face = ViewFace(robot.operations, settings)
+    face.start()
+    try:
+        assert face.url.startswith("https://")
+        port = int(face.address.rpartition(":")[2])
+        context = ssl.create_default_context(cafile=str(authority.file))
+        with (
+            socket.create_connection(("127.0.0.1", port)) as plain,
+            context.wrap_socket(plain, server_hostname="localhost") as secure,
+        ):
+            secure.sendall(f"GET / HTTP/1.1\r\nHost: localhost:{port}\r\n\r\n".encode())
+            assert secure.recv(20).startswith(b"HTTP/1.1 200")
+    finally:
+        face.stop()
+
+
+def test_where_it_must_not_or_cannot_listen(robot: LiveRobot, tmp_path: Path) -> None:
+    def why(settings: ViewSettings) -> str:
+        face = ViewFace(robot.operations, settings)
+        with pytest.raises(ViewError) as error:
+            face.start()
+        assert not face.is_alive
+        face.stop()
+        return str(error.value)
+
+    assert "can be reached from other machines" in why(ViewSettings("0.0.0.0:0"))
+    assert "HOST:PORT" in why(ViewSettings("nonsense"))
+    missing = ServerSecurity(certificate=tmp_path / "none.pem", key=tmp_path / "none.key")
+    assert "none.pem" in why(ViewSettings("127.0.0.1:0", missing))
+    with viewed(robot) as face:
+        assert "in use" in why(ViewSettings(face.address))
+    insecure = ServerSecurity(insecure_beyond_loopback=True)
+    face = ViewFace(robot.operations, ViewSettings("0.0.0.0:0", insecure))
+    face.start()
+    face.stop()
+    face.stop()
+    assert not face.is_alive

@@ -1,0 +1,31 @@
+"""The page of the documentation tells the limits that hold, and is listed."""
+
+from pathlib import Path
+
+from robosc.explanation.blocked import MAXIMUM_REASONS
+from robosc_bridge.remote.convert import MAXIMUM_SUPERVISOR_BYTES
+from robosc_bridge.view import ADDRESS, graphs, hub, requests, ros2_topic, server
+
+DOCS = Path(__file__).parents[3] / "docs"
+PAGE = (DOCS / "live-view.md").read_text(encoding="utf-8")
+WORDS = " ".join(PAGE.split())
+
+
+def test_the_limits() -> None:
+    assert f"| {server.MAXIMUM_VIEWERS}; {server.MAXIMUM_CONNECTIONS} |" in PAGE
+    assert f"time for a request | {server.REQUEST_LIMIT_S:g} s |" in PAGE
+    assert f"| {requests.MAXIMUM_BYTES} bytes; {server.REQUESTS_A_S:g}, {server.BURST} in a burst |" in PAGE
+    assert f"wait for an answer | {server.MAXIMUM_WAITING} |" in PAGE
+    assert f"| {hub.MAXIMUM_EVENTS}, or {hub.MAXIMUM_BYTES // 2**20} MiB |" in PAGE
+    assert f"updates a second | {1 / hub.UPDATE_S:g} |" in PAGE
+    assert f"takes no byte | {server.SEND_LIMIT_S:g} s |" in PAGE
+    assert f"| {graphs.MAXIMUM_STATES} and {graphs.MAXIMUM_EDGES} |" in PAGE
+    assert f"after {hub.FIRST_PAUSE_S:g} s at first and {hub.LONGEST_PAUSE_S:g} s at most" in WORDS
+    assert f"nothing comes for {ros2_topic.SILENCE_S:g} s" in WORDS
+    assert f"at most {MAXIMUM_REASONS}:" in WORDS
+    assert f"at most {MAXIMUM_SUPERVISOR_BYTES // 2**20} MiB" in WORDS
+    assert ADDRESS in PAGE
+
+
+def test_the_page_is_listed() -> None:
+    assert "(live-view.md)" in (DOCS / "README.md").read_text(encoding="utf-8")

@@ -1,0 +1,228 @@
+"""Logs replayed: at any time the state after the last entry before it, and all entries in their order."""
+
+import asyncio
+import json
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import hypothesis.strategies as st
+import pytest
+from hypothesis import given, settings
+
+from robosc.event_logs import LoggedRun, read_log
+from robosc.execution.event_log import json_line, plain
+from robosc_bridge.view import ViewError
+from robosc_bridge.view.replay import HISTORY, Player, Recording, Replay
+from robosc_bridge.view.sources import Pause, Play, Seek
+from support.live import LiveRobot, large_model, supervisor_without_synthesis
+from support.pages_open import opened
+from support.view_servers import served
+
+BEGIN_S, STEP_S = 1.7e9, 0.1
+SUPERVISOR = supervisor_without_synthesis(large_model(6))
+
+
+class Written:
+    """A log, with what was so after each of its entries."""
+
+    def __init__(self, folder: Path, count: int, seed: int = 1) -> None:
+        robot = LiveRobot(SUPERVISOR, seed)
+        subscription = robot.feed.subscribe(lambda: None, count)
+        self.states = [self._state(robot)]
+        for _ in range(count):
+            robot.step()
+            self.states.append(self._state(robot))
+        entries = [
+            {**entry, "time": BEGIN_S + STEP_S * number} for number, entry in enumerate(subscription.take().entries)
+        ]
+        self.events = [entry["event"] for entry in entries]
+        self.path = folder / "run.jsonl"
+        self.path.write_text("".join(map(json_line, entries)))
+
+    @staticmethod
+    def _state(robot: LiveRobot) -> Any:
+        enabled = [robot.snapshot().enabled[place] for place in range(len(robot.snapshot().enabled))]
+        state = plain(robot.system.state()), robot.locations(), [f"{name}.request" for name in enabled]
+        return json.loads(json.dumps(state))
+
+    def recording(self) -> Recording:
+        return Recording(read_log(self.path), SUPERVISOR)
+
+
+def shown(message: dict[str, Any]) -> list[Any]:
+    return [message["components"], message["communications"], message["enabled"]]
+
+
+def test_every_place_shows_the_state_after_the_last_entry_before_it(tmp_path: Path) -> None:
+    written = Written(tmp_path, 400)
+    dice = Random(1)
+
+    async def look() -> None:
+        recording = written.recording()
+        async with (
+            served(lambda: Replay(recording), is_shared=False, robot=recording.robot) as server,
+            opened(server.url) as page,
+        ):
+            definition = await page.told("definition")
+            assert definition["source"] == "log"
+            assert definition["can_command"] is False
+            assert definition["log"] == {
+                "begin_s": BEGIN_S,
+                "end_s": pytest.approx(BEGIN_S + STEP_S * 399),
+                "count": 400,
+            }
+            await page.told("update")
+            for _ in range(12):
+                number = dice.randrange(1, 400)
+                time_s = BEGIN_S + STEP_S * (number - 1) + 0.05
+                page.messages.clear()
+                await page.send(type="seek", time_s=time_s)
+                told = await page.until(_is_update_of(time_s))
+                assert shown(told) == written.states[number]
+                (position,) = [message for message in page.messages if message["type"] == "position"]
+                assert position == {"type": "position", "time_s": time_s, "is_playing": False, "speed": 1.0}
+                entries = page.entries()
+                assert [entry["number"] for entry in entries] == list(range(max(number - HISTORY, 0) + 1, number + 1))
+                assert entries[-1]["event"] == written.events[number - 1]
+                lit = [entry for entry in entries if entry["transitions"]]
+                assert len(lit) > len(entries) / 3
+
+    asyncio.run(look())
+
+
+def test_it_plays_to_the_end_and_every_entry_comes_once(tmp_path: Path) -> None:
+    written = Written(tmp_path, 300)
+
+    async def look() -> None:
+        recording = written.recording()
+        async with (
+            served(lambda: Replay(recording), is_shared=False) as server,
+            opened(server.url) as page,
+            opened(server.url) as other,
+        ):
+            await page.told("update")
+            await other.told("update")
+            await page.send(type="play", speed=40)
+            await page.until(_stands_at(BEGIN_S + STEP_S * 299))
+            await page.until(lambda message: message["type"] == "update" and shown(message) == written.states[-1])
+            assert [entry["number"] for entry in page.entries()] == list(range(1, 301))
+            assert [entry["event"] for entry in page.entries()] == written.events
+            # Each page has a place of its own.
+            assert shown(await other.told("update")) == written.states[1]
+            await page.send(type="play", speed=0.5)
+            begun = await page.told("position")
+            assert begun["is_playing"] and begun["time_s"] < BEGIN_S + 1.0
+            await page.send(type="pause")
+            await page.until(lambda message: message["type"] == "position" and not message["is_playing"])
+            await page.send(type="stop")
+            assert (await page.told("refused"))["what"] == "stop"
+
+    asyncio.run(look())
+
+
+def _is_update_of(time_s: float) -> Any:
+    return lambda message: message["type"] == "update" and message["time_s"] == pytest.approx(time_s)
+
+
+def _stands_at(time_s: float) -> Any:
+    return lambda message: (
+        message["type"] == "position" and not message["is_playing"] and message["time_s"] == pytest.approx(time_s)
+    )
+
+
+@given(
+    st.lists(
+        st.one_of(
+            st.floats(-10, 60).map(lambda value: Seek(BEGIN_S + value)),
+            st.floats(0.01, 100).map(Play),
+            st.just(Pause()),
+            st.floats(0, 20),
+        ),
+        max_size=30,
+    )
+)
+@settings(max_examples=100)
+def test_a_player_stays_within_the_log(wishes: list[Any]) -> None:
+    player = Player(RECORDING)
+    expected_s = BEGIN_S
+    for wish in wishes:
+        before_s, was_playing = player.time_s, player.is_playing
+        if isinstance(wish, float):
+            player.advance(wish)
+            expected_s = min(before_s + wish * player.speed, RECORDING.end_s) if was_playing else before_s
+        else:
+            player.steer(wish)
+            if isinstance(wish, Seek):
+                expected_s = min(max(wish.time_s, RECORDING.begin_s), RECORDING.end_s)
+            elif isinstance(wish, Play) and before_s >= RECORDING.end_s:
+                expected_s = BEGIN_S
+        assert player.time_s == expected_s
+        assert not (player.is_playing and isinstance(wish, Pause))
+        count = RECORDING.count(player.time_s)
+        assert RECORDING.times_s[count - 1] <= player.time_s
+        assert count == len(RECORDING.times_s) or RECORDING.times_s[count] > player.time_s
+
+
+def entries(*documents: dict[str, Any]) -> str:
+    return "".join(json_line({"time": BEGIN_S + number, **item}) for number, item in enumerate(documents))
+
+
+def _run(path: Path, *documents: dict[str, Any]) -> LoggedRun:
+    path.write_text(entries(*documents))
+    return read_log(path)
+
+
+def _state() -> Any:
+    return LiveRobot(SUPERVISOR).system.state()
+
+
+def test_faults_stops_and_restarts_are_told(tmp_path: Path) -> None:
+    state = {**_state(), "Motor1": {"state": "moving", "variables": {}}}
+    run = _run(
+        tmp_path / "log.jsonl",
+        {"kind": "event", "event": "go1.request", "controllable": True, "data": 1, "state": state},
+        {"kind": "stop", "what": "'/seen0' is stale"},
+        {"kind": "fault", "what": "it broke"},
+        {"kind": "resume", "what": "again"},
+        {"kind": "restart", "what": "again"},
+        {"kind": "event", "event": "hold2.request", "controllable": True, "data": None, "state": _state()},
+    )
+    recording = Recording(run, SUPERVISOR)
+    frames = [recording.frame(number) for number in range(7)]
+    assert [frame.problem for frame in frames] == ["", "", "", "it broke", "it broke", "", ""]
+    assert [frame.stops for frame in frames] == [(), (), *[("'/seen0' is stale",)] * 2, (), (), ()]
+    assert [frame.components["Motor1"]["state"] for frame in frames] == ["still", *["moving"] * 4, "still", "still"]
+    assert [frame.communications["hold2"] for frame in frames] == [*["idle"] * 6, "waiting"]
+
+
+def test_a_clock_that_was_set_back_hides_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "log.jsonl"
+    note = {"kind": "stop", "what": "x"}
+    path.write_text("".join(json_line({"time": time_s, **note}) for time_s in (10.0, 20.0, 15.0, 30.0)))
+    recording = Recording(read_log(path), SUPERVISOR)
+    assert recording.times_s == [10.0, 20.0, 20.0, 30.0]
+    assert [recording.count(time_s) for time_s in (9.0, 10.0, 16.0, 20.0, 29.0, 31.0)] == [0, 1, 1, 3, 3, 4]
+
+
+def test_a_log_of_another_model_or_without_entries_is_refused(tmp_path: Path) -> None:
+    other = {"kind": "event", "event": "dance.request", "controllable": True, "data": 1, "state": _state()}
+    with pytest.raises(ViewError, match="line 1: the model has no such event"):
+        Recording(_run(tmp_path / "a.jsonl", other), SUPERVISOR)
+    part = {**other, "event": "go1.request", "state": {"Motor1": {"state": "moving", "variables": {}}}}
+    with pytest.raises(ViewError, match="line 1"):
+        Recording(_run(tmp_path / "b.jsonl", part), SUPERVISOR)
+    with pytest.raises(ViewError, match="no entries"):
+        Recording(LoggedRun(()), SUPERVISOR)
+
+
+def _recording() -> Recording:
+    state = _state()
+    event = {"kind": "event", "event": "seen0.response", "controllable": False, "data": 1, "state": state}
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        return Recording(_run(Path(folder) / "log.jsonl", *[event] * 50), SUPERVISOR)
+
+
+RECORDING = _recording()

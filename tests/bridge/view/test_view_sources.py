@@ -1,0 +1,193 @@
+"""Sources that are lost and come back, commands over gRPC, and what a page is told where little is known."""
+
+import asyncio
+import json
+from typing import Any
+
+import pytest
+
+from robosc.execution.interpreter import InterpretedSystem
+from robosc_api.v1 import bridge_pb2 as pb
+from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.remote import RemoteSettings, convert, serve
+from robosc_bridge.view import hub as hub_module
+from robosc_bridge.view.definition import DefinitionError
+from robosc_bridge.view.facts import Happenings, Status
+from robosc_bridge.view.remote_bridge import robot_told
+from robosc_bridge.view.running import RunningBridge
+from robosc_bridge.view.sources import RefusedError
+from robosc_bridge.view.telling import NOT_EXECUTED, NOT_KNOWN, Portrait, Teller, entry_text
+from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed
+from support.pages_open import opened, token_of
+from support.view_servers import remotely_viewed, served
+
+
+@pytest.fixture
+def robot() -> LiveRobot:
+    return LiveRobot(supervisor_without_synthesis(large_model(6)))
+
+
+def test_a_bridge_that_ends_is_told_and_found_again(robot: LiveRobot, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hub_module, "FIRST_PAUSE_S", 0.1)
+    monkeypatch.setattr(hub_module, "LONGEST_PAUSE_S", 0.3)
+
+    async def look() -> None:
+        face = serve(robot.operations, RemoteSettings("127.0.0.1:0"))
+        try:
+            async with remotely_viewed(face.address) as server, opened(server.url) as page:
+                await page.told("definition")
+                await page.told("update")
+                await asyncio.to_thread(face.stop)
+                assert (await page.told("gone"))["why"]
+                await page.send(type="stop")
+                assert "bridge" in (await page.told("refused"))["why"]
+                # Who comes now is told so, too.
+                async with opened(server.url) as late:
+                    assert (await late.next())["type"] == "gone"
+                again = serve(robot.operations, RemoteSettings(face.address))
+                try:
+                    await page.told("definition")
+                    await page.told("update")
+                    robot.step()
+                    await page.until(lambda message: message["type"] == "events" and message["entries"])
+                finally:
+                    await asyncio.to_thread(again.stop)
+        finally:
+            face.stop()
+
+    asyncio.run(look())
+
+
+def test_a_bridge_elsewhere_is_commanded(robot: LiveRobot) -> None:
+    face = serve(robot.operations, RemoteSettings("127.0.0.1:0"))
+
+    async def look() -> None:
+        async with remotely_viewed(face.address) as server, opened(server.url) as page:
+            await page.told("definition")
+            await page.send(type="stop")
+            assert (await page.told("done"))["what"] == "stop"
+            await page.until(lambda message: "OPERATOR_STOP" in json.dumps(message.get("reasons")))
+            await page.send(type="command", command="resume", token=token_of(server.url))
+            assert (await page.told("done"))["what"] == "resume"
+            robot.refusal = "not now"
+            await page.send(type="command", command="start", token=token_of(server.url))
+            assert (await page.told("refused"))["why"] == "not now"
+            await page.send(type="play", speed=1)
+            assert (await page.told("refused"))["what"] == "play"
+
+    try:
+        asyncio.run(look())
+    finally:
+        face.stop()
+    assert [order.command for order in robot.orders] == [Command.STOP, Command.RESUME, Command.START]
+
+
+def test_both_ways_to_a_bridge_define_and_tell_the_same(robot: LiveRobot) -> None:
+    told = convert.definition(robot.operations)
+    near, far = RunningBridge(robot.operations).robot, robot_told(told)
+    assert near == far
+    # As a bridge of before, which did not tell its supervisor.
+    told.supervisor = b""
+    without = robot_told(told)
+    assert (without.shape, without.table, without.talks, without.requests) == (
+        near.shape,
+        near.table,
+        near.talks,
+        near.requests,
+    )
+    assert without.supervisor is None
+    # As one of later, with another format.
+    told.supervisor = b'{"format":"robosc-supervisor","version":99}'
+    assert robot_told(told).supervisor is None
+    told.definition = "[" * 100_000
+    with pytest.raises(DefinitionError):
+        robot_told(told)
+    assert isinstance(told, pb.GetDefinitionResponse)
+
+
+def test_at_rest_there_is_a_sign_of_life_and_nothing_is_executed(robot: LiveRobot) -> None:
+    robot.state = State.STANDBY
+    robot.show()
+
+    async def look(url: str) -> None:
+        async with opened(url) as page:
+            await page.told("definition")
+            first, second = await page.told("update"), await page.told("update")
+            assert second["number"] > first["number"]
+            assert second["age_s"] > first["age_s"]
+            assert (second["state"], second["components"], second["enabled"]) == ("standby", {}, [])
+            assert {tuple(item["why"]) for item in second["disabled"]} == {(NOT_EXECUTED,)}
+
+    with viewed(robot) as face:
+        asyncio.run(look(face.url))
+
+
+def test_the_feed_is_asked_only_while_somebody_looks(robot: LiveRobot) -> None:
+    async def look() -> None:
+        async with served(lambda: RunningBridge(robot.operations)) as server:
+            assert not robot.feed.is_watched
+            async with opened(server.url) as page:
+                await page.told("update")
+                assert robot.feed.is_watched
+            while robot.feed.is_watched:
+                await asyncio.sleep(0.002)
+            async with opened(server.url) as page:
+                await page.told("update")
+
+    asyncio.run(asyncio.wait_for(look(), 30))
+
+
+def update(teller: Teller, status: Status) -> Any:
+    return json.loads(teller.update(status, 1, 0.0))
+
+
+def test_what_is_not_known_is_neither_enabled_nor_not(robot: LiveRobot) -> None:
+    defined = RunningBridge(robot.operations).robot
+    teller = Teller(Portrait(defined))
+    system = InterpretedSystem(robot.supervisor)
+    told = update(teller, Status(1.0, components=system.state()))
+    named = {*told["enabled"], *(item["event"] for item in told["disabled"])}
+    assert set(defined.requests) - named == {"hold2.request", "hold5.request"}
+    wrong = {**system.state(), "Motor1": {"state": "flying", "variables": {}}}
+    told = update(teller, Status(1.0, components=wrong))
+    assert (told["enabled"], told["disabled"]) == ([], [])
+    assert "flying" in told["warnings"][0]["text"]
+    told = update(teller, Status(1.0, components=wrong, enabled=["go1"]))
+    assert told["enabled"] == ["go1.request"]
+    assert {tuple(item["why"]) for item in told["disabled"]} == {(NOT_KNOWN,)}
+
+
+def test_after_a_gap_only_what_is_sure_is_lit(robot: LiveRobot) -> None:
+    teller = Teller(Portrait(RunningBridge(robot.operations).robot))
+    system = InterpretedSystem(robot.supervisor)
+    entries: list[dict[str, Any]] = []
+    for event in ("seen0.response", "seen0.response", "go1.request", "halt1.request"):
+        assert system.step(event, system.read(event, 0)) is not None
+        entries.append({"time": 1.0, "kind": "event", "event": event, "controllable": True, "state": system.state()})
+
+    def lit(lost: int, *places: int) -> list[int]:
+        found = teller.entries(Happenings([entries[place] for place in places], lost))
+        return [len(json.loads(text)["transitions"]) for text in found]
+
+    # One state alone leads to where each of them ended.
+    assert lit(0, 0, 1, 2, 3) == [1, 1, 1, 1]
+    # Told twice: the state before is not one that it leads from.
+    assert lit(0, 3) == [0]
+    assert lit(5, 3) == [1]
+    numbers = [json.loads(text)["number"] for text in teller.entries(Happenings(entries[:1]))]
+    assert numbers == [12]
+
+
+def test_an_entry_says_what_there_is_to_say() -> None:
+    assert (
+        entry_text({"time": 1, "kind": "event", "event": "x", "data": {"value": "front_free"}}) == "value = front_free"
+    )
+    assert entry_text({"kind": "blocked", "identifier": "/go", "why": "no"}) == "/go; why: no"
+    assert entry_text({"kind": "event", "data": 3.0, "state": {}, "decision_us": 4}) == "3"
+    assert len(entry_text({"kind": "event", "data": ["x" * 100] * 100})) <= 300
+    assert entry_text({"kind": "stop", "what": "late"}) == "late"
+
+
+def test_a_live_robot_cannot_be_moved_in_time(robot: LiveRobot) -> None:
+    with pytest.raises(RefusedError):
+        RunningBridge(robot.operations).steer(None)  # type: ignore[arg-type]

@@ -45,8 +45,8 @@ _IN_REAL_TIME = (
     "tests/test_tutorial.py",
 )
 
-# Their files build packages or start servers, once for all tests of a file.
-_BY_FILE = ("tests/end_to_end/", "tests/robosc/targets/cpp/")
+# Their files build packages, or start servers or a browser, once for all tests of a file.
+_BY_FILE = ("tests/bridge/view/test_page_", "tests/end_to_end/", "tests/robosc/targets/cpp/")
 
 
 class _Scheduling(LoadScopeScheduling):  # type: ignore[misc]

@@ -3,7 +3,7 @@
 Usage: run.py [NAME...]      (all of them without an argument)
 
 Names: cold-start, conditions, execution, language, synthesis; of the bridge: decoders, drive-bases, loop-period,
-maze, reaction, endurance, twin.
+maze, reaction, endurance, live-view-pixels, twin.
 """
 
 import sys
@@ -16,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent / "bridge"))
 import decoders
 import drive_bases
 import endurance
+import live_view_pixels
 import loop_period
 import maze
 import reaction
@@ -35,6 +36,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "endurance": endurance.table,
     "execution": execution.table,
     "language": language.table,
+    "live-view-pixels": live_view_pixels.table,
     "loop-period": loop_period.table,
     "maze": maze.table,
     "reaction": reaction.table,

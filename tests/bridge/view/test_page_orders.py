@@ -53,6 +53,8 @@ def test_a_stop_that_nobody_confirms_is_told(server: StandIn, seen: Visit) -> No
     seen.page.get_by_role("button", name="STOP").click()
     server.wait_for_messages(1)
     seen.wait(ANSWER_IS, "STOP was not confirmed within 2 s. Use the switch on the robot.")
+    server.send({"type": "done", "what": "stop"})
+    seen.wait(ANSWER_IS, "STOP was heard.")
 
 
 def test_a_stop_without_a_connection_is_told_and_sent_later(server: StandIn, seen: Visit) -> None:

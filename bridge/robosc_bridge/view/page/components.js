@@ -7,6 +7,7 @@ import { told } from "./told.js";
 
 const SERVED = new Set(["service", "action"]);
 const WIDE_PX = 430;
+const LEAST_SCALE = 0.75;
 const KINDS = { controllable: "controllable", uncontrollable: "uncontrollable", silent: "silent" };
 
 class Card {
@@ -23,7 +24,9 @@ class Card {
     this.places = new Map();
     this.element = make("article", { class: isWide ? "card is-wide" : "card", "aria-labelledby": id, "data-component": component.name },
       this.headline(id, enlarge), this.frame, this.variablesList, this.communicationsList(communications));
+    this.scrolls = (component.graph?.width ?? 0) * LEAST_SCALE > WIDE_PX;
     if (this.graph) {
+      this.graph.element.style.minWidth = `${component.graph.width * LEAST_SCALE}px`;
       this.frame.append(this.graph.element);
       this.element.append(transitionsTable(component.graph));
     } else {
@@ -58,13 +61,21 @@ class Card {
   paint(shown, places) {
     const state = shown?.state ?? null;
     say(this.state, state ?? (this.graph ? "not known" : ""));
-    this.graph?.setActive(state);
+    if (this.graph && state !== this.graph.active) this.setActive(state);
     this.paintVariables(shown?.variables ?? {});
     for (const [name, place] of this.places) {
       const location = places[name] ?? "not known";
       say(place, location);
       mark(place, "data-place", location);
     }
+  }
+
+  setActive(state) {
+    this.graph.setActive(state);
+    const share = this.graph.activeShare;
+    if (!this.scrolls || share === null) return;
+    const { scrollWidth, clientWidth } = this.frame;
+    this.frame.scrollLeft = share * scrollWidth - clientWidth / 2;
   }
 
   paintVariables(variables) {

@@ -62,6 +62,12 @@ export class Graph {
     return group;
   }
 
+  /** How far along the drawing the active state is, from 0 to 1; null: nowhere. */
+  get activeShare() {
+    const state = this.layout.states.find(({ name }) => name === this.active);
+    return state ? state.x / this.layout.width : null;
+  }
+
   /** Lights the active state. */
   setActive(name) {
     if (name === this.active) return;

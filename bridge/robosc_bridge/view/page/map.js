@@ -1,6 +1,6 @@
 // The canvas: walls and line of the simulated world, the robot's way, the LiDAR's last turn.
 
-import { byId, mark, say } from "./dom.js";
+import { byId, mark, say, show } from "./dom.js";
 import { figure } from "./format.js";
 import { touch } from "./frame.js";
 import { Path } from "./path.js";
@@ -20,7 +20,7 @@ export function startMap() {
   let isFollowing = true;
   let wordsMs = -Infinity;
   // Asked of the document once a change, since each question makes it lay itself out.
-  let size = [canvas.clientWidth, canvas.clientHeight];
+  const measure = () => Object.assign(view, { width: canvas.clientWidth, height: canvas.clientHeight });
 
   const change = () => touch("map");
   const follow = (isOn) => {
@@ -87,7 +87,7 @@ export function startMap() {
   });
   for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, (event) => pointers.delete(event.pointerId));
   new ResizeObserver(() => {
-    size = [canvas.clientWidth, canvas.clientHeight];
+    measure();
     change();
   }).observe(canvas);
 
@@ -110,8 +110,11 @@ export function startMap() {
 
   return {
     build() {
-      if (told.definition.scene) fit();
-      follow(!told.definition.scene);
+      const hasScene = Boolean(told.definition.scene);
+      show(byId("surroundings"), hasScene);
+      measure();
+      if (hasScene) fit();
+      follow(!hasScene);
     },
     /** The update is new. */
     updated() {
@@ -125,13 +128,14 @@ export function startMap() {
     },
     paint() {
       const pose = poseOf();
+      if (!pose && !told.scan && !told.definition?.scene) return;
+      show(byId("surroundings"), true);
       const ratio = window.devicePixelRatio || 1;
-      const [width, height] = size;
+      const { width, height } = view;
       if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
         canvas.width = Math.round(width * ratio);
         canvas.height = Math.round(height * ratio);
       }
-      Object.assign(view, { width, height });
       if (isFollowing && pose) Object.assign(view, { x: pose[0], y: pose[1] });
       const context = canvas.getContext("2d");
       context.setTransform(ratio, 0, 0, ratio, 0, 0);

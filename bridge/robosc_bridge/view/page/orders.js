@@ -14,7 +14,7 @@ const SWITCH = "Use the switch on the robot.";
  *   called for a new definition, an answer, an update, and a change of the connection.
  */
 export function startOrders(connection, token) {
-  /** What waits for its answer, by name. */
+  /** What waits for its answer: its timer by its name, null once it is late. */
   const waiting = new Map();
   let isOwed = false;
 
@@ -33,8 +33,9 @@ export function startOrders(connection, token) {
     return connection().send(message);
   };
 
+  // What was not answered in time may be later.
   const unanswered = (what) => {
-    waiting.delete(what);
+    waiting.set(what, null);
     answer("bad", what === "stop" ? `STOP was not confirmed within 2 s. ${SWITCH}` : `${what}: no answer within 2 s.`);
   };
 

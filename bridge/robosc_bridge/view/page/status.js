@@ -12,7 +12,8 @@ export function paintRobot() {
   if (definition === null) return;
   say(byId("robot"), definition.robot);
   const deployment = definition.deployment === "layer" ? "supervision layer" : "controller";
-  say(byId("about"), `${deployment} · ${SOURCES[definition.source] ?? definition.source} · ${definition.version}`);
+  const source = SOURCES[definition.source] ?? definition.source;
+  say(byId("about"), [deployment, source, definition.version].filter(Boolean).join(" · "));
   document.title = `${definition.robot} – RoboSC live view`;
 }
 

@@ -41,6 +41,7 @@ export class Viewport {
       ([a, b, c, d], [x, y]) => [Math.min(a, x), Math.max(b, x), Math.min(c, y), Math.max(d, y)], [Infinity, -Infinity, Infinity, -Infinity]);
     this.x = (x1 + x2) / 2;
     this.y = (y1 + y2) / 2;
+    if (this.width <= 48 || this.height <= 48) return;
     const fitting = Math.min((this.width - 48) / Math.max(x2 - x1, 1), (this.height - 48) / Math.max(y2 - y1, 1));
     this.scale = Math.min(Math.max(fitting, LEAST), MOST);
   }

@@ -65,7 +65,7 @@ def told(folder: Path, entries: list[Entry], deployment: Deployment = Deployment
 
 
 def names(entries: list[Entry]) -> list[str]:
-    return [entry.get("event", entry["kind"]) for entry in entries]
+    return [str(entry.get("event", entry["kind"])) for entry in entries]
 
 
 def test_the_log_is_right(tmp_path: Path) -> None:

@@ -142,22 +142,25 @@ def run(arguments: argparse.Namespace) -> int:
     connections: Sequence[str] = list(dict.fromkeys(arguments.connection)) or ["serial"]
     if arguments.scene is not None and len(names) > 1:
         raise UsageError("--scene is the world of one experiment: name it with --experiment")
+    from robosc_bridge.experiments.processes import interruptible
     from robosc_bridge.experiments.report import write_report
 
     folder: Path = arguments.output
     progress = ProgressLine()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        report = evaluated(
-            [EXPERIMENTS[name] for name in names],
-            connections,
-            folder,
-            scene=arguments.scene,
-            speed=arguments.speed,
-            seed=arguments.seed,
-            has_cycles=not arguments.no_cycles,
-            say=progress.show,
-        )
+        # However it is told to end, no server, bridge or robot runs on.
+        with interruptible():
+            report = evaluated(
+                [EXPERIMENTS[name] for name in names],
+                connections,
+                folder,
+                scene=arguments.scene,
+                speed=arguments.speed,
+                seed=arguments.seed,
+                has_cycles=not arguments.no_cycles,
+                say=progress.show,
+            )
         files = write_report(report, folder)
     except OSError as error:
         raise UsageError(f"cannot write {error.filename or folder}: {error.strerror or error}") from error

@@ -23,7 +23,6 @@ from robosc.targets import generate, write_files
 from robosc_bridge.experiments.line import BOX, FREE_M, HELD_S, line_figures
 from robosc_bridge.experiments.line import MODEL as LINE_MODEL
 from robosc_bridge.experiments.maze import LIMIT_S, WORLD_LIMIT_S, way_figures
-from robosc_bridge.experiments.maze import MODEL as MAZE_MODEL
 from robosc_bridge.experiments.processes import Program, finish
 from robosc_bridge.experiments.scenario import Connection, Outcome, Say, ScenarioError
 from robosc_bridge.experiments.serial import EXAMPLES, scene_of
@@ -33,6 +32,8 @@ from robosc_bridge.simulated.motion import Motion, MotionError, read_motion
 from robosc_bridge.simulated.scene import Scene
 
 HELPERS = EXAMPLES / "robosc_examples"
+MAZE_MODEL = EXAMPLES / "maze_solver" / "maze_solver.rscd"
+"""For the ways of 1 m that the mazes of the package have."""
 
 FASTEST, SLOWEST = 25.0, 0.5
 """How many times as fast as the clock the world may pass."""
@@ -308,7 +309,7 @@ def run_maze(
         speed: How many times as fast as the clock the world passes.
         say: Takes lines of progress.
         seed: Of what the scene leaves to chance.
-        model: Another one, with the communications of `narrow_maze.rscd`.
+        model: Another one, with the communications of `maze_solver.rscd`.
 
     Raises:
         ScenarioError: It could not be run to its end. A robot that does not find the way out is no such error, but a

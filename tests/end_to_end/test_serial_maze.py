@@ -8,7 +8,7 @@ import pytest
 from robosc.event_logs import read_log
 from robosc_bridge.experiments.maze import run_maze
 
-SPEED = 12.0
+SPEED = 10.0
 
 
 @pytest.mark.parametrize(("scene", "seed"), [("maze-rooms", 0), ("maze-spiral", 0), ("maze-random", 3)])

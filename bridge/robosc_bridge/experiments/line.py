@@ -93,7 +93,7 @@ def run_line(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: i
         motion=rig.motion,
         supervisor=rig.supervisor,
         scene=place,
-        faults=(*play.faults, *judge_line(place, motion, play.stops), *log_faults(rig)),
+        faults=(*play.faults, *judge_line(place, motion, play.halts), *log_faults(rig)),
         figures={
             **figures,
             **line_figures(place, motion),
@@ -107,12 +107,12 @@ class _Play:
     """What happens to the robot, one after the other.
 
     Attributes:
-        stops: When it had to stand still.
+        halts: When it had to stand still.
         faults: What it should have done, and did not within the time that it had.
     """
 
     def __init__(self, rig: Rig, follower: Program, say: Say) -> None:
-        self.stops: list[Halt] = []
+        self.halts: list[Halt] = []
         self.faults: list[str] = []
         self._rig = rig
         self._follower = follower
@@ -127,7 +127,7 @@ class _Play:
         with BridgeClient(self._rig.address, Credentials()) as operator, suppress(_TooLateError):
             self._drive("along the line")
             tell(f"obstacle {BOX} back")
-            self._stand("for the box on the line", lambda: tell(f"obstacle {BOX} away"))
+            self._stand("for the box on the line", lambda: tell(f"obstacle {BOX} away"), is_at_once=False)
             self._drive("without the box")
             tell("press button_1")
             self._stand("after the stop button", lambda: (tell("let button_1"), tell("press button_2")))
@@ -147,8 +147,15 @@ class _Play:
             if driven_m >= FREE_M:
                 return
 
-    def _stand(self, what: str, let_go: Callable[[], object]) -> None:
-        """Until it has stood still for a while; then it may go on."""
+    def _stand(self, what: str, let_go: Callable[[], object], *, is_at_once: bool = True) -> None:
+        """Until it has stood still for a while; then it may go on.
+
+        Args:
+            what: Why it stands.
+            let_go: Lets it go on.
+            is_at_once: Whether it has to from now on; else from when it does.
+        """
+        told_s = latest(self._rig.motion).world_s
         begin_s: float | None = None
         for now in self._looks(f"did not stand still {what}", f"stands {what}"):
             if not now.is_standing:
@@ -156,7 +163,7 @@ class _Play:
             elif begin_s is None:
                 begin_s = now.world_s
             elif now.world_s - begin_s >= HELD_S:
-                self.stops.append(Halt(begin_s, now.world_s, what))
+                self.halts.append(Halt(told_s if is_at_once else begin_s, now.world_s, what))
                 let_go()
                 return
 

@@ -148,8 +148,8 @@ def configuration(setting: Setting, base: str, scanner: str, camera: str | None)
         camera: Socket of the camera; None: there is none.
     """
     speed = setting.speed
-    # The least that the safety layer takes: twice the period, and some turns of a fast LiDAR.
-    loop_limit_s, scan_limit_s = min(max(0.8 / speed, 0.04), 0.3), min(max(1.0 / speed, 0.05), 0.6)
+    # The least that the bridge takes: twice the period, and more than a turn of the LiDAR.
+    loop_limit_s, scan_limit_s = min(max(0.8 / speed, 0.04), 0.3), min(max(1.0 / speed, 0.22), 0.6)
     # One exchange, and one to be felt; gain times delay stays below 1/e (`robosc_bridge.skills.rotate`).
     delay_s = min(2 * 0.02 * speed, 2 * PATIENCE_S) + 0.04
     skills = {

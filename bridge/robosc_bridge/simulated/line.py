@@ -35,6 +35,8 @@ _FINE_S = 0.001
 # A world that passes faster is lived in fewer and larger pieces: a wake-up for each frame would be thousands a second.
 _COARSE_S = 0.002
 _PIECE = 1024
+# Less than a turn of any LiDAR: who leaves more unread is behind.
+_MOST_UNREAD = 1024
 _BAUDS = {
     getattr(termios, f"B{baud}"): baud
     for baud in (
@@ -151,6 +153,9 @@ class SimulatedLine:
         self._link = link
         self.path = str(self._link)
         self._wire: deque[tuple[float, bytes]] = deque()
+        # Bytes that were unread when it had sent last, and whether any were ever read.
+        self._waiting = 0
+        self._is_used = False
         self._master = self._slave = -1
         self._woken, self._waker = os.pipe()
         os.set_blocking(self._woken, False)
@@ -198,6 +203,7 @@ class SimulatedLine:
         self._is_open = False
         self._wake()
         self._thread.join()
+        self._time.read(self, is_behind=False)
         self._time.leave(self._catch_up)
         self.disconnect()
         self._give_back()
@@ -280,11 +286,21 @@ class SimulatedLine:
 
     def _live(self) -> None:
         with self._time.lock:
+            if self._time.waits:
+                self._look_at_the_host()
             # It lives on without a line, and what it sends then goes nowhere.
             sendings = self.device.live()
             if self._master >= 0:
                 self._send(sendings)
             self._flush()
+            if self._time.waits:
+                self._waiting = self._unread() if self._master >= 0 else 0
+
+    def _look_at_the_host(self) -> None:
+        """Whether the host is behind; nobody waits for one that has no use for this line, and reads nothing of it."""
+        unread = self._unread() if self._master >= 0 else 0
+        self._is_used = self._is_used or unread < self._waiting
+        self._time.read(self, is_behind=self._is_used and unread > _MOST_UNREAD)
 
     def _limit_s(self) -> float:
         wire_s = self._wire[0][0] - time.monotonic() if self._wire else math.inf

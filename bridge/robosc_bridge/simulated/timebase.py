@@ -25,7 +25,7 @@ class Timebase:
         clock: `SystemClock`: the devices live by themselves. `ManualClock`: they live when `advance` is called.
         factor: How many seconds pass in the world in one of the clock.
         patience_s: How many seconds may pass in the world after the host was heard; then it stands still until it is
-            heard again, or for the first time. None: it never waits.
+            heard again, or for the first time, and is not behind with what was sent to it. None: it never waits.
 
     Raises:
         ValueError: The factor or the patience is no positive, finite number.
@@ -44,6 +44,7 @@ class Timebase:
         # By the world's time: when it waits next, and how long it has waited.
         self._limit_s = math.inf if patience_s is None else patience_s
         self._waited_s = 0.0
+        self._unread: set[object] = set()
         self._members: list[Callable[[], None]] = []
 
     @property
@@ -68,7 +69,18 @@ class Timebase:
         """The host has sent something: the world need not wait for it."""
         if self._patience_s is not None:
             with self.lock:
-                self._limit_s = self.world_s() + self._patience_s
+                if not self._unread:
+                    self._limit_s = self.world_s() + self._patience_s
+
+    @property
+    def waits(self) -> bool:
+        """Whether the world waits for its host at all."""
+        return self._patience_s is not None
+
+    def read(self, line: object, *, is_behind: bool) -> None:
+        """The host is behind with what was sent on a line, or not any more: while it is, hearing it is not enough."""
+        with self.lock:
+            (self._unread.add if is_behind else self._unread.discard)(line)
 
     def join(self, live: Callable[[], None]) -> None:
         """Call this whenever `advance` has moved the clock by a step."""

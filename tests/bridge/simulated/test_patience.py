@@ -54,3 +54,27 @@ def test_any_byte_of_the_host_lets_a_robots_world_go_on() -> None:
             finally:
                 os.close(port)
             assert robot.time.world_s() == pytest.approx(before_s + 0.5, abs=0.011)
+
+
+def test_the_world_waits_for_a_host_that_does_not_read_what_its_lidar_sends() -> None:
+    with SimulatedTurtleBot3("burger", "opencr", "lds01", clock=ManualClock(), patience_s=0.5) as robot:
+        base, scanner = (os.open(path, os.O_RDWR | os.O_NOCTTY) for path in (robot.base_path, robot.scanner_path))
+        try:
+
+            def live(seconds: float) -> float:
+                begin_s = robot.time.world_s()
+                for _ in range(round(seconds / 0.05)):
+                    os.write(base, b"b")
+                    robot.advance(0.05)
+                return robot.time.world_s() - begin_s
+
+            # It has not read anything yet: it may have no use for a LiDAR.
+            assert live(2.0) == pytest.approx(2.0)
+            assert os.read(scanner, 100)
+            assert live(2.0) < 0.6
+            while len(os.read(scanner, 4096)) == 4096:
+                pass
+            assert live(0.3) == pytest.approx(0.3, abs=0.06)
+        finally:
+            os.close(base)
+            os.close(scanner)

@@ -180,6 +180,14 @@ def test_a_graph_as_the_layout_has_it(browser: Browser) -> None:
         assert seen.errors == []
 
 
+def test_a_graph_that_is_too_large_is_told(server: StandIn, seen: Visit) -> None:
+    note = "() => document.querySelector('[data-component=Sensor] p').textContent"
+    seen.wait(f"() => ({note})() === 'No behaviour of its own.'")
+    server.send(update(components=parts(Sensor="seeing")))
+    seen.wait(f"() => ({note})() === 'Its graph is too large to be drawn.'")
+    assert seen.text("[data-component=Sensor] .card-state") == "seeing"
+
+
 def test_components_and_requests_are_narrowed_by_name(server: StandIn, seen: Visit) -> None:
     server.send(update())
     seen.page.get_by_label("Filter components by name").fill("GRI")

@@ -8,6 +8,8 @@ import { told } from "./told.js";
 const SERVED = new Set(["service", "action"]);
 const WIDE_PX = 430;
 const LEAST_SCALE = 0.75;
+const NO_BEHAVIOUR = "No behaviour of its own.";
+const TOO_LARGE = "Its graph is too large to be drawn.";
 const KINDS = { controllable: "controllable", uncontrollable: "uncontrollable", silent: "silent" };
 
 class Card {
@@ -31,7 +33,8 @@ class Card {
       this.element.append(transitionsTable(component.graph));
     } else {
       this.frame.remove();
-      this.element.append(make("p", { class: "quiet" }, "No behaviour of its own."));
+      this.note = make("p", { class: "quiet" }, NO_BEHAVIOUR);
+      this.element.append(this.note);
     }
   }
 
@@ -62,6 +65,7 @@ class Card {
     const state = shown?.state ?? null;
     say(this.state, state ?? (this.graph ? "not known" : ""));
     if (this.graph && state !== this.graph.active) this.setActive(state);
+    if (this.note) say(this.note, state === null ? NO_BEHAVIOUR : TOO_LARGE);
     this.paintVariables(shown?.variables ?? {});
     for (const [name, place] of this.places) {
       const location = places[name] ?? "not known";

@@ -149,7 +149,7 @@ def configuration(setting: Setting, base: str, scanner: str, camera: str | None)
     """
     speed = setting.speed
     # The least that the bridge takes: twice the period, and more than a turn of the LiDAR.
-    loop_limit_s, scan_limit_s = min(max(0.8 / speed, 0.04), 0.3), min(max(1.0 / speed, 0.22), 0.6)
+    loop_limit_s, scan_limit_s = min(max(1.2 / speed, 0.04), 0.3), min(max(1.0 / speed, 0.22), 0.6)
     # One exchange, and one to be felt; gain times delay stays below 1/e (`robosc_bridge.skills.rotate`).
     delay_s = min(2 * 0.02 * speed, 2 * PATIENCE_S) + 0.04
     skills = {

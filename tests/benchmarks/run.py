@@ -2,8 +2,8 @@
 
 Usage: run.py [NAME...]      (all of them without an argument)
 
-Names: cold-start, conditions, execution, language, synthesis; of the bridge: decoders, drive-bases, loop-period,
-reaction, endurance.
+Names: cold-start, conditions, execution, language, synthesis; of the bridge: decoders, drive-bases, live-view,
+loop-period, reaction, endurance.
 """
 
 import sys
@@ -16,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent / "bridge"))
 import decoders
 import drive_bases
 import endurance
+import live_view
 import loop_period
 import reaction
 
@@ -33,6 +34,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "endurance": endurance.table,
     "execution": execution.table,
     "language": language.table,
+    "live-view": live_view.table,
     "loop-period": loop_period.table,
     "reaction": reaction.table,
     "synthesis": synthesis.table,

@@ -2,8 +2,8 @@
 
 Usage: run.py [NAME...]      (all of them without an argument)
 
-Names: cold-start, conditions, execution, language, synthesis; of the bridge: decoders, drive-bases, loop-period,
-maze, reaction, endurance, live-view-pixels, twin.
+Names: cold-start, conditions, execution, language, synthesis; of the bridge: decoders, drive-bases, live-view,
+live-view-pixels, loop-period, maze, reaction, endurance, twin.
 """
 
 import sys
@@ -16,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent / "bridge"))
 import decoders
 import drive_bases
 import endurance
+import live_view
 import live_view_pixels
 import loop_period
 import maze
@@ -36,6 +37,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "endurance": endurance.table,
     "execution": execution.table,
     "language": language.table,
+    "live-view": live_view.table,
     "live-view-pixels": live_view_pixels.table,
     "loop-period": loop_period.table,
     "maze": maze.table,

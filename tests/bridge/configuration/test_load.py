@@ -127,7 +127,7 @@ zz: 1
         "c.yaml:17: channels[\"/e\"].keys: there is no such key; did you mean 'key'?",
         f'c.yaml:18: channels["/f"].channel: there is no channel 7; there is {channels}',
         "c.yaml:19: zz: there is no such key; there is channels, drive, execution, log, remote, robot, safety, "
-        "scanner, skills, supervisor",
+        "scanner, skills, supervisor, view",
     ]
 
 

@@ -47,7 +47,7 @@ def files(tmp_path: Path) -> tuple[Path, Path]:
 
 
 def arguments(*words: str) -> argparse.Namespace:
-    parser = Parser(prog="robosc")
+    parser: argparse.ArgumentParser = Parser(prog="robosc")
     command.add_parser(parser.add_subparsers())
     return parser.parse_args(["view", *words])
 

@@ -4,13 +4,16 @@ from random import Random
 from typing import Any
 
 import hypothesis.strategies as st
+import pytest
 from hypothesis import given, settings
 
 from robosc.execution.event_log import plain
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.explanation.blocked import MAXIMUM_REASONS, Requests
+from robosc.explanation.blocked import MAXIMUM_REASONS, Requests, StateError, read_value
+from robosc.expressions import BooleanType, DoubleType, EnumType, IntegerType, StringType
 from robosc.model.structure import CommunicationKind
 from robosc.supervisor import Supervisor
+from support.generated import example_supervisor
 from support.random_supervisors import random_data, random_supervisor
 
 _CALLED = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
@@ -83,3 +86,49 @@ def test_what_is_told_without_locations_holds_with_them(seed: int) -> None:
         assert {item.event for item in part.blocked} <= {item.event for item in whole.blocked}
         told = {*part.enabled, *part.unknown, *(item.event for item in part.blocked)}
         assert told == set(requests.events)
+
+
+def test_the_sentences_are_in_the_words_of_the_model() -> None:
+    supervisor = example_supervisor("maze_solver/maze_solver")
+    system, requests = InterpretedSystem(supervisor), Requests(supervisor.model, supervisor.added)
+    turning: dict[str, Any] = {**system.state(), "Rotator": {"state": "idle", "variables": {}}}
+    states = [item.name for item in supervisor.model.component("Rotator").behaviour.states]  # type: ignore[union-attr]
+    turning["Rotator"]["state"] = next(name for name in states if name != "idle")
+    found = {item.event: item.why for item in requests.judge(turning, {}).blocked}
+    (first, second) = found["rotate_left.request"]
+    assert first == f"Rotator is in {turning['Rotator']['state']}, not in idle"
+    assert second.startswith("requirement rotate_left needs Rotator.idle and LidarSensor.front = front_wall: ")
+    assert second.endswith(f"Rotator.idle does not hold (Rotator is {turning['Rotator']['state']})")
+
+
+@pytest.mark.parametrize(
+    ("type_", "raw", "value"),
+    [
+        (BooleanType(), "true", True),
+        (BooleanType(), 1, None),
+        (IntegerType(), 3.0, 3),
+        (IntegerType(), "-3", -3),
+        (IntegerType(), 3.5, None),
+        (IntegerType(), True, None),
+        (IntegerType(0, 5), 6, None),
+        (IntegerType(), "9" * 50, None),
+        (DoubleType(), "1.5", 1.5),
+        (DoubleType(), 10**400, None),
+        (DoubleType(), "x" * 10**6, None),
+        (EnumType("Kind", ("small",)), "small", "small"),
+        (EnumType("Kind", ("small",)), "large", None),
+        (StringType(), "large", "large"),
+        (StringType(), ["large"], None),
+    ],
+)
+def test_what_comes_from_elsewhere_is_read_by_its_type(type_: Any, raw: Any, value: Any) -> None:
+    found = read_value(type_, raw)
+    assert (found, type(found)) == (value, type(value))
+
+
+def test_a_state_of_another_model_is_refused() -> None:
+    supervisor = example_supervisor("maze_solver/maze_solver")
+    requests, state = Requests(supervisor.model, supervisor.added), InterpretedSystem(supervisor).state()
+    for wrong in ({}, {**state, "Rotator": 3}, {**state, "Rotator": {"state": "flying"}}, {**state, "LidarSensor": {}}):
+        with pytest.raises(StateError):
+            requests.judge(wrong, {})

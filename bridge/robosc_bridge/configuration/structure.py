@@ -226,6 +226,11 @@ class View(_Section, frozen=True):
     insecure_beyond_loopback: Annotated[
         bool, Meta(description="Serve it without TLS where other machines reach it, on a network that is trusted.")
     ] = False
+    scene: Annotated[
+        _Text | None,
+        Meta(description="Name or file of a scene (docs/twin.md) whose walls and line the map shows; null: none."),
+    ] = None
+    scene_seed: Annotated[int, Meta(ge=0, le=2**31, description="Seed of what the scene leaves to chance.")] = 0
 
 
 class SupervisorSource(_Section, frozen=True):

@@ -253,6 +253,14 @@ def _require_faces(configuration: Configuration, ties: Ties) -> None:
             check_listening(page.address, page.security)
         except (SecurityError, ValueError) as error:
             raise AssemblyError(f"view: {error}") from error
+        if page.scene is not None:
+            # Where nobody wants one, nothing of the simulator is loaded.
+            from robosc_bridge.view.scenery import scenery
+
+            try:
+                scenery(page.scene, page.scene_seed)
+            except BridgeError as error:
+                raise AssemblyError(f"view: {error}") from error
 
 
 def assemble(

@@ -71,6 +71,14 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
             help=f"another folder with {what} of the model, as for 'robosc synth' (may be repeated)",
         )
     add_engine_options(parser)
+    parser.add_argument(
+        "--scene",
+        metavar="NAME|FILE",
+        help="a scene of the simulator, whose walls and line the map shows, from where the robot began",
+    )
+    parser.add_argument(
+        "--scene-seed", type=int, default=0, metavar="N", help="of what the scene leaves to chance (default: 0)"
+    )
     _add_serving(parser)
     _add_client(parser)
     parser.set_defaults(run=run)
@@ -167,6 +175,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _source(arguments: argparse.Namespace) -> "tuple[Callable[[], Source], bool, Robot | None]":
     """What makes the source, whether all pages share one, and the robot where it is known."""
+    from robosc_bridge.view.scenery import scenery
+
+    scene = scenery(arguments.scene, arguments.scene_seed)
     if arguments.bridge is not None:
         from robosc_api.security import SecurityError, check_credentials, credentials_of
         from robosc_bridge.view.remote_bridge import RemoteBridge
@@ -176,17 +187,17 @@ def _source(arguments: argparse.Namespace) -> "tuple[Callable[[], Source], bool,
             check_credentials(credentials)
         except SecurityError as error:
             raise UsageError(str(error)) from error
-        return lambda: RemoteBridge(arguments.bridge, credentials), True, None
+        return lambda: RemoteBridge(arguments.bridge, credentials, scene), True, None
     supervisor = None if arguments.model is None else _supervisor(arguments)
     if arguments.ros2:
         from robosc_bridge.view.ros2_topic import StateTopic
 
         _require_ros2()
-        return lambda: StateTopic(arguments.namespace, supervisor), True, None
+        return lambda: StateTopic(arguments.namespace, supervisor, scene), True, None
     from robosc_bridge.view.replay import Recording, Replay
 
     assert supervisor is not None  # noqa: S101  # `run` has seen to that.
-    recording = Recording(_log(arguments.log), supervisor)
+    recording = Recording(_log(arguments.log), supervisor, scene)
     return lambda: Replay(recording), False, recording.robot
 
 

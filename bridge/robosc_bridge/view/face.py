@@ -21,7 +21,7 @@ class ViewFace:
         settings: Where and how.
 
     Raises:
-        ViewError: The extra `view` is not installed.
+        ViewError: The extra `view` is not installed, or there is no such scene.
 
     Attributes:
         address: `HOST:PORT` that it listens on; empty: it does not yet.
@@ -33,10 +33,11 @@ class ViewFace:
 
         require_view()
         from robosc_bridge.view.running import RunningBridge
+        from robosc_bridge.view.scenery import scenery
         from robosc_bridge.view.server import ViewServer
 
         self.address = self.url = ""
-        source = RunningBridge(operations)
+        source = RunningBridge(operations, scenery(settings.scene, settings.scene_seed))
         # Laid out before the robot moves: a large automaton would hold up everything for a while.
         self._server = ViewServer(settings, lambda: source, is_shared=True, robot=source.robot)
         self._failure: BaseException | None = None

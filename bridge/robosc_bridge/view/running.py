@@ -4,6 +4,8 @@ import asyncio
 import contextlib
 import math
 import time
+from collections.abc import Mapping
+from typing import Any
 
 from robosc._version import __version__
 from robosc_bridge.configuration.channels import channel_name
@@ -24,13 +26,19 @@ class RunningBridge:
 
     Args:
         operations: The daemon.
+        scene: For the map.
     """
 
-    def __init__(self, operations: Operations) -> None:
+    def __init__(self, operations: Operations, scene: Mapping[str, Any] | None = None) -> None:
         self._operations = operations
         channels = {name: channel_name(item) for name, item in operations.ties.channels.items()}
         self.robot: Robot = robot_of(
-            operations.supervisor, SourceKind.BRIDGE, version=__version__, channels=channels, can_command=True
+            operations.supervisor,
+            SourceKind.BRIDGE,
+            version=__version__,
+            channels=channels,
+            can_command=True,
+            scene=scene,
         )
 
     async def run(self, sink: Sink) -> None:

@@ -18,11 +18,15 @@ class ViewSettings:
         address: `HOST:PORT`; port 0 picks a free one.
         security: The certificate.
         names: Further names by which browsers reach the server.
+        scene: Name or file of a scene that the map shows; None: none.
+        scene_seed: Of what the scene leaves to chance.
     """
 
     address: str = ADDRESS
     security: ServerSecurity = field(default_factory=ServerSecurity)
     names: tuple[str, ...] = ()
+    scene: str | None = None
+    scene_seed: int = 0
 
 
 def settings_of(configuration: Configuration) -> ViewSettings | None:
@@ -40,4 +44,4 @@ def settings_of(configuration: Configuration) -> ViewSettings | None:
         key=None if view.tls_key is None else Path(view.tls_key),
         insecure_beyond_loopback=view.insecure_beyond_loopback,
     )
-    return ViewSettings(chosen, security, view.names)
+    return ViewSettings(chosen, security, view.names, view.scene, view.scene_seed)

@@ -25,6 +25,7 @@ OPEN = {
     "line_follower": set[str](),
     "line_follower_layer": set[str](),
     "maze_solver": set[str](),
+    "narrow_maze": set[str](),
     "ball_pusher": {"/ball", "/goal", "/scored", "/kick_off", "/push", "/pushed", "circle"},
     "navigation": {"/calibrate", "/person/distance", "/navigate_to_pose"},
     "object_finder": {"/camera/detection", "/search", "/announce"},

@@ -86,6 +86,7 @@ def test_wrong_use(files: tuple[Path, Path], tmp_path: Path) -> None:
     assert "cannot read" in why("--log", str(tmp_path / "none"), "--model", model)
     assert "there is no file" in why("--log", log, "--model", str(tmp_path / "none.rscd"))
     assert "line 1" in why("--log", model, "--model", model)
+    assert "there is no scene" in why("--log", log, "--model", model, "--scene", "nowhere")
     assert "other machines" in why("--log", log, "--model", model, "--address", "0.0.0.0:0")
     for words in ((), ("--ros2", "--bridge", "127.0.0.1:1"), ("--bridge", "x"), ("--ros2", "--address", "h:99999")):
         with pytest.raises(SystemExit):
@@ -123,10 +124,11 @@ def test_what_a_configuration_says() -> None:
         return parse((plain + text).encode(), "c.yaml").configuration
 
     assert settings_of(configured("")) is None
-    chosen = configured("view: {address: '127.0.0.1:8066', names: [robot.example]}")
+    chosen = configured("view: {address: '127.0.0.1:8066', names: [robot.example], scene: room, scene_seed: 3}")
     settings = settings_of(chosen)
     assert settings is not None
     assert (settings.address, settings.names) == (ADDRESS, ("robot.example",))
+    assert (settings.scene, settings.scene_seed) == ("room", 3)
     assert is_startable(chosen) and not is_remote(chosen)
     with pytest.raises(Exception, match="'tls_key' is missing"):
         configured("view: {address: '127.0.0.1:8066', tls_certificate: x.pem}")

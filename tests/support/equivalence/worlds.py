@@ -112,7 +112,7 @@ def _maze_solver() -> Run:
             if _MAZE[y + dy][x + dx] != "#":
                 x, y = x + dx, y + dy
         (bx, by), (rx, ry) = _DIRECTIONS[(heading + 2) % 4], _DIRECTIONS[(heading + 3) % 4]
-        back_right = 0.5 if _MAZE[y + by + ry][x + bx + rx] == "#" else 2.0
+        back_right = 0.52 if _MAZE[y + by + ry][x + bx + rx] == "#" else 2.0
         right, left = distance(3), distance(1)
         coming.append(_scan(2.0, left=left, back=2.0, back_right=back_right, right=right, front=distance(0)))
         issued = yield coming

@@ -4,10 +4,13 @@ import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from robosc.errors import RoboscError
 from robosc.event_logs.structure import LogEntry, LoggedRun
+
+if TYPE_CHECKING:
+    from typing_extensions import TypeIs
 
 MAXIMUM_BYTES = 1 << 29
 """Size of a file beyond which it is not read."""
@@ -97,7 +100,7 @@ class _Reading:
 
     def _entry(self, number: int, document: dict[str, Any]) -> LogEntry:
         time_s, kind = document.get("time"), document.get("kind")
-        if not isinstance(time_s, int | float) or isinstance(time_s, bool) or not math.isfinite(time_s):
+        if not _is_time(time_s):
             self._refuse(number, "its 'time' is no number of seconds")
         if not isinstance(kind, str) or not 0 < len(kind) <= _MAXIMUM_NAME:
             self._refuse(number, "it has no 'kind'")
@@ -133,6 +136,16 @@ class _Reading:
 
     def _refuse(self, number: int, why: str) -> NoReturn:
         raise LogError(f"{self._name}, line {number}: {why}")
+
+
+def _is_time(value: object) -> "TypeIs[int | float]":
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        # A whole number of hundreds of digits.
+        return False
 
 
 def _is_component(part: object) -> bool:

@@ -80,6 +80,7 @@ def test_lines_that_were_torn_by_a_full_disk_are_those_that_the_log_counts(tmp_p
         ({"kind": "event"}, "its 'time' is no number of seconds"),
         (event(True), "its 'time' is no number of seconds"),
         ('{"time": 1e999, "kind": "x"}', "its 'time' is no number of seconds"),
+        ('{"time": 1' + "0" * 400 + ', "kind": "x"}', "its 'time' is no number of seconds"),
         ({"time": 1.0}, "it has no 'kind'"),
         (event(name=""), "its 'event' is no event's name"),
         (event(name="x" * 601), "its 'event' is no event's name"),

@@ -16,11 +16,11 @@ _IS_ONE_WORD = re.compile(r"[a-z0-9]+")
 NO_CODES = frozenset(
     {
         *("utf-8", "utf-8-sig", "robosc-supervisor", "explain-synthesis", "only-uncontrollable", "unreachable-state"),
-        "ssh-ed25519",
+        *("ssh-ed25519", "check-log", "triangle-up"),
         *(info.name for info in available_targets()),
     }
 )
-"""Texts of the source that look like codes and are none: a command, its remarks, a kind of key, names of targets."""
+"""Texts of the source that look like codes and are none: commands, their remarks, kinds of keys and marks, targets."""
 
 # The pages themselves, and the models that a new robot begins with.
 _ELSEWHERE = ("explain", "starter")

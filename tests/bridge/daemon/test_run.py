@@ -218,7 +218,10 @@ def test_standby_without_a_remote_face_is_refused(tmp_path: Path) -> None:
         file = configured(tmp_path, robot, "opencr")
         done = bridge("run", "--standby", "--model", str(MODEL), "--config", str(file))
     assert done.returncode == 2
-    assert "to wait in standby, the bridge needs 'remote.grpc_address' or 'remote.mavlink_url'" in done.stderr
+    assert (
+        "to wait in standby, the bridge needs 'remote.grpc_address', 'remote.mavlink_url' or 'view.address'"
+        in done.stderr
+    )
 
 
 def test_drivers_are_listed_for_people_and_programs() -> None:

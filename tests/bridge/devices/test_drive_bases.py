@@ -120,7 +120,7 @@ def test_in_a_world_that_is_faster_no_motion_is_taken_for_a_restart(kind: str) -
         bench.drive_until(_is_at_rest)
         reading = bench.drive(seconds=0.05)
         assert bench.robot.world.pose[2] > 4.0
-        assert math.cos(reading.pose.heading_rad - bench.robot.world.pose[2]) == pytest.approx(1.0, abs=1e-3)
+        assert math.cos(reading.pose.heading_rad - bench.robot.world.pose[2]) == pytest.approx(1.0, abs=1e-2)
 
 
 def test_torque_off_is_after_a_stop_and_on_again_without_motion(any_bench: Rig) -> None:

@@ -133,7 +133,7 @@ def test_a_signed_vehicle_is_driven_with_its_key_alone(tmp_path: Path, monkeypat
     monkeypatch.setattr(mavlink_rover, "_FIRST_HEARTBEAT_LIMIT_S", 1.0)
     key_file = tmp_path / "key"
     key_file.write_text(KEY.hex())
-    with rig(key=KEY, signing=Signing(key_file)) as bench:
+    with rig(key=KEY, signing_key=str(key_file)) as bench:
         # Its clock does not go back to when it was built.
         bench.rover._encoder.timestamp = Signing(key_file).begin().timestamp()
         bench.start()

@@ -397,7 +397,8 @@ class _Watch:
         self.faults: list[str] = []
         self._stage = stage
         self._say = say
-        self._events = LineCount(stage.setting.event_log)
+        # The node makes its log when it has started.
+        self._events: LineCount | None = None
         self._begin_s = time.monotonic()
 
     def looks(self, what: str, limit_s: float) -> Iterator[Now]:
@@ -407,11 +408,20 @@ class _Watch:
             self._stage.require()
             now = latest(self._stage.setting.motion)
             self._say(
-                f"{what}: x {now.x_m:+.2f} m  y {now.y_m:+.2f} m  {self._events.look()} events  "
+                f"{what}: x {now.x_m:+.2f} m  y {now.y_m:+.2f} m  {self._count()} events  "
                 f"{now.world_s:.1f} s of the world in {time.monotonic() - self._begin_s:.1f} s"
             )
             yield now
             time.sleep(_LOOK_S)
+
+    def _count(self) -> int:
+        """Entries of the log so far."""
+        if self._events is None:
+            found = list(self._stage.setting.events.glob("*.jsonl"))
+            if not found:
+                return 0
+            self._events = LineCount(found[0])
+        return self._events.look()
 
     def drive(self, what: str) -> None:
         """Wait until it has driven some way."""

@@ -540,4 +540,4 @@ def test_services_and_actions_of_a_program_that_knows_of_no_layer_are_remapped(p
         assert ["goal", False] in told()
         assert ["scan", [0.5]] in told()
     assert action.requests == service.requests == []
-    assert {"/power", "/count", "/cmd_vel"} <= {message.data for message in porter.blocked}
+    porter.until(lambda: {"/power", "/count", "/cmd_vel"} <= {message.data for message in porter.blocked}, "all told")

@@ -10,6 +10,7 @@ import contextlib
 import signal
 import sys
 import threading
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +27,7 @@ from robosc_bridge.simulated.turtlebot3 import BASES, SimulatedTurtleBot3
 from robosc_bridge.simulated.walls import parse_walls, room
 
 OVAL = "oval"
+_POLL_S = 0.05
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -41,10 +43,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.list_scenes:
         print("\n".join(scene_names()))
         return 0
-    ended = threading.Event()
+    # Not an event: who waits for one holds its lock now and then, and a handler that sets it then waits forever.
+    received: list[int] = []
 
     def end(number: int, frame: FrameType | None) -> None:
-        ended.set()
+        received.append(number)
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, end)
@@ -63,7 +66,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 print(f"camera {robot.camera.path}")
             sys.stdout.flush()
             threading.Thread(target=_listen, args=(robot,), name="commands", daemon=True).start()
-            ended.wait()
+            # Nor without end: a signal that comes just before a wait begins does not end it.
+            while not received:
+                time.sleep(_POLL_S)
     except (OSError, ValueError) as error:
         print(f"the robot cannot be simulated: {error}", file=sys.stderr)
         return 1

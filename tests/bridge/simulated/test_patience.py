@@ -70,7 +70,10 @@ def test_the_world_waits_for_a_host_that_does_not_read_what_its_lidar_sends() ->
 
             # It has not read anything yet: it may have no use for a LiDAR.
             assert live(2.0) == pytest.approx(2.0)
-            assert os.read(scanner, 100)
+            # More than once: what the kernel still carries from end to end hides that something was read.
+            for _ in range(8):
+                assert os.read(scanner, 100)
+                robot.advance(0.005)
             assert live(2.0) < 0.6
             while len(os.read(scanner, 4096)) == 4096:
                 pass

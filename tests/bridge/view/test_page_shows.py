@@ -181,7 +181,7 @@ def test_a_graph_as_the_layout_has_it(browser: Browser) -> None:
 
 
 def test_a_graph_that_is_too_large_is_told(server: StandIn, seen: Visit) -> None:
-    note = "() => document.querySelector('[data-component=Sensor] p').textContent"
+    note = "() => document.querySelector('[data-component=Sensor] p')?.textContent"
     seen.wait(f"() => ({note})() === 'No behaviour of its own.'")
     server.send(update(components=parts(Sensor="seeing")))
     seen.wait(f"() => ({note})() === 'Its graph is too large to be drawn.'")

@@ -94,10 +94,11 @@ def run(name: str, make: Callable[[], Node]) -> int:
     Returns:
         The exit status: 0 after a signal, 1 after an error, 2 for wrong parameters, or what the node says.
     """
-    ended = threading.Event()
+    # Not an event: who waits for one holds its lock now and then, and a handler that sets it then waits forever.
+    received: list[int] = []
 
-    def handle(_number: int, _frame: FrameType | None) -> None:
-        ended.set()
+    def handle(number: int, _frame: FrameType | None) -> None:
+        received.append(number)
 
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, handle)
@@ -107,8 +108,9 @@ def run(name: str, make: Callable[[], Node]) -> int:
     except ParameterError as error:
         sys.stderr.write(f"{name}: {error}\n")
         return EXIT_USAGE
-    while not ended.wait(_TICK_S) and not rospy.is_shutdown() and node.exit_status is None:
+    while not received and not rospy.is_shutdown() and node.exit_status is None:
         node.live()
+        time.sleep(_TICK_S)
     node.end()
     time.sleep(DELIVERY_S)
     rospy.signal_shutdown("it has ended")

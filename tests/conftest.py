@@ -25,8 +25,8 @@ hypothesis.settings.register_profile("busy", deadline=None, suppress_health_chec
 hypothesis.settings.load_profile("busy")
 
 
-# They measure how quickly a robot reacts, or wait for what has to come in time, and would disturb each other: files, or
-# single tests. `make test` runs them when all others are through, `pytest -m real_time` runs them alone.
+# They measure how quickly a robot reacts, and would disturb each other: `make test` runs them when all others are
+# through. `pytest -m real_time` runs them alone. Single tests of other files carry the marker themselves.
 _IN_REAL_TIME = (
     "tests/bridge/daemon/test_assembly.py",
     "tests/bridge/daemon/test_faults.py",
@@ -55,7 +55,7 @@ class _Scheduling(LoadScopeScheduling):  # type: ignore[misc]
 
     def _split_scope(self, nodeid: str) -> str:
         file = nodeid.partition("::")[0]
-        if nodeid.startswith(_IN_REAL_TIME):
+        if file in _IN_REAL_TIME:
             return "real time"
         return file if file.startswith(_BY_FILE) else nodeid
 
@@ -71,6 +71,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.nodeid.startswith(_IN_REAL_TIME):
             item.add_marker(pytest.mark.real_time)
+        if item.get_closest_marker("real_time") is not None:
             item.add_marker(pytest.mark.flaky(reruns=4, only_rerun=[MachineLateError.__name__]))
 
 

@@ -91,14 +91,29 @@ def test_what_a_program_has_started_ends_with_it(tmp_path: Path) -> None:
     wait_until(lambda: not is_alive(child))
 
 
+SLOW = """
+import pathlib, signal, sys, time
+
+def end(*_):
+    print("ending", flush=True)
+    while not pathlib.Path("end").exists():
+        time.sleep(0.01)
+    sys.exit(0)
+
+signal.signal(signal.SIGTERM, end)
+print("ready", flush=True)
+signal.pause()
+"""
+"""A program that ends in order, but only when there is a file `end`."""
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_stops_programs_and_a_second_one_changes_nothing(number: signal.Signals, tmp_path: Path) -> None:
     text = f"""
-        import signal, sys, time
+        import time
         from pathlib import Path
         from robosc_bridge.experiments.processes import Program, interruptible
-        code = "import signal, sys, time; signal.signal(15, lambda *_: (time.sleep(0.5), sys.exit(0))); " \
-               "print('ready', flush=True); signal.pause()"
+        code = {SLOW!r}
         try:
             with interruptible(), Program("slow", ("-c", code), Path({str(tmp_path)!r})) as program:
                 program.wait_for("^ready$")
@@ -112,9 +127,10 @@ def test_a_signal_stops_programs_and_a_second_one_changes_nothing(number: signal
         assert outer.stdout is not None
         child = int(outer.stdout.readline())
         outer.send_signal(number)
-        # The child takes half a second to end: it is in the middle of it.
-        time.sleep(0.1)
+        # The child is in the middle of ending.
+        wait_until(lambda: "ending" in (tmp_path / "slow.log").read_text())
         outer.send_signal(number)
+        (tmp_path / "end").touch()
         assert outer.communicate(timeout=LIMIT_S)[0] == "interrupted 0\n"
         assert not is_alive(child)
     finally:

@@ -1,7 +1,7 @@
 """Programs of a scenario as processes: each in a session of its own, stopped in order, none left behind.
 
 A terminal sends Ctrl-C to every process of its session; theirs are others, so that whoever runs the scenario brings
-them to rest one after the other.
+them to rest one after the other. Where that process is killed, each is told to end by the kernel.
 """
 
 import os
@@ -26,6 +26,7 @@ STOP_LIMIT_S = 15.0
 
 ANSWER_LIMIT_S = 10.0
 _POLL_S = 0.02
+_BEGIN = str(Path(__file__).with_name("begin.py"))
 _PREFERRED = -15
 _SHOWN_BYTES = 4096
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -84,7 +85,7 @@ def environment() -> dict[str, str]:
 
 
 class Program:
-    """A Python program that runs as long as the `with` block.
+    """A Python program that runs as long as the `with` block, and no longer than the thread that has entered it.
 
     Args:
         name: In messages, and of its log file.
@@ -130,7 +131,7 @@ class Program:
         with self.log.open("w", encoding="utf-8") as log, _interrupts.held():
             try:
                 process = subprocess.Popen(  # noqa: S603 (our own programs)
-                    [self._interpreter, *self._arguments],
+                    [sys.executable, "-I", "-S", _BEGIN, str(os.getpid()), self._interpreter, *self._arguments],
                     env=environment() if self._variables is None else dict(self._variables),
                     cwd=self._folder,
                     stdin=pipe or subprocess.DEVNULL,

@@ -120,9 +120,12 @@ class MotionRecorder:
     def close(self) -> None:
         """Watch no more, and write where the robot is at the end."""
         with self._world.time.lock:
-            self._world.catch_up()
-            if self._steps % _EVERY:
-                self._write(self._sample(self._world.lived_s, self._steps % _EVERY * STEP_S))
+            world = self._world
+            world.catch_up()
+            steps = self._steps % _EVERY
+            # It may have been put down elsewhere since a sample, with no step after it.
+            if steps or self._last != (world.x_m, world.y_m, world.heading_rad):
+                self._write(self._sample(world.lived_s, (steps or _EVERY) * STEP_S))
             self._world.unwatch(self._step, self._happen)
 
     def _step(self, world_s: float) -> None:

@@ -11,15 +11,16 @@ from pathlib import Path
 
 import pytest
 
+from robosc_bridge.experiments import processes
 from robosc_bridge.experiments.processes import Program, finish, interruptible
 from robosc_bridge.experiments.scenario import ScenarioError
 
 LIMIT_S = 30.0
 
 
-def script(folder: Path, text: str) -> tuple[str, ...]:
+def script(folder: Path, text: str, name: str = "program.py") -> tuple[str, ...]:
     """Words that run a program with this text."""
-    file = folder / "program.py"
+    file = folder / name
     file.write_text(textwrap.dedent(text), encoding="utf-8")
     return (str(file),)
 
@@ -91,14 +92,81 @@ def test_what_a_program_has_started_ends_with_it(tmp_path: Path) -> None:
     wait_until(lambda: not is_alive(child))
 
 
+def test_a_program_that_is_not_there_is_told(tmp_path: Path) -> None:
+    with Program("none", (), tmp_path, interpreter="/no/python") as program, pytest.raises(ScenarioError) as raised:
+        program.wait_for("never told")
+    assert str(raised.value) == (
+        "none ended by itself with status 127:\n/no/python cannot be run: No such file or directory"
+    )
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no other kernel tells a program that its parent has died")
+def test_a_program_ends_politely_when_who_runs_it_is_killed(tmp_path: Path) -> None:
+    ending = """
+        import signal, sys, time
+        def end(*_):
+            print("at rest", flush=True)
+            sys.exit(0)
+        signal.signal(signal.SIGTERM, end)
+        print("ready", flush=True)
+        while True:
+            time.sleep(60.0)
+    """
+    text = f"""
+        import time
+        from pathlib import Path
+        from robosc_bridge.experiments.processes import Program
+        with Program("robot", {script(tmp_path, ending, "robot.py")!r}, Path({str(tmp_path)!r})) as program:
+            program.wait_for("^ready$")
+            print(program._used.pid, flush=True)
+            time.sleep(60.0)
+    """
+    outer = subprocess.Popen([sys.executable, *script(tmp_path, text)], stdout=subprocess.PIPE, text=True)
+    try:
+        assert outer.stdout is not None
+        robot = int(outer.stdout.readline())
+        assert is_alive(robot)
+        outer.kill()
+        outer.wait()
+        wait_until(lambda: not is_alive(robot))
+        assert (tmp_path / "robot.log").read_text() == "ready\nat rest\n"
+    finally:
+        outer.kill()
+        outer.communicate()
+
+
+def test_a_program_whose_parent_died_before_it_began_does_not_run(tmp_path: Path) -> None:
+    begin = Path(processes.__file__).with_name("begin.py")
+    nobody = str(os.getppid())
+    command = [sys.executable, "-I", "-S", str(begin), nobody, sys.executable, *script(tmp_path, "print('runs')")]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S)
+    assert (ended.returncode, ended.stdout) == (1, "")
+    assert ended.stderr == f"who started {sys.executable} has ended\n"
+
+
+SLOW = """
+import pathlib, signal, sys, time
+
+def end(*_):
+    print("ending", flush=True)
+    while not pathlib.Path("end").exists():
+        time.sleep(0.01)
+    sys.exit(0)
+
+signal.signal(signal.SIGTERM, end)
+print("ready", flush=True)
+signal.pause()
+"""
+"""A program that ends in order, but only when there is a file `end`."""
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_stops_programs_and_a_second_one_changes_nothing(number: signal.Signals, tmp_path: Path) -> None:
     text = f"""
-        import signal, sys, time
+        import time
         from pathlib import Path
         from robosc_bridge.experiments.processes import Program, interruptible
-        code = "import signal, sys, time; signal.signal(15, lambda *_: (time.sleep(0.5), sys.exit(0))); " \
-               "print('ready', flush=True); signal.pause()"
+        code = {SLOW!r}
         try:
             with interruptible(), Program("slow", ("-c", code), Path({str(tmp_path)!r})) as program:
                 program.wait_for("^ready$")
@@ -112,9 +180,10 @@ def test_a_signal_stops_programs_and_a_second_one_changes_nothing(number: signal
         assert outer.stdout is not None
         child = int(outer.stdout.readline())
         outer.send_signal(number)
-        # The child takes half a second to end: it is in the middle of it.
-        time.sleep(0.1)
+        # The child is in the middle of ending.
+        wait_until(lambda: "ending" in (tmp_path / "slow.log").read_text())
         outer.send_signal(number)
+        (tmp_path / "end").touch()
         assert outer.communicate(timeout=LIMIT_S)[0] == "interrupted 0\n"
         assert not is_alive(child)
     finally:

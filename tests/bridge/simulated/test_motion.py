@@ -115,6 +115,17 @@ def test_what_happens_is_recorded(path: Path) -> None:
     assert motion.samples[-1].collisions == 2
 
 
+@pytest.mark.parametrize("seconds", [0.1, 0.12])
+def test_the_last_sample_is_where_it_was_put_at_last(path: Path, seconds: float) -> None:
+    def act(world: World) -> None:
+        drive(world, 0.0, 0.0, seconds)
+        world.place(1.0, 0.5, 0.0)
+
+    samples = recorded(YARD, act, path).samples
+    assert [sample.world_s for sample in samples] == pytest.approx([0.0, 0.05, 0.1, seconds])
+    assert (samples[-2].x_m, samples[-1].x_m, samples[-1].y_m) == (0.0, 1.0, 0.5)
+
+
 def test_a_line_is_written_at_once() -> None:
     world = World(BODIES["burger"], YARD, Timebase(ManualClock()))
     stream = io.StringIO()

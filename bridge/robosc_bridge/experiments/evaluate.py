@@ -16,7 +16,7 @@ from robosc.source import visible
 
 if TYPE_CHECKING:
     from robosc.supervisor.structure import Supervisor
-    from robosc_bridge.experiments.evaluate_cycles import CycleTimes
+    from robosc_bridge.experiments.cycles import CycleTimes
     from robosc_bridge.experiments.lines_of_code import CodeSize
     from robosc_bridge.experiments.report import FailedRun, Report, ReportedRun
     from robosc_bridge.experiments.scenario import Outcome
@@ -116,7 +116,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="the report's folder (default: %(default)s)",
     )
     parser.add_argument(
-        "--no-cycles", action="store_true", help="do not measure control cycles, which takes half a minute"
+        "--no-cycles", action="store_true", help="do not measure control cycles, which takes a minute or two"
     )
     parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
     parser.set_defaults(run=run)
@@ -354,7 +354,7 @@ def _sizes(experiment: Experiment) -> "tuple[tuple[CodeSize, ...], Supervisor]":
 
 
 def _cycles(experiment: Experiment, controller: "Supervisor") -> "tuple[CycleTimes, ...]":
-    from robosc_bridge.experiments.evaluate_cycles import measure
+    from robosc_bridge.experiments.cycles import measure
 
     return measure(experiment.name, controller)
 

@@ -1,16 +1,17 @@
-"""Measures cycles of a generated Python package that publishes a Twist; a process of its own, Python 3.8 and later.
+"""Measures cycles of generated Python that drives and publishes a Twist; a program of its own, for Python 3.8 and on.
 
-Usage: python_cycle.py rclpy|rospy FOLDER ROBOT; prints a line of JSON: seconds of `cycle` and of `publish` alone.
+Usage: driving.py rclpy|rospy FILE COMES RUNS CYCLES. COMES is JSON: what comes `first`, as its topic and its data, and
+the `ranges` of each scan. Prints a line of JSON: seconds of each `cycle`, and of each `publish` alone.
 """
 
+import importlib
 import json
 import sys
 import time
+from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, Dict, List, Tuple
+from typing import Any
 
-RUNS = 3
-CYCLES = 1000
 WARM_UP = 50
 PAUSE_S = 0.001
 LIMIT_S = 20.0
@@ -25,7 +26,7 @@ class Publishing:
 
     def prepare(self, communication: str, data: Any) -> Any:
         """The message with the model's velocities."""
-        data = data or {}
+        data = data if isinstance(data, dict) else {}
         self._message.linear.x = float(data.get("linear", {}).get("x", 0.0))
         self._message.angular.z = float(data.get("angular", {}).get("z", 0.0))
         return self._message
@@ -42,8 +43,8 @@ class Publishing:
         """Nothing: the robot goes on."""
 
 
-def connect(kind: str) -> Tuple[Any, Any]:
-    """A publisher of Twist with a subscriber, and a message."""
+def connect(kind: str) -> tuple[Any, Any]:
+    """A publisher of Twist that has a subscriber, and a message."""
     from geometry_msgs.msg import Twist
 
     if kind == "rclpy":
@@ -58,40 +59,43 @@ def connect(kind: str) -> Tuple[Any, Any]:
         rospy.init_node("measured")
         publisher = rospy.Publisher("/cmd_vel", Twist, queue_size=10)
         count = publisher.get_num_connections
-    deadline = time.monotonic() + LIMIT_S
+    deadline_s = time.monotonic() + LIMIT_S
     while not count():
-        if time.monotonic() > deadline:
+        if time.monotonic() > deadline_s:
             raise SystemExit("no subscriber came")
         time.sleep(0.01)
     return publisher, Twist()
 
 
+def timed(work: Any) -> float:
+    """Seconds that it takes, after a pause."""
+    time.sleep(PAUSE_S)
+    begin_s = time.perf_counter()
+    work()
+    return time.perf_counter() - begin_s
+
+
 def main() -> None:
     """Measure."""
-    kind, folder, robot = sys.argv[1:]
-    sys.path.insert(0, folder)
-    from measured import Executor, Supervisor
-
+    kind, file, comes, runs, cycles = sys.argv[1:]
+    sys.path.insert(0, str(Path(file).parent))
+    module = importlib.import_module(Path(file).stem)
+    given = json.loads(comes)
     publisher, message = connect(kind)
-    scan = SimpleNamespace(ranges=[3.0] * 360)
-    found: Dict[str, List[float]] = {"cycle": [], "publish": []}
-    for _ in range(RUNS):
-        executor = Executor(Supervisor(), Publishing(publisher, message))
+    scan = SimpleNamespace(ranges=given["ranges"])
+    found: dict[str, list[float]] = {"cycle": [], "publish": []}
+    for _ in range(int(runs)):
+        executor = module.Executor(module.Supervisor(), Publishing(publisher, message))
         executor.start()
-        executor.receive(*(("/line/correction", 0.1) if robot == "line_follower" else ("/rotate_done", None)))
-        executor.receive("/scan", scan)
-        for number in range(-WARM_UP, CYCLES):
-            time.sleep(PAUSE_S)
-            begin = time.perf_counter()
-            executor.tick()
-            cycle = time.perf_counter() - begin
-            time.sleep(PAUSE_S)
-            begin = time.perf_counter()
-            publisher.publish(message)
-            alone = time.perf_counter() - begin
+        executor.receive(*given["first"])
+        for number in range(-WARM_UP, int(cycles)):
+            # A sensor that says nothing for long stops the robot.
+            executor.receive("/scan", scan)
+            cycle_s = timed(executor.tick)
+            publish_s = timed(lambda: publisher.publish(message))
             if number >= 0:
-                found["cycle"].append(cycle)
-                found["publish"].append(alone)
+                found["cycle"].append(cycle_s)
+                found["publish"].append(publish_s)
     if message.linear.x <= 0.0:
         raise SystemExit("the robot did not move")
     sys.stdout.write("\n" + json.dumps(found) + "\n")

@@ -6,6 +6,7 @@ figures are told at the end of the run.
 
 import signal
 from collections.abc import Generator
+from pathlib import Path
 from typing import Any
 
 import hypothesis
@@ -63,6 +64,14 @@ class _Scheduling(LoadScopeScheduling):  # type: ignore[misc]
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> _Scheduling:
     """How tests are handed out to processes; asked for by `-n`."""
     return _Scheduling(config, log)
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Where tests in real time alone are asked for, files that have none are not imported: that takes a minute."""
+    if config.option.markexpr != "real_time" or not collection_path.name.startswith("test_"):
+        return None
+    file = collection_path.relative_to(config.rootpath).as_posix()
+    return None if file in _IN_REAL_TIME or "mark.real_time" in collection_path.read_text("utf-8") else True
 
 
 @pytest.hookimpl(tryfirst=True)  # Before `-m` chooses.

@@ -75,10 +75,16 @@ def test_who_chooses_by_markers_gets_one_phase(words: tuple[str, ...], tmp_path:
 
 
 def test_what_lives_by_the_clock_is_marked() -> None:
-    of_the_clock, other = "tests/bridge/daemon/test_run.py", "tests/deploy/test_judge.py"
-    for marked, file in (("real_time", of_the_clock), ("not real_time", other)):
-        command = ["-m", "pytest", "-p", "no:cacheprovider", "--collect-only", "-q", "-m", marked, of_the_clock, other]
+    """Whole files, and single tests that carry the marker themselves; and folders may have none."""
+    whole, some, folder = (
+        "tests/bridge/daemon/test_run.py",
+        "tests/bridge/devices/test_dynamixel_bus.py",
+        "tests/deploy",
+    )
+    others = {f"tests/deploy/{file.name}" for file in SCRIPT.with_name("deploy").glob("test_*.py")}
+    for marked, files in (("real_time", {whole, some}), ("not real_time", {some, *others})):
+        command = ["-m", "pytest", "-p", "no:cacheprovider", "--collect-only", "-q", "-m", marked, whole, some, folder]
         ended = subprocess.run(
-            [sys.executable, *command], cwd=SCRIPT.parents[1], capture_output=True, text=True, timeout=60
+            [sys.executable, *command], cwd=SCRIPT.parents[1], capture_output=True, text=True, timeout=120
         )
-        assert {line.partition("::")[0] for line in ended.stdout.splitlines() if "::" in line} == {file}
+        assert {line.partition("::")[0] for line in ended.stdout.splitlines() if "::" in line} == files

@@ -146,11 +146,11 @@ def test_depth_and_size_are_bounded() -> None:
     assert "nested deeper" in faults("(" * 1000 + "A.G")[0]
     assert "nested deeper" in faults("AG !" * 150 + "A.G")[0]
     assert "AG" in read("AG " * 150 + "A.G")
-    begin = time.monotonic()
+    begin = time.process_time()
     chain = " and ".join(["EF A.X", "A.G"] * 5_000)
     assert len(read(chain)) > 50_000
     assert len(read("AG (" + " or ".join(["A.n = 1"] * 10_000) + ")")) > 50_000
-    assert time.monotonic() - begin < 20
+    assert time.process_time() - begin < 20
 
 
 def test_so_many_faults_are_told() -> None:

@@ -22,6 +22,7 @@ from robosc_bridge.view.server import BURST, HEADERS, MAXIMUM_VIEWERS
 from support.certificates import Authority
 from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed
 from support.pages_open import opened, token_of
+from support.wire import wait_until
 
 
 @pytest.fixture
@@ -255,6 +256,10 @@ def test_there_is_a_limit_of_pages_and_of_connections(
 
     asyncio.run(pages())
     assert MAXIMUM_VIEWERS > 3
+    runner = face._server._runner
+    assert runner is not None
+    # While those of the pages still end, they would take the places of the next two.
+    wait_until(lambda: runner.server is not None and not runner.server.connections)
     monkeypatch.setattr(server_module, "MAXIMUM_CONNECTIONS", 2)
     host, _, port = face.address.rpartition(":")
     with (

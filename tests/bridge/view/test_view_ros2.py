@@ -2,9 +2,8 @@
 
 import asyncio
 import json
-import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -17,7 +16,7 @@ from robosc_bridge.view.definition import DefinitionError
 from robosc_bridge.view.ros2_topic import MAXIMUM_CHARACTERS, StateReader, StateTopic
 from support.generated import example_supervisor, imported
 from support.live import large_model, supervisor_without_synthesis
-from support.pages_open import opened
+from support.pages_open import LIMIT_S, OpenPage, opened
 from support.ros2 import Peer, environment, own_domain
 from support.view_servers import served
 
@@ -144,49 +143,51 @@ def test_a_node_is_shown_over_dds(peer: Peer, tmp_path: Path) -> None:
 
     supervisor = example_supervisor(MAZE)
     node = Node(supervisor, tmp_path / "package")
-    steps = threading.Event()
-    end = threading.Event()
-    taken: list[str] = []
+    publisher = peer.publisher(String, "/robot1/state")
 
-    def publish() -> None:
-        publisher = peer.publisher(String, "/robot1/state")
-        while not end.wait(0.02):
-            if steps.is_set() and len(taken) < 30:
-                event = node.step()
-                taken.extend([] if event is None else [event])
+    async def told(page: OpenPage, fits: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:
+        """What fits, while the node publishes now and then: never so much that the topic would let go of something."""
+        waiting = asyncio.create_task(page.until(fits))
+        while not waiting.done():
             publisher.publish(String(data=node.system.report()))
+            await asyncio.wait([waiting], timeout=0.5)
+        return await waiting
+
+    def is_now(message: dict[str, Any]) -> bool:
+        return (
+            message["type"] == "update"
+            and {name: part["state"] for name, part in message["components"].items()}
+            == {name: part["state"] for name, part in node.system.state().items()}
+            and message["enabled"] == node.enabled()
+        )
 
     async def look() -> None:
-        async with served(lambda: StateTopic("/robot1", supervisor)) as server, opened(server.url) as page:
-            definition = await page.told("definition")
+        async with (
+            asyncio.timeout(LIMIT_S),
+            served(lambda: StateTopic("/robot1", supervisor)) as server,
+            opened(server.url) as page,
+        ):
+            definition = await told(page, lambda message: message["type"] == "definition")
             assert (definition["robot"], definition["source"]) == (supervisor.model.name, "ros2")
             assert definition["can_command"] is False
-            await page.told("update")
-            steps.set()
-
-            def is_final(message: dict[str, Any]) -> bool:
-                return (
-                    len(taken) >= 30
-                    and message["type"] == "update"
-                    and {name: part["state"] for name, part in message["components"].items()}
-                    == {name: part["state"] for name, part in node.system.state().items()}
-                    and message["enabled"] == node.enabled()
-                )
-
-            told = await page.until(is_final)
-            assert len(told["enabled"]) + len(told["disabled"]) == len(definition["requests"])
-            while len(page.entries()) < 10:
+            await told(page, is_now)
+            reader, wanted = StateReader(supervisor), []
+            for _ in range(30):
+                while node.step() is None:
+                    pass
+                text = node.system.report()
+                wanted += [item["event"] for item in reader.read(text, 1.0)[2]]
+                publisher.publish(String(data=text))
+                shown = await told(page, is_now)
+                assert len(shown["enabled"]) + len(shown["disabled"]) == len(definition["requests"])
+            assert len(wanted) >= 10
+            while len(page.entries()) < len(wanted):
                 await page.next()
+            assert [entry["event"] for entry in page.entries()] == wanted
             await page.send(type="stop")
             assert (await page.told("refused"))["what"] == "stop"
 
-    thread = threading.Thread(target=publish)
-    thread.start()
-    try:
-        asyncio.run(look())
-    finally:
-        end.set()
-        thread.join()
+    asyncio.run(look())
 
 
 @pytest.mark.ros2

@@ -105,8 +105,8 @@ class Eye:
 def rays(mount: Mount) -> Rays:
     """Where the middle of each pixel looks, in the robot's axes (x forward, y left)."""
     focal = mount.width / 2 / math.tan(mount.field_of_view_rad / 2)
-    right: Floats = (np.arange(mount.width) + 0.5 - mount.width / 2) / focal
-    down: Floats = (np.arange(mount.height) + 0.5 - mount.height / 2) / focal
+    right: Floats = (np.arange(mount.width, dtype=np.float64) + 0.5 - mount.width / 2) / focal
+    down: Floats = (np.arange(mount.height, dtype=np.float64) + 0.5 - mount.height / 2) / focal
     cosine, sine = math.cos(mount.tilt_rad), math.sin(mount.tilt_rad)
     return Rays(mount.height_m, focal, cosine - down * sine, sine + down * cosine, -right)
 

@@ -93,7 +93,7 @@ class Sweep:
         once = np.maximum(nearest[_HALF : _HALF + BEAMS], 0.0)
         np.maximum(once[_HALF:], nearest[:_HALF], out=once[_HALF:])
         np.maximum(once[: _HALF + 1], nearest[_HALF + BEAMS :], out=once[: _HALF + 1])
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):
             found: Floats = 1.0 / once
         return found
 

@@ -109,7 +109,7 @@ class Walls:
             beside_starts *= beside_ends
             np.copyto(inverse, 0.0, where=beside_starts > 0.0)
             np.maximum(nearest, inverse.max(axis=0), out=nearest)
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):
             found: Floats = np.where(nearest > 0.0, 1.0 / nearest, np.inf)
         return found
 

@@ -16,9 +16,9 @@ from robosc_bridge.simulated.walls import Floats
 NOTHING = Rounds(())
 _DEGREES = np.radians(np.arange(float(BEAMS)))
 # So far a ray may be turned where it passes the very end of something; rounding decides there.
-_TURN_RAD = 1e-8
-# Nearer to a wall or to an edge there is no such bound.
-_NEAR_M = 1e-4
+_TURN_RAD = 1e-10
+# Nearer to a wall, or nearly in line with one (square metres), there is no such bound.
+_NEAR_M, _NEARLY = 1e-4, 1e-6
 
 
 def one_by_one(walls: Walls, rounds: Rounds, place: tuple[float, float], angles_rad: Floats) -> Floats:
@@ -34,12 +34,26 @@ def require_agreement(walls: Walls, rounds: Rounds, x_m: float, y_m: float, head
     rays = heading_rad + _DEGREES
     around = [one_by_one(walls, rounds, (x_m, y_m), rays + turn) for turn in (-_TURN_RAD, 0.0, _TURN_RAD)]
     shortest, longest = np.minimum.reduce(around), np.maximum.reduce(around)
-    is_told = (found >= shortest * (1 - 1e-6) - 1e-9) & (found <= longest * (1 + 1e-6) + 1e-9)
+    # How much the length of a ray changes with its direction, on the most slanted of the walls.
+    slants = [apart / seen for apart, seen in _seen(walls, x_m, y_m) if seen > _NEARLY]
+    seen_m = np.where(np.isinf(found), 0.0, found)
+    slack_m = 1e-9 + (1e-9 + 2 * _TURN_RAD * max(slants, default=0.0) * seen_m) * seen_m
+    is_told = (found >= shortest - slack_m) & (found <= longest + slack_m)
     assert is_told.all(), [(int(ray), found[ray], shortest[ray], longest[ray]) for ray in np.flatnonzero(~is_told)]
     return found
 
 
+def _seen(walls: Walls, x_m: float, y_m: float) -> list[tuple[float, float]]:
+    """The length of each wall, and twice the area between it and a point."""
+    return [
+        (math.dist((x1, y1), (x2, y2)), abs((x1 - x_m) * (y2 - y_m) - (y1 - y_m) * (x2 - x_m)))
+        for x1, y1, x2, y2 in walls.segments
+    ]
+
+
 def is_apart(walls: Walls, rounds: Rounds, x_m: float, y_m: float) -> bool:
+    if any(1e-13 < seen < _NEARLY for _, seen in _seen(walls, x_m, y_m)):
+        return False
     return walls.distance_m(x_m, y_m) > _NEAR_M and abs(rounds.nearest(x_m, y_m)[0]) > _NEAR_M
 
 

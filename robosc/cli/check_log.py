@@ -21,14 +21,14 @@ _SHOWN = 20
 _DESCRIPTION = """\
 Check an event log (JSON Lines, as every node, the bridge and the simulations write it) against the supervisor: the
 events are replayed from the initial state on the automata. Every request must have been allowed in the state in which
-it happened, every other event possible, every logged state the one that the events lead to; what a supervision layer
-held back must have been forbidden.
+it happened and carry what the model provides, every other event possible, every logged state the one that the events
+lead to; what a supervision layer held back must have been forbidden.
 """
 
 _EPILOG = """\
 exit status:
   0  nothing is wrong
-  1  something in the log could not have happened, or there is no supervisor
+  1  something in the log could not have happened, it tells of no event, or there is no supervisor
   2  wrong use; a file that cannot be read or is no event log
 """
 
@@ -145,7 +145,8 @@ def _print(log: Path, found: "LogCheck", supervisor: "Supervisor") -> None:
         counts.append(f"{found.blocked} requests held back{unjudged}")
     if found.restarts:
         counts.append(f"{found.restarts} restarts")
-    word = "passed" if found.has_passed else f"failed: {found.violation_count} violations"
+    failed = f"failed: {found.violation_count} violations" if found.violation_count else "not checked"
+    word = "passed" if found.has_passed else failed
     lines.append(f"{log}: {word} against the supervisor of {supervisor.model.name}: {', '.join(counts)}")
     lines += [f"note: {note}" for note in found.notes]
     sys.stdout.write("".join(f"{visible(line)}\n" for line in lines))

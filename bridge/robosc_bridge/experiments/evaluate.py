@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -48,7 +49,7 @@ class Experiment:
         name: `maze` or `line`.
         function: Of the connections' modules; runs it.
         serial_module: The one for serial lines.
-        scene: The world, if no other is wanted.
+        scenes: The worlds, one after the other, if no other is wanted.
         speed: How many times as fast as the clock, if nothing else is wanted.
         deployment: Of its supervisor.
     """
@@ -56,15 +57,15 @@ class Experiment:
     name: str
     function: str
     serial_module: str
-    scene: str
+    scenes: tuple[str, ...]
     speed: float
     deployment: Deployment
 
 
 EXPERIMENTS: Mapping[str, Experiment] = {
-    "maze": Experiment("maze", "run_maze", "maze", "maze-rooms", 10.0, Deployment.CONTROLLER),
+    "maze": Experiment("maze", "run_maze", "maze", ("maze-rooms",), 10.0, Deployment.CONTROLLER),
     # The camera shows so many pictures a second of the clock: the follower of a faster world would see too few.
-    "line": Experiment("line", "run_line", "line", "line-oval", 2.0, Deployment.LAYER),
+    "line": Experiment("line", "run_line", "line", ("line-oval", "line-curves"), 2.0, Deployment.LAYER),
 }
 
 
@@ -95,7 +96,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser.add_argument(
         "--scene",
         metavar="NAME|FILE",
-        help="the world, for one experiment (default: maze-rooms, line-oval); --list-scenes of "
+        help="the world, for one experiment (default: maze-rooms; line-oval, then line-curves); --list-scenes of "
         "'python -m robosc_bridge.simulated' names those that come with it",
     )
     parser.add_argument(
@@ -190,7 +191,7 @@ def evaluated(
         experiments: Which.
         connections: Over what.
         folder: Of the report; every run gets a new folder in it.
-        scene: The world; None: each experiment's own.
+        scene: The world; None: each experiment's own ones.
         speed: How many times as fast as the clock; None: each experiment's own.
         seed: Of what a scene leaves to chance.
         has_cycles: Whether control cycles are measured.
@@ -203,20 +204,21 @@ def evaluated(
     cycles: list[CycleTimes] = []
     sizes: dict[str, tuple[CodeSize, ...]] = {}
     for experiment in experiments:
-        for connection in connections:
-            title = f"{experiment.name} over {connection}"
+        for connection, place in product(connections, experiment.scenes if scene is None else (scene,)):
+            title = f"{experiment.name} over {connection}, {place}"
             found = _run(
                 experiment,
                 connection,
                 folder,
-                scene or experiment.scene,
+                place,
                 speed or experiment.speed,
                 seed,
                 lambda text, title=title: say(f"{title}: {text}"),  # type: ignore[misc]
             )
             if isinstance(found, _Reported):
                 runs.append(found.run)
-            else:
+            elif found not in failures:
+                # What no world can be run without is told once.
                 failures.append(found)
     for experiment in experiments:
         say(f"{experiment.name}: lines of code")

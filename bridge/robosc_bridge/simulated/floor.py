@@ -92,11 +92,12 @@ class Track:
         Returns:
             Shape (n,).
         """
-        places = (points - self._corner) / _CELL_M
-        is_there = ((places >= 0.0) & (places < self._is_line.shape)).all(axis=1)
+        # By columns: numpy is several times as slow along an axis of two.
+        across, along = ((points[:, axis] - self._corner[axis]) / _CELL_M for axis in (0, 1))
+        columns, rows = self._is_line.shape
+        is_there = (across >= 0.0) & (across < columns) & (along >= 0.0) & (along < rows)
         found = np.zeros(len(points), dtype=np.bool_)
-        cells = places[is_there].astype(int)
-        found[is_there] = self._is_line[cells[:, 0], cells[:, 1]]
+        found[is_there] = self._is_line[across[is_there].astype(np.intp), along[is_there].astype(np.intp)]
         return found
 
     def distance_m(self, x_m: float, y_m: float) -> float:

@@ -10,6 +10,9 @@ from msgspec import Meta, Struct
 MOST_SEGMENTS = 5_000
 """Of all walls of a scene."""
 
+WALL_HEIGHT_M, WALL_SHADE = 0.3, 130
+"""Of walls and obstacles where nothing is said: a grey between the floors and the lines."""
+
 _Metres = Annotated[float, Meta(ge=-1000, le=1000)]
 _Seed = Annotated[int, Meta(ge=0, le=2**31 - 1)]
 _Point = tuple[_Metres, ...]
@@ -23,7 +26,7 @@ class _Section(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class WallsPart(_Section, frozen=True):
-    """Walls that stand where they are."""
+    """Walls that stand where they are, and how the camera sees walls and obstacles."""
 
     segments: Annotated[
         tuple[tuple[_Metres, ...], ...], Meta(description="Straight walls, `[x1, y1, x2, y2]` in metres each.")
@@ -38,6 +41,10 @@ class WallsPart(_Section, frozen=True):
             description="Four walls, `[x, y, width, height]` each, where x, y is the corner of the least coordinates."
         ),
     ] = ()
+    height_m: Annotated[
+        float, Meta(ge=0.01, le=10, description="Of walls and obstacles, as the camera sees them; the LiDAR sees all.")
+    ] = WALL_HEIGHT_M
+    shade: Annotated[int, Meta(ge=0, le=255, description="Of walls and obstacles: 0 is black, 255 white.")] = WALL_SHADE
 
 
 class MazePart(_Section, frozen=True):

@@ -6,13 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robosc_bridge.simulated import Eye, Mount, Track, oval, parse_track
+from robosc_bridge.simulated import Eye, Mount, Scene, Track, Walls, oval, parse_track
 from robosc_bridge.simulated.eye import DISTANCE, ground_points
 from robosc_bridge.simulated.floor import SHADE as LINE
 from robosc_bridge.simulated.textures import PLAIN
 
 FLOOR = PLAIN.shade
 STRAIGHT = Track([(-1.0, 0.0), (3.0, 0.0)], width_m=0.04)
+BARE = Scene("bare", Walls(()))
+LINED = replace(BARE, line=STRAIGHT)
 # Straight down from 1 m with a right angle of view: one metre to each side.
 ABOVE = Mount(x_m=0.0, height_m=1.0, tilt_rad=math.pi / 2, field_of_view_rad=math.pi / 2, width=100, height=50)
 
@@ -94,7 +96,7 @@ def test_the_edges_of_the_picture_are_half_the_field_of_view_aside() -> None:
 
 
 def test_the_line_is_seen_where_it_is() -> None:
-    eye = Eye(ABOVE, STRAIGHT)
+    eye = Eye(ABOVE, LINED)
     for pose, column in (
         ((0.0, 0.0, 0.0), 50),
         ((0.0, 0.3, 0.0), 65),
@@ -112,7 +114,7 @@ def test_the_line_is_seen_where_it_is() -> None:
 
 def test_above_the_horizon_there_is_no_floor() -> None:
     level = replace(Mount(), tilt_rad=0.0)
-    picture = Eye(level, STRAIGHT).picture((0.0, 0.0, 0.0))
+    picture = Eye(level, LINED).picture((0.0, 0.0, 0.0))
     assert (picture[:60] == DISTANCE).all()
     assert set(np.unique(picture[60:])) == {LINE, FLOOR}
-    assert (Eye(Mount(), None).picture((0.0, 0.0, 0.0)) == FLOOR).all()
+    assert (Eye(Mount(), BARE).picture((0.0, 0.0, 0.0)) == FLOOR).all()

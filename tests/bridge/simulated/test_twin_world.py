@@ -207,7 +207,7 @@ def test_an_ideal_world_has_no_chance_in_it() -> None:
 def test_the_line_detector_sees_the_line_of_a_scene(name: str) -> None:
     scene = load_scene(name, seed=3)
     assert scene.line is not None
-    eye = Eye(Mount(), scene.line, scene.floor, scene.noise.camera_shades, 3)
+    eye = Eye(Mount(), scene, 3)
     settings_ = LineSettings()
     points = scene.line.points
     for place in range(0, len(points) - 30, 60):
@@ -226,13 +226,15 @@ def test_the_line_detector_sees_the_line_of_a_scene(name: str) -> None:
 @pytest.mark.parametrize("kind", ["tiles", "checkerboard", "speckle"])
 def test_a_textured_floor_without_a_line_shows_none(kind: str) -> None:
     texture = Texture(kind, 215, 150, 0.1)  # type: ignore[arg-type]
-    picture = Eye(Mount(), None, texture, 5.0, 1).picture((0.3, 0.2, 0.1))
+    scene = Scene("floor", Walls(()), floor=texture, noise=Noise(camera_shades=5.0))
+    picture = Eye(Mount(), scene, 1).picture((0.3, 0.2, 0.1))
     assert len(np.unique(picture)) > 10
     assert line_offset(picture, LineSettings()) is None
 
 
 def test_noise_of_the_camera_is_as_large_as_told_and_seeded() -> None:
-    first, same, other = (Eye(Mount(), None, deviation=6.0, seed=seed).picture((0.0, 0.0, 0.0)) for seed in (1, 1, 2))
+    scene = Scene("noisy", Walls(()), noise=Noise(camera_shades=6.0))
+    first, same, other = (Eye(Mount(), scene, seed).picture((0.0, 0.0, 0.0)) for seed in (1, 1, 2))
     assert (first == same).all()
     assert (first != other).any()
     assert float(first.std()) == pytest.approx(6.0, rel=0.05)

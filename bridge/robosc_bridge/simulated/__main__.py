@@ -23,6 +23,7 @@ from robosc_bridge.simulated.motion import MotionRecorder
 from robosc_bridge.simulated.recorder import Recorder
 from robosc_bridge.simulated.robots import BODIES
 from robosc_bridge.simulated.scene import Scene, load_scene, maze_scene, scene_names
+from robosc_bridge.simulated.timebase import FASTEST
 from robosc_bridge.simulated.turtlebot3 import BASES, SimulatedTurtleBot3
 from robosc_bridge.simulated.walls import parse_walls, room
 
@@ -168,7 +169,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--pose", type=_pose, metavar="X,Y,HEADING", help="start, in m and rad; default: the scene's, else 0,0,0"
     )
-    parser.add_argument("--speed", type=float, default=1.0, metavar="N", help="the world passes N times as fast")
+    parser.add_argument(
+        "--speed", type=float, default=1.0, metavar="N", help=f"the world passes N times as fast, up to {FASTEST:g}"
+    )
     parser.add_argument(
         "--wait",
         type=float,

@@ -132,6 +132,7 @@ def test_it_goes_on_when_its_input_ends() -> None:
     ("arguments", "text"),
     [
         (["--speed", "0"], "speed factor"),
+        (["--speed", "1000"], "the speed factor must be a positive number up to 100, and is 1000"),
         (["--walls", "/nowhere"], "No such file"),
         (["--maze", "0x2"], "one cell"),
         (["--line", "/nowhere"], "No such file"),

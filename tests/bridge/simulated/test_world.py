@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from robosc.execution.clock import ManualClock, SystemClock
 from robosc_bridge.simulated import BODIES, Timebase, Walls, World, maze, parse_walls, room
+from robosc_bridge.simulated.world import STEP_S
 
 SIZES = st.floats(-5, 5, allow_nan=False)
 SEGMENTS = st.lists(st.tuples(SIZES, SIZES, SIZES, SIZES), max_size=6)
@@ -160,10 +161,50 @@ def test_the_world_passes_faster_by_its_factor() -> None:
     assert fast.pose == pytest.approx(slow.pose)
 
 
-@pytest.mark.parametrize("factor", [0.0, -1.0, math.inf, math.nan])
-def test_a_factor_is_positive_and_finite(factor: float) -> None:
-    with pytest.raises(ValueError, match="speed factor"):
+@pytest.mark.parametrize("factor", [0.0, -1.0, 100.1, 1e300, math.inf, math.nan])
+def test_a_factor_is_positive_and_no_more_than_can_be_lived(factor: float) -> None:
+    with pytest.raises(ValueError, match="speed factor must be a positive number up to 100"):
         Timebase(factor=factor)
+    assert Timebase(factor=100.0).factor == 100.0
+
+
+class ReadClock(SystemClock):
+    """A clock that goes when it is told; the devices take it for the computer's."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.now_s = 0.0
+
+    def monotonic(self) -> float:
+        return self.now_s
+
+
+def test_a_world_that_takes_too_long_to_live_passes_more_slowly() -> None:
+    clock = ReadClock()
+    time = Timebase(clock, factor=10.0)
+    world = World(BODIES["burger"], Walls(()), time)
+
+    def dawdle(world_s: float) -> None:
+        # Three times as long as the step is by the clock.
+        clock.now_s += 3 * STEP_S / 10.0
+
+    world.watch(dawdle, lambda world_s, happening: None)
+    clock.now_s = 1.0
+    for _ in range(3):
+        # What it has taken to live a part is no more than that part again.
+        before_s = world.lived_s
+        world.catch_up()
+        assert world.lived_s - before_s == pytest.approx(10.0)
+        assert time.world_s() - world.lived_s == pytest.approx(10.0)
+
+    # What takes but a moment is made up for.
+    clock.now_s = 0.0
+    time = Timebase(clock, factor=10.0)
+    world = World(BODIES["burger"], Walls(()), time)
+    world.watch(dawdle, lambda world_s, happening: None)
+    clock.now_s = 0.01
+    world.catch_up()
+    assert time.world_s() - world.lived_s == pytest.approx(0.3)
 
 
 def test_only_a_manual_clock_is_advanced() -> None:

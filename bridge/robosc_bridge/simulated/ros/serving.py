@@ -26,7 +26,7 @@ from robosc_bridge.simulated.ros.commands import obey
 from robosc_bridge.simulated.ros.readings import Reading
 from robosc_bridge.simulated.ros.robot import COMMAND_TIMEOUT_S, ENCODINGS, RosRobot
 from robosc_bridge.simulated.scene import load_scene, scene_names
-from robosc_bridge.simulated.timebase import Timebase
+from robosc_bridge.simulated.timebase import FASTEST, Timebase
 from robosc_bridge.simulated.world import World
 
 READY = "ready"
@@ -220,7 +220,9 @@ def parser(prog: str, description: str) -> argparse.ArgumentParser:
     found.add_argument(
         "--encoding", choices=ENCODINGS, default="mono8", help="of the camera's pictures; default: %(default)s"
     )
-    found.add_argument("--speed", type=float, default=1.0, metavar="N", help="the world passes N times as fast")
+    found.add_argument(
+        "--speed", type=float, default=1.0, metavar="N", help=f"the world passes N times as fast, up to {FASTEST:g}"
+    )
     found.add_argument("--seed", type=int, default=0, help="of whatever the scene leaves to chance, and of noise")
     found.add_argument(
         "--command-timeout",

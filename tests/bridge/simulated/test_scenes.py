@@ -215,6 +215,12 @@ def test_textures_are_what_they_are_called() -> None:
     assert tiles[:5].tolist() == [200, 200, 200, 200, 90]
 
 
+def test_speckle_takes_any_seed() -> None:
+    far = Texture("speckle", 200, 100, 0.1, seed=10**15).shades(POINTS)
+    assert (far == Texture("speckle", 200, 100, 0.1, seed=10**15).shades(POINTS)).all()
+    assert (far != Texture("speckle", 200, 100, 0.1, seed=-1).shades(POINTS)).any()
+
+
 def test_speckle_is_random_within_its_shades_and_the_same_for_the_same_seed() -> None:
     grid = (
         np.stack(np.meshgrid(np.arange(-50, 50), np.arange(-50, 50)), axis=-1).reshape(-1, 2).astype(np.float64) * 0.01

@@ -100,7 +100,7 @@ class Standing:
         by_below = np.stack((np.zeros_like(crosses), np.zeros_like(crosses), -crosses, crosses))
         rests = by_forward[..., None] * rays.forward + by_below[..., None] * rays.below
         slopes = slopes[..., None]
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             bounds = -rests / slopes
         never = np.where(rests >= 0.0, -np.inf, np.inf)
         lowest = np.where(slopes > 0.0, bounds, np.where(slopes < 0.0, -np.inf, never)).max(axis=0)
@@ -128,7 +128,7 @@ class Standing:
         rows, columns = np.nonzero(found)
         along, root, squares = along[found], np.sqrt(under[found]), self._squares[found]
         # A ray straight down is above one point only.
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             enters, leaves = (along - root) / squares, (along + root) / squares
         is_point = squares < _EDGEWAYS
         enters[is_point], leaves[is_point] = 0.0, np.inf

@@ -90,10 +90,13 @@ class Walls:
         point = np.array((x_m, y_m))
         to_starts, to_ends = self._starts - point, self._ends - point
         crosses = to_starts[:, 0] * to_ends[:, 1] - to_starts[:, 1] * to_ends[:, 0]
-        is_on = np.abs(crosses) < _PARALLEL
-        if is_on.any():
-            # In line with a wall, and maybe on it: rare enough to be looked at pair by pair.
-            return self.cast(np.broadcast_to(point, directions.shape), directions)
+        is_in_line = np.abs(crosses) < _PARALLEL
+        if is_in_line.any():
+            if (to_starts * to_ends).sum(axis=1)[is_in_line].min() <= _PARALLEL:
+                # On a wall: rare enough to be looked at pair by pair.
+                return self.cast(np.broadcast_to(point, directions.shape), directions)
+            # It is seen edgeways, that is, not at all.
+            to_starts, to_ends, crosses = to_starts[~is_in_line], to_ends[~is_in_line], crosses[~is_in_line]
         across = np.stack((-directions[:, 1], directions[:, 0]))
         nearest = np.zeros(len(directions))
         # Not all at once: what does not fit into the processor's cache is several times as slow.
@@ -106,7 +109,7 @@ class Walls:
             beside_starts *= beside_ends
             np.copyto(inverse, 0.0, where=beside_starts > 0.0)
             np.maximum(nearest, inverse.max(axis=0), out=nearest)
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):
             found: Floats = np.where(nearest > 0.0, 1.0 / nearest, np.inf)
         return found
 

@@ -15,6 +15,7 @@ from robosc_bridge.simulated.drift import Drift
 from robosc_bridge.simulated.robots import Body
 from robosc_bridge.simulated.rounds import Rounds
 from robosc_bridge.simulated.scene import IDEAL, Obstacle, Scene
+from robosc_bridge.simulated.sweep import Sweep
 from robosc_bridge.simulated.timebase import Timebase
 from robosc_bridge.simulated.walls import Floats, Walls
 
@@ -24,8 +25,6 @@ _STRONGEST_RAD_S2 = 150.0
 _FRICTION_RAD_S2 = 60.0
 # A body that has left a wall by so much has left it; less is the same collision.
 _APART_M = 0.005
-_DEGREES = np.radians(np.arange(360.0))
-_TURN = np.stack((np.cos(_DEGREES), np.sin(_DEGREES)), axis=1)
 
 
 @dataclass
@@ -130,6 +129,7 @@ class World:
         self.body = body
         self.scene = walls if isinstance(walls, Scene) else Scene("walls", walls)
         self.walls = self.scene.walls
+        self._sweep = Sweep(self.walls)
         self.time = time
         self.x_m, self.y_m, self.heading_rad = self.scene.start if pose is None else pose
         self.left = Wheel()
@@ -304,7 +304,7 @@ class World:
         with self.time.lock:
             self.catch_up()
             cosine, sine = math.cos(self.heading_rad), math.sin(self.heading_rad)
-            x_m, y_m = self.x_m + cosine * self.body.scanner_x_m, self.y_m + sine * self.body.scanner_x_m
+            x_m, y_m = self._scanner_place()
             rounds = self._rounds
         turn = np.array(((cosine, sine), (-sine, cosine)))
         along = directions @ turn
@@ -335,4 +335,11 @@ class World:
         Returns:
             Shape (360,): counter-clockwise from the front, in metres; infinity where nothing is met.
         """
-        return self.cast(None, _TURN)
+        with self.time.lock:
+            self.catch_up()
+            x_m, y_m = self._scanner_place()
+            return self._sweep.lengths_m(x_m, y_m, self.heading_rad, self._rounds)
+
+    def _scanner_place(self) -> tuple[float, float]:
+        aside_m = self.body.scanner_x_m
+        return self.x_m + math.cos(self.heading_rad) * aside_m, self.y_m + math.sin(self.heading_rad) * aside_m

@@ -109,7 +109,11 @@ def test_discs_do_not_mind_how_long_a_direction_is(
     directions = _directions(np.arange(12.0))
     many = Rounds(discs).cast(np.tile((x_m, y_m), (12, 1)), directions * length)
     one = Rounds(discs).cast(np.array([(x_m, y_m)]), directions)
-    assert np.allclose(many * length, one, rtol=1e-6, atol=1e-6)
+    aside = np.array([(disc[0] - x_m) * directions[:, 1] - (disc[1] - y_m) * directions[:, 0] for disc in discs])
+    # A ray that just grazes a disc is met or not by rounding.
+    radii = np.array([disc[2] for disc in discs]).reshape(-1, 1)
+    grazes = (np.abs(np.abs(aside.reshape(-1, 12)) - radii) < 1e-6).any(axis=0)
+    assert (np.isclose(many * length, one, rtol=1e-6, atol=1e-6) | grazes).all()
 
 
 @settings(deadline=None, max_examples=15)

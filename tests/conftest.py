@@ -42,6 +42,7 @@ _IN_REAL_TIME = (
     "tests/end_to_end/test_serial_maze.py",
     "tests/end_to_end/test_twin_ros1.py",
     "tests/end_to_end/test_twin_ros2.py",
+    "tests/end_to_end/test_twin_roslaunch.py",
     "tests/test_tutorial.py",
 )
 

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 CONNECTIONS = ("serial", "ros2", "ros1")
 
 _FASTEST = 100.0
+# As a scene file has it; what that is read with takes too long to import for a command line.
+_MOST_SEED = 2**31 - 1
 _MODULES = "robosc_bridge.experiments"
 
 _DESCRIPTION = """\
@@ -108,7 +110,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="let the world pass N times as fast as the clock (default: 10 for the maze, 2 for the line)",
     )
     parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="of what the scene leaves to chance (default: 0)"
+        "--seed", type=_seed, default=0, metavar="N", help="of what the scene leaves to chance (default: 0)"
     )
     parser.add_argument(
         "-o",
@@ -132,6 +134,15 @@ def _speed(text: str) -> float:
     return value
 
 
+def _seed(text: str) -> int:
+    value = int(text)
+    if not 0 <= value <= _MOST_SEED:
+        raise ValueError
+    return value
+
+
+# What argparse calls them.
+_seed.__name__ = f"whole number from 0 to {_MOST_SEED},"
 _speed.__name__ = f"number above 0, up to {_FASTEST:g},"
 
 

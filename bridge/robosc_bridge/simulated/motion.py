@@ -10,14 +10,14 @@ was elsewhere since; each line is written at once:
 `time` is in seconds since 1970, `world_s` in seconds of the world since the simulation began.
 """
 
-import contextlib
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, TextIO
+from typing import Annotated, Literal
 
 import msgspec
 
+from robosc_bridge.simulated.output import Sink
 from robosc_bridge.simulated.world import STEP_S, Happening, World
 
 SAMPLE_S = 0.05
@@ -107,10 +107,10 @@ class MotionRecorder:
 
     Args:
         world: That is watched from now on.
-        stream: Where to; is closed by whoever opened it.
+        stream: Where to, such as an `Output`; is closed by whoever opened it.
     """
 
-    def __init__(self, world: World, stream: TextIO) -> None:
+    def __init__(self, world: World, stream: Sink) -> None:
         self._world = world
         self._stream = stream
         self._encoder = msgspec.json.Encoder()
@@ -176,10 +176,8 @@ class MotionRecorder:
         return round(time.clock.wall() - (time.world_s() - world_s) / time.factor, _DIGITS)
 
     def _write(self, entry: Sample | Event) -> None:
-        # A full disk ends the record, not the robot; whoever reads it misses its end.
-        with contextlib.suppress(OSError):
-            self._stream.write(self._encoder.encode(entry).decode("utf-8") + "\n")
-            self._stream.flush()
+        self._stream.write(self._encoder.encode(entry).decode("utf-8") + "\n")
+        self._stream.flush()
 
 
 def read_motion(path: Path) -> Motion:

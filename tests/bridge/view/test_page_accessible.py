@@ -234,7 +234,7 @@ def test_the_switch_goes_before_the_computer_and_is_kept(browser: Browser, serve
 NOTE_MOTION = """() => {
   window.motion = [];
   new MutationObserver(([{ target }]) => {
-    motion.push([target.dataset.glow, getComputedStyle(target).opacity, document.getAnimations().length]);
+    motion.push([target.dataset.glow, getComputedStyle(target).strokeOpacity, document.getAnimations().length]);
   }).observe(document.querySelector("#cards"), { subtree: true, attributeFilter: ["data-glow"] });
 }"""
 

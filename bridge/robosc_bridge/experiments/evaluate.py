@@ -19,7 +19,7 @@ from robosc.source import visible
 
 if TYPE_CHECKING:
     from robosc.supervisor.structure import Supervisor
-    from robosc_bridge.experiments.cycles import CycleTimes
+    from robosc_bridge.experiments.cycles.times import CycleTimes
     from robosc_bridge.experiments.lines_of_code import CodeSize
     from robosc_bridge.experiments.report import FailedRun, Report, ReportedRun
     from robosc_bridge.experiments.scenario import Outcome
@@ -371,7 +371,7 @@ def _sizes(experiment: Experiment) -> "tuple[tuple[CodeSize, ...], Supervisor]":
 
 
 def _cycles(experiment: Experiment, controller: "Supervisor") -> "tuple[CycleTimes, ...]":
-    from robosc_bridge.experiments.cycles import measure
+    from robosc_bridge.experiments.cycles.measure import measure
 
     return measure(experiment.name, controller)
 

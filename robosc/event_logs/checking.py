@@ -7,9 +7,12 @@ log as events like any other; a request is wrong while one of the resets or taus
 executor takes them first. Where something is wrong the replay goes on from what the log tells.
 """
 
+import json
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from robosc.errors import RoboscError
+from robosc.event_logs.data import is_provided
 from robosc.event_logs.replay import Replay
 from robosc.event_logs.structure import LogEntry, LoggedRun
 from robosc.model.structure import CommunicationKind, Deployment, EventKind
@@ -18,7 +21,15 @@ from robosc.supervisor.structure import Supervisor
 MAXIMUM_VIOLATIONS = 1000
 """Violations that are told one by one: more are only counted."""
 
+KINDS = frozenset(
+    ("event", "unexpected", "unknown", "release", "blocked", "fault", "stop", "resume", "restart", "dropped")
+)
+"""Kinds of entries."""
+
 _FAULT = "a fault"
+_KINDS_SHOWN = 5
+_KIND_SHOWN = 40
+_DATA_SHOWN = 120
 
 
 class WrongDeploymentError(RoboscError):
@@ -68,8 +79,8 @@ class LogCheck:
 
     @property
     def has_passed(self) -> bool:
-        """Whether nothing is wrong."""
-        return self.violation_count == 0
+        """Whether something was checked, and nothing is wrong."""
+        return self.violation_count == 0 and self.events > 0
 
 
 def check_log(run: LoggedRun, supervisor: Supervisor, deployment: Deployment | None = None) -> LogCheck:
@@ -97,6 +108,16 @@ def check_log(run: LoggedRun, supervisor: Supervisor, deployment: Deployment | N
     return checking.result(run)
 
 
+def _is_of(stop: str, sensor: str) -> bool:
+    """Whether a stop is that of a stale sensor: `scan on /scan is stale`; a sentence of somebody else may begin so."""
+    return stop.startswith(f"{sensor} on ") and stop.endswith(" is stale")
+
+
+def _shown(data: object) -> str:
+    text = json.dumps(data, default=str)
+    return text if len(text) <= _DATA_SHOWN else text[: _DATA_SHOWN - 4] + " ..."
+
+
 class _Checking:
     """One log while it is checked."""
 
@@ -110,6 +131,12 @@ class _Checking:
         self._stops: set[str] = set()
         # Actions that were requested: their goals may be under way for longer than the model knows.
         self._requested: set[str] = set()
+        model = replay.model
+        # What nothing is requested before; the executor asks again in another run, which a log does not tell whole.
+        self._awaited = {item.identifier for item in model.communications if item.max_age is not None}
+        self._identifiers = {event: item.identifier for item in model.communications for event in item.events}
+        self._unknown_kinds: set[str] = set()
+        self._others = 0
 
     def result(self, run: LoggedRun) -> LogCheck:
         return LogCheck(
@@ -120,21 +147,37 @@ class _Checking:
             blocked=self._blocked,
             unjudged=self._unjudged,
             restarts=self._restarts,
-            notes=run.notes(),
+            notes=(*run.notes(), *self._notes()),
         )
 
+    def _notes(self) -> Iterator[str]:
+        if not self._events:
+            yield "the log tells of no event: there was nothing to check"
+        if self._others:
+            kinds = sorted(self._unknown_kinds)
+            shown = ", ".join(repr(kind[:_KIND_SHOWN]) for kind in kinds[:_KINDS_SHOWN])
+            more = ", ..." if len(kinds) > _KINDS_SHOWN else ""
+            yield f"{self._others} lines are of a kind that no log has, and were not looked at: {shown}{more}"
+
     def take(self, entry: LogEntry) -> None:
+        if entry.kind not in KINDS:
+            self._others += 1
+            self._unknown_kinds.add(entry.kind)
         match entry.kind:
             case "event":
                 self._event(entry)
             case "unexpected" if entry.event:
                 self._unexpected(entry)
+                self._seen(entry.event)
+            case "unknown":
+                self._seen(entry.event)
             case "blocked":
                 self._held_back(entry)
             case "restart":
                 self._restarts += 1
                 self._replay.restart()
                 self._stops.clear()
+                self._awaited.clear()
             case "fault":
                 self._stops.add(_FAULT)
             case "stop":
@@ -142,7 +185,7 @@ class _Checking:
             case "resume":
                 # `scan is back` ends `scan on /scan is stale`.
                 name = entry.text("what").removesuffix(" is back")
-                self._stops = {item for item in self._stops if not item.startswith(f"{name} on ")}
+                self._stops = {item for item in self._stops if not _is_of(item, name)}
 
     def _event(self, entry: LogEntry) -> None:
         replay, event = self._replay, entry.event
@@ -160,6 +203,9 @@ class _Checking:
             pending = replay.pending()
             if pending is not None:
                 problems.append(f"{event} happened although {pending} was still to be taken before any request")
+            if self._awaited:
+                problems.append(f"{event} happened before the first message on {', '.join(sorted(self._awaited))}")
+        self._seen(event)
         if kind != EventKind.CANCEL and entry.is_controllable is not replay.is_controllable(event):
             # A cancel is the caller's or the layer's own; both stand in the log of a layer.
             what = "controllable" if entry.is_controllable else "uncontrollable"
@@ -167,12 +213,27 @@ class _Checking:
         why = replay.refusal(event) if replay.is_controllable(event) else ""
         if why:
             problems.append(f"{event} was not allowed: {why}")
+        elif kind == EventKind.REQUEST and self._deployment is Deployment.CONTROLLER:
+            problems += self._provided_otherwise(event, entry.data)
         if why and not replay.is_possible(event):
             replay.adopt(event, entry.state)
         else:
             problems += replay.step(event, entry.data, entry.state)
         if problems:
             self._wrong(entry, "; ".join(problems))
+
+    def _seen(self, event: str) -> None:
+        """Something has come, whether the state could accept it or not."""
+        if self._awaited and event in self._identifiers:
+            self._awaited.discard(self._identifiers[event])
+
+    def _provided_otherwise(self, event: str, data: object) -> Iterator[str]:
+        """What is wrong with the data of a controller's request. A layer passes on what it was given."""
+        is_known, provided = self._replay.provided(event)
+        if not is_known:
+            yield f"{event} happened although the data that the model provides for it was not known"
+        elif not is_provided(data, provided):
+            yield f"{event} carries {_shown(data)}, where the model provides {_shown(provided)}"
 
     def _unexpected(self, entry: LogEntry) -> None:
         if self._replay.has(entry.event) and self._replay.is_possible(entry.event):

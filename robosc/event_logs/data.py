@@ -67,6 +67,28 @@ def is_same(logged: object, value: Value | None, type_: Type | None) -> bool:
     return type(found) is type(value) and found == value
 
 
+def is_provided(logged: object, data: object) -> bool:
+    """Whether a log tells just this data of a request, property by property.
+
+    Args:
+        logged: What stands in the log.
+        data: What the model provides: a value, properties by name, or None.
+    """
+    if isinstance(data, dict):
+        return (
+            isinstance(logged, dict)
+            and logged.keys() == data.keys()
+            and all(is_provided(logged[name], part) for name, part in data.items())
+        )
+    if isinstance(data, int | float) and not isinstance(data, bool):
+        found = _NOT_FINITE.get(logged) if isinstance(logged, str) else logged
+        if not isinstance(found, int | float) or isinstance(found, bool):
+            return False
+        both_nan = math.isnan(found) and math.isnan(data)
+        return both_nan or found == data or math.isclose(found, data, rel_tol=_CLOSE, abs_tol=1e-300)
+    return type(logged) is type(data) and logged == data
+
+
 class NotTold:
     """The log tells nothing of it."""
 

@@ -17,6 +17,11 @@ _ROW_PIXELS = 26
 _FRAME_PIXELS = 190
 
 
+def _escaped(text: str) -> str:
+    """A text, none of which plotly takes for a tag; it shows entities of quotation marks as they stand."""
+    return html.escape(text, quote=False)
+
+
 def page(sequence: EventSequence, title: str) -> tuple[bytes, EventSequence]:
     """A page, and what of the sequence it shows.
 
@@ -35,7 +40,7 @@ def page(sequence: EventSequence, title: str) -> tuple[bytes, EventSequence]:
                     x=[time_s for _, row in rows for time_s in row.times_s],
                     y=[place for place, row in rows for _ in row.times_s],
                     # Names come from a file, and plotly takes some tags in texts for its own.
-                    text=[f"{html.escape(row.event)} (line {line})" for _, row in rows for line in row.lines],
+                    text=[f"{_escaped(row.event)} (line {line})" for _, row in rows for line in row.lines],
                     hovertemplate="%{text}<br>%{x:.3f} s<extra></extra>",
                     mode="markers",
                     name="controllable" if is_controllable else "uncontrollable",
@@ -48,7 +53,7 @@ def page(sequence: EventSequence, title: str) -> tuple[bytes, EventSequence]:
                 )
             )
     figure.update_layout(
-        title={"text": html.escape(title)},
+        title={"text": _escaped(title)},
         template="plotly_white",
         height=_FRAME_PIXELS + _ROW_PIXELS * len(shown.rows),
         legend={"orientation": "h", "yanchor": "bottom", "y": 1.0, "x": 0},
@@ -56,16 +61,16 @@ def page(sequence: EventSequence, title: str) -> tuple[bytes, EventSequence]:
             {
                 "type": "line", "x0": item.time_s, "x1": item.time_s, "y0": 0, "y1": 1, "yref": "paper",
                 "line": {"color": "#555555", "width": 1, "dash": "dot"},
-                "label": {"text": html.escape(item.text), "textangle": 0, "font": {"size": 9}, "yanchor": "top"},
+                "label": {"text": _escaped(item.text), "textangle": 0, "font": {"size": 9}, "yanchor": "top"},
             }
             for item in shown.interruptions
         ],
     )  # fmt: skip
-    notes = "".join(f"<br>{html.escape(note)}" for note in shown.notes)
+    notes = "".join(f"<br>{_escaped(note)}" for note in shown.notes)
     figure.update_xaxes(title=f"time since the begin of the log (s){notes}", automargin=True)
     figure.update_yaxes(
         tickvals=list(range(len(shown.rows))),
-        ticktext=[html.escape(row.label) for row in shown.rows],
+        ticktext=[_escaped(row.label) for row in shown.rows],
         range=[len(shown.rows) - 0.4, -0.6],
         automargin=True,
     )

@@ -1,7 +1,6 @@
 """Reads event logs, which may come from anywhere: every size is bounded, and what is wrong is told with its line."""
 
 import json
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -20,6 +19,9 @@ MAXIMUM_LINE_BYTES = 1 << 20
 
 MAXIMUM_ENTRIES = 1_000_000
 """A day of ten events a second."""
+
+MAXIMUM_TIME_S = 1e12
+"""The latest time: a log of the year 33658 is none."""
 
 _MAXIMUM_NAME = 600
 """Characters of an event's name: two identifiers of 255 and more."""
@@ -102,11 +104,14 @@ class _Reading:
         time_s, kind = document.get("time"), document.get("kind")
         if not _is_time(time_s):
             self._refuse(number, "its 'time' is no number of seconds")
-        if not isinstance(kind, str) or not 0 < len(kind) <= _MAXIMUM_NAME:
+        if not _is_name(kind) or not kind:
             self._refuse(number, "it has no 'kind'")
         event = document.get("event", "")
-        if not isinstance(event, str) or len(event) > _MAXIMUM_NAME or (kind == "event" and not event):
+        if not _is_name(event) or (kind == "event" and not event):
             self._refuse(number, "its 'event' is no event's name")
+        what = document.get("what", "")
+        if isinstance(what, str) and not _is_text(what):
+            self._refuse(number, "its 'what' is no text that can be shown")
         is_controllable = document.get("controllable", False)
         if not isinstance(is_controllable, bool):
             self._refuse(number, "its 'controllable' is neither true nor false")
@@ -141,11 +146,16 @@ class _Reading:
 def _is_time(value: object) -> "TypeIs[int | float]":
     if not isinstance(value, int | float) or isinstance(value, bool):
         return False
-    try:
-        return math.isfinite(value)
-    except OverflowError:
-        # A whole number of hundreds of digits.
-        return False
+    return abs(value) <= MAXIMUM_TIME_S
+
+
+def _is_name(value: object) -> "TypeIs[str]":
+    return isinstance(value, str) and len(value) <= _MAXIMUM_NAME and value.isprintable()
+
+
+def _is_text(value: str) -> bool:
+    """Whether it can be drawn: no half of a character of UTF-16, no control character but white space."""
+    return all(char.isprintable() or char.isspace() for char in value)
 
 
 def _is_component(part: object) -> bool:

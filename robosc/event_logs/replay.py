@@ -27,6 +27,8 @@ from robosc.model.structure import (
     Deployment,
     EventKind,
     Model,
+    ObjectValue,
+    ProvidedValue,
     Transition,
     Variable,
     is_tau,
@@ -69,6 +71,12 @@ class Replay:
         supervisor: Its automata, requirements and added conditions.
         deployment: Where it stood.
 
+    Attributes:
+        model: The model.
+        requests: The communications that are requested, by identifier.
+        state: Of the automata.
+        stored: Values of the variables that synthesis leaves out, by component and name.
+
     Raises:
         UnsupportedModelError: A synthesis variable takes received data with infinitely many values.
     """
@@ -76,7 +84,7 @@ class Replay:
     def __init__(self, supervisor: Supervisor, deployment: Deployment) -> None:
         model = _own_transitions_first(supervisor.model)
         system = to_automata(model, deployment)
-        self._model = model
+        self.model = model
         self._semantics = Semantics(system)
         self._added = state_predicates(system, supervisor.added)
         self._events = {event.name: event.is_controllable for event in system.events}
@@ -144,7 +152,7 @@ class Replay:
     def _blocked_by(self, event: str) -> str:
         name, _, kind = event.rpartition(".")
         if not is_tau(event):
-            communication = self._model.communication(name)
+            communication = self.model.communication(name)
             location = self._location(communication)
             moves = communication_plant(communication).edges
             if location is not None and not any(e.source == location and e.event == event for e in moves):
@@ -166,6 +174,21 @@ class Replay:
                 if target != self.state:
                     return event
         return None
+
+    def provided(self, request: str) -> tuple[bool, Any]:
+        """The data that the model provides for a request in this state: (is known, data)."""
+        name, _, _ = request.rpartition(".")
+        for statement in self.model.provides_for(name):
+            if statement.condition is None or self._value(statement.condition, "", None) is True:
+                return self._provided_value(statement.value)
+        return True, None
+
+    def _provided_value(self, provided: ProvidedValue) -> tuple[bool, Any]:
+        if not isinstance(provided, ObjectValue):
+            value = self._value(provided, "", None)
+            return value is not None, value
+        found = {name: self._provided_value(part) for name, part in provided.properties}
+        return all(is_known for is_known, _ in found.values()), {name: value for name, (_, value) in found.items()}
 
     # What happens.
 

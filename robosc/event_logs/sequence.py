@@ -110,8 +110,8 @@ def sequence_of(
 
     Args:
         run: The log.
-        begin_s: The window's begin, in seconds since the begin of the log; None: the first event.
-        end_s: Its end; None: the last event.
+        begin_s: The window's begin, in seconds since the begin of the log; None: the first event or interruption.
+        end_s: Its end; None: the last event or interruption.
         events: Names, or patterns such as `*.request`, of the events to show; empty: all.
         only_changes: Whether events are left out that say nothing new.
 
@@ -133,15 +133,18 @@ def sequence_of(
     if not inside:
         last_s = max(entry.time_s for entry in chosen) - run.begin_s
         raise PlotError(f"no event in the time window; the last one is at {last_s:.3f} s")
-    first_s = min(time_s for time_s, _ in inside) if begin_s is None else begin_s
-    last_s = max(time_s for time_s, _ in inside) if end_s is None else end_s
+    # A fault that ends a run comes after its last event.
+    interrupted = [entry for entry in run.entries if entry.kind in _INTERRUPTIONS]
+    times_s = [time_s for time_s, _ in inside] + [entry.time_s - run.begin_s for entry in interrupted]
+    first_s = min(times_s) if begin_s is None else begin_s
+    last_s = max(times_s) if end_s is None else end_s
     shown, notes = _most_frequent([entry for _, entry in inside])
     if only_changes:
         notes = ("events that repeat what was known already are left out", *notes)
     interruptions = tuple(
         Interruption(entry.time_s - run.begin_s, f"{entry.kind}: {entry.text('what')}".removesuffix(": ")[:80])
-        for entry in run.entries
-        if entry.kind in _INTERRUPTIONS and first_s <= entry.time_s - run.begin_s <= last_s
+        for entry in interrupted
+        if first_s <= entry.time_s - run.begin_s <= last_s
     )
     if len(interruptions) > MAXIMUM_INTERRUPTIONS:
         notes += (f"of {len(interruptions)} faults, stops and restarts the first {MAXIMUM_INTERRUPTIONS} are drawn",)

@@ -5,6 +5,7 @@
 
 import copy
 import json
+import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from random import Random
@@ -179,7 +180,8 @@ def faults(supervisor: Supervisor, entries: Sequence[Entry]) -> Iterator[int]:
         elif kind in ("fault", "stop"):
             reasons.add(kind if kind == "fault" else entry["what"])
         elif kind == "resume":
-            reasons = {item for item in reasons if item.split(" on ")[0] != entry["what"].removesuffix(" is back")}
+            back = re.compile(re.escape(entry["what"].removesuffix(" is back")) + " on .* is stale", re.DOTALL)
+            reasons = {item for item in reasons if not back.fullmatch(item)}
         elif kind == "event" and not _happens(system, supervisor, entry, bool(reasons)):
             yield line
             return
@@ -189,6 +191,8 @@ def _happens(system: InterpretedSystem, supervisor: Supervisor, entry: Entry, is
     event = entry["event"]
     kind = event.rpartition(".")[2]
     if kind == "request" and (is_stopped or system.enabled_silent() is not None):
+        return False
+    if kind == "request" and supervisor.deployment == "controller" and not _is_provided(system, entry):
         return False
     is_cancel = kind == "cancel" and supervisor.deployment == "layer"
     is_own = kind in ("request", "cancel", "reset") or kind.startswith("tau_")
@@ -207,6 +211,11 @@ def _happens(system: InterpretedSystem, supervisor: Supervisor, entry: Entry, is
     return bool(system.state() == entry["state"])
 
 
+def _is_provided(system: InterpretedSystem, entry: Entry) -> bool:
+    is_known, data = system.provide(entry["event"].rpartition(".")[0])
+    return is_known and bool(json.loads(json_line({"data": data}))["data"] == entry["data"])
+
+
 def _is_idle_tau(system: InterpretedSystem, event: str) -> bool:
     """A tau that changes nothing is never taken, but it is not forbidden."""
     rule = system._events[event]
@@ -221,9 +230,14 @@ def mutated(dice: Random, supervisor: Supervisor, entries: Sequence[Entry]) -> l
         return None
     found = copy.deepcopy(list(entries))
     place = dice.choice(places)
-    match dice.randrange(5):
+    match dice.randrange(6):
         case 0:
             del found[place]
+        case 5:
+            asked = [number for number in places if found[number]["event"].endswith(".request")]
+            if not asked:
+                return None
+            found[dice.choice(asked)]["data"] = dice.choice((None, 1, {}, {"n": 1}, {"n": 1, "m": 1.5}, True, "small"))
         case 1:
             requests = [
                 f"{item.name}.request"
@@ -272,8 +286,11 @@ def walked(supervisor: Supervisor, dice: Random, steps: int, data: Callable[[Ran
         successor = system._successor(rule, reading.values.get)
         if successor is None or successor.leaves_range:
             continue
+        is_known, provided = system.provide(event.rpartition(".")[0]) if kind == "request" else (True, None)
+        if not is_known:
+            continue
         system.step(event, reading)
-        told = {"data": None if is_own else reading.data, "state": system.state()}
+        told = {"data": provided if is_own else reading.data, "state": system.state()}
         entry = {"time": float(number), "kind": "event", "event": event, "controllable": is_own, **told}
         entries.append(json.loads(json_line(entry)))
     return entries

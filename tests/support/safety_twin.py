@@ -200,7 +200,8 @@ class SafetyTwin:
 
     @staticmethod
     def _moved(present: float, wanted: float, up: float, down: float) -> float:
-        if present * wanted < 0:
+        # Of the smallest numbers the product would be 0.
+        if present < 0 < wanted or wanted < 0 < present:
             aim, most = 0.0, down
         elif abs(wanted) < abs(present):
             aim, most = wanted, down

@@ -1,7 +1,9 @@
 """`robosc evaluate`: the paper's experiments, run whole, and one report of them."""
 
 import argparse
+import contextlib
 import importlib
+import itertools
 import math
 import sys
 import time
@@ -17,7 +19,7 @@ from robosc.source import visible
 
 if TYPE_CHECKING:
     from robosc.supervisor.structure import Supervisor
-    from robosc_bridge.experiments.evaluate_cycles import CycleTimes
+    from robosc_bridge.experiments.cycles.times import CycleTimes
     from robosc_bridge.experiments.lines_of_code import CodeSize
     from robosc_bridge.experiments.report import FailedRun, Report, ReportedRun
     from robosc_bridge.experiments.scenario import Outcome
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
 CONNECTIONS = ("serial", "ros2", "ros1")
 
 _FASTEST = 100.0
+# As a scene file has it; what that is read with takes too long to import for a command line.
+_MOST_SEED = 2**31 - 1
 _MODULES = "robosc_bridge.experiments"
 
 _DESCRIPTION = """\
@@ -106,7 +110,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="let the world pass N times as fast as the clock (default: 10 for the maze, 2 for the line)",
     )
     parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="of what the scene leaves to chance (default: 0)"
+        "--seed", type=_seed, default=0, metavar="N", help="of what the scene leaves to chance (default: 0)"
     )
     parser.add_argument(
         "-o",
@@ -117,7 +121,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="the report's folder (default: %(default)s)",
     )
     parser.add_argument(
-        "--no-cycles", action="store_true", help="do not measure control cycles, which takes half a minute"
+        "--no-cycles", action="store_true", help="do not measure control cycles, which takes a minute or two"
     )
     parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
     parser.set_defaults(run=run)
@@ -130,6 +134,15 @@ def _speed(text: str) -> float:
     return value
 
 
+def _seed(text: str) -> int:
+    value = int(text)
+    if not 0 <= value <= _MOST_SEED:
+        raise ValueError
+    return value
+
+
+# What argparse calls them.
+_seed.__name__ = f"whole number from 0 to {_MOST_SEED},"
 _speed.__name__ = f"number above 0, up to {_FASTEST:g},"
 
 
@@ -262,10 +275,12 @@ def _run(
 
 
 def _new_folder(folder: Path, name: str) -> Path:
-    """A folder for a run that is not there yet: what an earlier run has left stays."""
-    number = 1
-    while (place := folder / f"{name}-{number}").exists():
-        number += 1
+    """A new, empty folder for a run: what an earlier one has left stays, and one that is under way has its own."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for number in itertools.count(1):
+        with contextlib.suppress(FileExistsError):
+            (place := folder / f"{name}-{number}").mkdir()
+            break
     return place
 
 
@@ -356,7 +371,7 @@ def _sizes(experiment: Experiment) -> "tuple[tuple[CodeSize, ...], Supervisor]":
 
 
 def _cycles(experiment: Experiment, controller: "Supervisor") -> "tuple[CycleTimes, ...]":
-    from robosc_bridge.experiments.evaluate_cycles import measure
+    from robosc_bridge.experiments.cycles.measure import measure
 
     return measure(experiment.name, controller)
 

@@ -15,7 +15,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoes
 
 from robosc._version import __version__
 from robosc.event_logs import LogCheck
-from robosc_bridge.experiments.evaluate_cycles import CycleTimes
+from robosc_bridge.experiments.cycles.times import CycleTimes
 from robosc_bridge.experiments.lines_of_code import COUNTER, CodeSize
 
 TITLES: Mapping[str, str] = {"maze": "Maze solver", "line": "Line follower"}
@@ -157,7 +157,19 @@ def write_report(report: Report, folder: Path) -> tuple[Path, ...]:
     )
     if report.cycles:
         files["cycles.csv"] = _csv(
-            ("experiment", "what", "middleware", "mean_us", "min_us", "max_us", "sd_us", "median_us", "cycles", "by"),
+            (
+                "experiment",
+                "what",
+                "middleware",
+                "mean_us",
+                "min_us",
+                "max_us",
+                "sd_us",
+                "median_us",
+                "publish_median_us",
+                "cycles",
+                "by",
+            ),
             _cycle_rows(report.cycles),
         )
     if report.sizes:
@@ -226,13 +238,13 @@ def _shown_cycles(cycles: Iterable[CycleTimes]) -> list[dict[str, Any]]:
     for (is_without, experiment), members in sorted(groups.items()):
         title, middleware = TITLES[experiment], "without" if is_without else "with"
         for times in members:
-            measured = () if times.microseconds is None else (*times.microseconds, times.median_us)
-            figures = [f"{figure:.2f}" for figure in measured]
+            measured = () if times.microseconds is None else (*times.microseconds, times.median_us, times.publish_us)
+            figures = ["–" if figure is None else f"{figure:.2f}" for figure in measured]
             found.append({
                 "title": title, "middleware": middleware, "what": times.what, "figures": figures,
                 "count": times.count, "why": f"not measured: {times.why}", "is_paper": False,
             })  # fmt: skip
-        paper = [*(f"{figure:g}" for figure in members[0].paper), "–"]
+        paper = [*(f"{figure:g}" for figure in members[0].paper), "–", "–"]
         found.append({
             "title": title, "middleware": middleware, "what": "the paper's", "figures": paper, "count": 3000,
             "why": "", "is_paper": True,
@@ -266,13 +278,14 @@ def _cycle_rows(cycles: Iterable[CycleTimes]) -> Iterable[tuple[object, ...]]:
     seen = set[tuple[str, bool]]()
     for times in cycles:
         middleware = "with" if times.has_middleware else "without"
-        figures = [""] * 5
+        figures = [""] * 6
         if times.microseconds is not None:
-            figures = [f"{us:.3f}" for us in (*times.microseconds, times.median_us)]
+            measured = (*times.microseconds, times.median_us, times.publish_us)
+            figures = ["" if us is None else f"{us:.3f}" for us in measured]
         yield times.experiment, times.what, middleware, *figures, times.count, "here"
         if (times.experiment, times.has_middleware) not in seen:
             seen.add((times.experiment, times.has_middleware))
-            yield times.experiment, "generated C, ROS", middleware, *times.paper, "", 3000, "the paper"
+            yield times.experiment, "generated C, ROS", middleware, *times.paper, "", "", 3000, "the paper"
 
 
 def _size_rows(sizes: Mapping[str, Sequence[CodeSize]]) -> Iterable[tuple[object, ...]]:

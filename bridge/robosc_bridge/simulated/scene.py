@@ -247,7 +247,7 @@ class _Maker:
             points = (*points, points[0])
         try:
             if said.kind == "spline":
-                points = spline(points)
+                points = spline(points, said.width_m)
             return Track(points, said.width_m, said.shade)
         except ValueError as error:
             self._fail(str(error), ("line",))

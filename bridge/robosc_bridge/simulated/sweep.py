@@ -4,7 +4,7 @@ Each wall is met by the rays between the directions of its two ends and by no ot
 and a ray are computed: in a maze a few for each wall, where all pairs are hundreds of times as many. In the laser's own
 axes the rays are always the same; it is the ends of the walls that are turned. With its ends a and b, a wall is met by
 the ray d at the length t with 1/t = (d x (b - a)) / (a x b), which is linear in d: the greatest is the nearest wall.
-Who is in line with a wall does not see it; who is on one sees nothing else.
+Who is in line with a wall sees its near end, if a ray goes there; who is on one sees nothing else.
 
 `Walls.cast` and `Rounds.cast` tell the same for any rays, pair by pair.
 """
@@ -68,10 +68,12 @@ class Sweep:
         xs, ys = cosine * apart_x + sine * apart_y, cosine * apart_y - sine * apart_x
         crosses = xs[0] * ys[1] - ys[0] * xs[1]
         is_in_line = np.abs(crosses) < _PARALLEL
+        edgeways = None
         if is_in_line.any():
             if (xs[0] * xs[1] + ys[0] * ys[1])[is_in_line].min() <= _PARALLEL:
                 # On a wall.
                 return np.zeros(BEAMS)
+            edgeways = xs[:, is_in_line], ys[:, is_in_line]
             xs, ys, crosses = xs[:, ~is_in_line], ys[:, ~is_in_line], crosses[~is_in_line]
         places = np.arctan2(ys, xs)
         places *= _PER_RAD
@@ -95,7 +97,18 @@ class Sweep:
         np.maximum(once[: _HALF + 1], nearest[_HALF + BEAMS :], out=once[: _HALF + 1])
         with np.errstate(divide="ignore", over="ignore"):
             found: Floats = 1.0 / once
+        if edgeways is not None:
+            _see_edgeways(found, *edgeways)
         return found
+
+
+def _see_edgeways(lengths_m: Floats, xs: Floats, ys: Floats) -> None:
+    """Shorten the rays that go along a wall."""
+    nearest_m = np.hypot(xs, ys).min(axis=0)
+    places = np.arctan2(ys[0], xs[0]) * _PER_RAD
+    rays = np.rint(places)
+    is_met = np.abs(places - rays) < _SLACK
+    np.minimum.at(lengths_m, rays[is_met].astype(np.intp) % BEAMS, nearest_m[is_met])
 
 
 def _see_disc(lengths_m: Floats, ahead_m: float, left_m: float, radius_m: float) -> None:

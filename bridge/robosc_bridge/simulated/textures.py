@@ -67,7 +67,7 @@ class Texture:
 
 
 def _hashed(cells: npt.NDArray[np.int64], seed: int) -> npt.NDArray[np.uint32]:
-    mixed = (cells[:, 0] * 73_856_093 ^ cells[:, 1] * 19_349_663 ^ seed * 83_492_791).astype(np.uint32)
+    mixed = (cells[:, 0] * 73_856_093 ^ cells[:, 1] * 19_349_663 ^ (seed * 83_492_791 & 0xFFFF_FFFF)).astype(np.uint32)
     for factor, shift in ((0x85EBCA6B, 16), (0xC2B2AE35, 13)):
         mixed ^= mixed >> np.uint32(shift)
         mixed *= np.uint32(factor)

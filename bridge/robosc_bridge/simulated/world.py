@@ -239,12 +239,13 @@ class World:
     def catch_up(self) -> None:
         """Live until now, in whole steps; what is commanded now acts from here on."""
         with self.time.lock:
-            now_s = self.time.world_s()
+            began_s, before_s, now_s = self.time.now_s(), self.lived_s, self.time.world_s()
             while self.lived_s + STEP_S <= now_s + 1e-9:
                 self.lived_s += STEP_S
                 self._step()
                 for on_step, _ in self._watchers:
                     on_step(self.lived_s)
+            self.time.lived(self.lived_s - before_s, began_s)
 
     def _step(self) -> None:
         left_rad, right_rad = self.left.step(STEP_S), self.right.step(STEP_S)

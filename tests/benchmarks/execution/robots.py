@@ -1,24 +1,30 @@
 """The robots that are measured, what comes to them, and a large one."""
 
-from types import SimpleNamespace
 from typing import Any
 
 from robosc.supervisor.structure import Supervisor
+from robosc_bridge.experiments.cycles.times import PAPER
+from robosc_bridge.experiments.cycles.times import feed as comes
 from support.execution import supervisor_of
 from support.generated import example_supervisor
 from support.models import model_of
 
-CYCLES = 1000
-RUNS = 3
-
-# The paper's Table I: mean, minimum, maximum, standard deviation.
-WITHOUT = {"line_follower": "5 / 0 / 73 / 5", "maze_solver": "2 / 0 / 139 / 7"}
-WITH = {"line_follower": "34 / 11 / 160 / 25", "maze_solver": "40 / 9 / 660 / 40"}
-
 SMALL = ("line_follower", "maze_solver")
+EXPERIMENTS = {"line_follower": "line", "maze_solver": "maze"}
+
+
+def _paper(*, has_middleware: bool) -> dict[str, str]:
+    """The paper's Table I: mean, minimum, maximum, standard deviation."""
+    return {
+        name: " / ".join(f"{us:g}" for us in PAPER[experiment, has_middleware])
+        for name, experiment in EXPERIMENTS.items()
+    }
+
+
+WITHOUT, WITH = _paper(has_middleware=False), _paper(has_middleware=True)
+
 LARGE = "60 components"
-_OTHER = {"line_follower": ("/line/correction", 0.1), "maze_solver": ("/rotate_done", None), LARGE: ("/seen7", True)}
-_SCANS = tuple(SimpleNamespace(ranges=[distance] * 360) for distance in (3.0, 0.2))
+_SEEN = ("/seen7", True)
 
 _LARGE_SENSORS = 28
 
@@ -29,8 +35,10 @@ def supervisor(name: str) -> Supervisor:
 
 
 def feed(name: str, number: int) -> tuple[str, Any]:
-    """What comes: every other time a scan, whose obstacle comes and goes every 50 times."""
-    return ("/scan", _SCANS[number // 50 % 2]) if number % 2 else _OTHER[name]
+    """What comes: every other time a scan, whose obstacle comes and goes."""
+    if name == LARGE and number % 2 == 0:
+        return _SEEN
+    return comes(EXPERIMENTS.get(name, "line"), number)
 
 
 def _large_text() -> str:

@@ -15,12 +15,13 @@ import time
 from collections import Counter
 
 from execution import c_cycles
-from execution.null_middleware import NullMiddleware
-from execution.robots import CYCLES, LARGE, RUNS, SMALL, WITHOUT, feed, supervisor
+from execution.robots import LARGE, SMALL, WITHOUT, feed, supervisor
 from figures import micro
 from robosc.execution.executor import Executor
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.protocol import ControlledSystem
+from robosc_bridge.experiments.cycles.alone import NullMiddleware
+from robosc_bridge.experiments.cycles.times import CYCLES, RUNS
 from support.generated import load_system
 
 AIM_CYCLE, AIM_EVENT = "5", "2"

@@ -103,7 +103,17 @@ def test_what_cannot_be_is_one_clear_message(
     assert capsys.readouterr().err == f"robosc: {problem}\n"
 
 
-@pytest.mark.parametrize("arguments", [["--speed", "0"], ["--speed", "nan"], ["--experiment", "golf"], ["--seed", "x"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--speed", "0"],
+        ["--speed", "nan"],
+        ["--experiment", "golf"],
+        ["--seed", "x"],
+        ["--seed", "-1"],
+        ["--seed", "1000000000000000"],
+    ],
+)
 def test_arguments_that_are_wrong(arguments: list[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         call(*arguments)

@@ -1,6 +1,7 @@
 """A whole turn of the laser against the same rays one by one, among any walls and round things."""
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -116,10 +117,80 @@ def test_who_is_on_a_wall_sees_nothing_else() -> None:
         assert (Sweep(walls).lengths_m(*place, 0.3, Rounds([(1.0, 0.0, 0.2)])) == 0.0).all()
 
 
-def test_who_is_in_line_with_a_wall_sees_what_is_behind_it() -> None:
-    walls = Walls([(1.0, 0.0, 2.0, 0.0), (4.0, 0.0, 4.0, 0.0), (5.0, -1.0, 5.0, 1.0)])
-    assert Sweep(walls).lengths_m(0.0, 0.0, 0.0, NOTHING)[0] == pytest.approx(5.0)
-    assert walls.cast_from(0.0, 0.0, np.array([(1.0, 0.0)]))[0] == pytest.approx(5.0)
+@pytest.mark.parametrize("heading_rad", [0.0, 1.0, -2.0, math.pi])
+def test_who_is_in_line_with_a_wall_sees_its_near_end(heading_rad: float) -> None:
+    """And not through it, whichever of its ends is told first."""
+    cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
+    turned = [
+        (cosine * x1 - sine * y1, sine * x1 + cosine * y1, cosine * x2 - sine * y2, sine * x2 + cosine * y2)
+        for x1, y1, x2, y2 in (
+            (2.0, 0.0, 1.0, 0.0),
+            (1.5, 0.0, 2.5, 0.0),
+            (-4.0, 0.0, -3.0, 0.0),
+            (5.0, -1.0, 5.0, 1.0),
+        )
+    ]
+    walls = Walls(turned)
+    directions = np.array([(cosine, sine), (-2 * cosine, -2 * sine), (-sine, cosine)])
+    expected = pytest.approx([1.0, 1.5, math.inf])
+    assert walls.cast(np.zeros((3, 2)), directions).tolist() == expected
+    assert walls.cast_from(0.0, 0.0, directions).tolist() == expected
+    assert Sweep(walls).lengths_m(0.0, 0.0, heading_rad, NOTHING)[[0, 180, 90]].tolist() == pytest.approx(
+        [1.0, 3.0, math.inf]
+    )
+    # Whoever is beside the line by a hair sees what is behind.
+    aside = walls.cast_from(-1e-6 * sine, 1e-6 * cosine, directions[:1])
+    assert aside.tolist() == pytest.approx([5.0])
+
+
+WHOLE = st.integers(-4, 4)
+_WAYS = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)]
+
+
+def exact_ray(segments: list[tuple[int, int, int, int]], place: tuple[int, int], way: tuple[int, int]) -> float:
+    """One wall after the other, in fractions."""
+    found: list[Fraction] = []
+    for x1, y1, x2, y2 in segments:
+        edge, apart = (x2 - x1, y2 - y1), (x1 - place[0], y1 - place[1])
+        cross = way[0] * edge[1] - way[1] * edge[0]
+        beside = apart[0] * way[1] - apart[1] * way[0]
+        if cross:
+            length = Fraction(apart[0] * edge[1] - apart[1] * edge[0], cross)
+            found += [length] * (length >= 0 and 0 <= Fraction(beside, cross) <= 1)
+        elif beside == 0:
+            square = way[0] ** 2 + way[1] ** 2
+            ends = [
+                Fraction((x - place[0]) * way[0] + (y - place[1]) * way[1], square) for x, y in ((x1, y1), (x2, y2))
+            ]
+            if max(ends) >= 0:
+                found.append(max(min(ends), Fraction(0)))
+    return float(min(found)) if found else math.inf
+
+
+@settings(max_examples=300)
+@given(st.lists(st.tuples(WHOLE, WHOLE, WHOLE, WHOLE), max_size=8), WHOLE, WHOLE)
+def test_rays_on_a_grid_are_as_fractions_tell(segments: list[tuple[int, int, int, int]], x: int, y: int) -> None:
+    walls = Walls(segments)
+    expected = pytest.approx([exact_ray(segments, (x, y), way) for way in _WAYS])
+    ways = np.array(_WAYS, dtype=np.float64)
+    assert walls.cast(np.tile((float(x), float(y)), (8, 1)), ways).tolist() == expected
+    assert walls.cast_from(x, y, ways).tolist() == expected
+    turn = Sweep(walls).lengths_m(x, y, 0.0, NOTHING)[::45] / np.hypot(*ways.T)
+    assert turn.tolist() == expected
+
+
+def test_a_robot_comes_to_the_end_of_a_wall_and_its_laser_sees_that() -> None:
+    walls = Walls([(1.0, 0.0, 2.0, 0.0), (3.0, -1.0, 3.0, 1.0)])
+    world = World(BODIES["burger"], walls, Timebase(ManualClock()))
+    assert world.scan()[0] == pytest.approx(1.032)
+    assert world.ranges((0.0,))[0] == pytest.approx(1.032)
+    for wheel in (world.left, world.right):
+        wheel.is_driven, wheel.goal_rad_s = True, 6.0
+    world.time.advance(10.0)
+    world.catch_up()
+    assert world.x_m == pytest.approx(1.0 - 0.105, abs=0.002)
+    assert world.collisions == 1
+    assert world.scan()[0] == pytest.approx(0.105 + 0.032, abs=0.002)
 
 
 def test_open_space_is_without_end_and_a_disc_is_seen_from_within() -> None:

@@ -110,6 +110,9 @@ class World:
         x_m: Of the middle between the wheels.
         y_m: Of the same.
         heading_rad: Counter-clockwise from x, unbounded.
+        floor_speed_m_s: Forward, as it moved on the floor in the last step: slip and walls make it less than what the
+            wheels turn.
+        floor_turn_rad_s: Counter-clockwise, likewise.
         collisions: How often the body has come to a wall or an obstacle.
         is_touching: Whether it is at one now.
         left: The left wheel.
@@ -134,6 +137,8 @@ class World:
         self.x_m, self.y_m, self.heading_rad = self.scene.start if pose is None else pose
         self.left = Wheel()
         self.right = Wheel()
+        self.floor_speed_m_s = 0.0
+        self.floor_turn_rad_s = 0.0
         self.collisions = 0
         self.is_touching = False
         self.lived_s = time.world_s()
@@ -257,6 +262,7 @@ class World:
             left_rad *= 1.0 - drift.slips[0]
             right_rad *= 1.0 - drift.slips[1]
         if left_rad == 0.0 and right_rad == 0.0:
+            self.floor_speed_m_s = self.floor_turn_rad_s = 0.0
             return
         left_m, right_m = left_rad * self.body.wheel_radius_m, right_rad * self.body.wheel_radius_m
         forward_m = (left_m + right_m) / 2
@@ -264,9 +270,11 @@ class World:
         middle_rad = self.heading_rad + turn_rad / 2
         # A round body can always turn, whatever it touches; its wheels slip where it cannot go on.
         self.heading_rad += turn_rad
-        self._go(forward_m, forward_m * math.cos(middle_rad), forward_m * math.sin(middle_rad))
+        has_gone = self._go(forward_m, forward_m * math.cos(middle_rad), forward_m * math.sin(middle_rad))
+        self.floor_speed_m_s, self.floor_turn_rad_s = forward_m * has_gone / STEP_S, turn_rad / STEP_S
 
-    def _go(self, forward_m: float, along_x_m: float, along_y_m: float) -> None:
+    def _go(self, forward_m: float, along_x_m: float, along_y_m: float) -> bool:
+        """Move, unless something is in the way; whether it has."""
         x_m, y_m = self.x_m + along_x_m, self.y_m + along_y_m
         radius_m = self.body.radius_m
         # A distance changes by no more than the way that was gone: most often nobody has to measure.
@@ -279,11 +287,12 @@ class World:
                     self.is_touching = True
                     self.collisions += 1
                     self._tell(Happening("collision", self.x_m, self.y_m, name))
-                return
+                return False
             self._clear_m = nearest_m
             self.is_touching = self.is_touching and nearest_m < radius_m + _APART_M
         self.x_m, self.y_m = x_m, y_m
         self._see_goal()
+        return True
 
     def _nearest(self, x_m: float, y_m: float) -> tuple[float, str]:
         """How far the nearest thing is, and its name; nothing for a wall."""

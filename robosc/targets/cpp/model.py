@@ -169,8 +169,7 @@ class Writer:
                 "}",
             ]
         return _function(
-            "inline void put_communications("
-            f"std::string& out, [[maybe_unused]] const {layout.prefix}_state_t& state)",
+            f"inline void put_communications(std::string& out, [[maybe_unused]] const {layout.prefix}_state_t& state)",
             [*lines, "out += '}';"],
             comment("Where each service and action is, as JSON, for /state."),
         )

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from robosc.errors import RoboscError
 from robosc.event_logs.replay import Replay
+from robosc.event_logs.stops import is_ended
 from robosc.event_logs.structure import LogEntry, LoggedRun
 from robosc.model.structure import CommunicationKind, Deployment, EventKind
 from robosc.supervisor.structure import Supervisor
@@ -140,9 +141,7 @@ class _Checking:
             case "stop":
                 self._stops.add(entry.text("what"))
             case "resume":
-                # `scan is back` ends `scan on /scan is stale`.
-                name = entry.text("what").removesuffix(" is back")
-                self._stops = {item for item in self._stops if not item.startswith(f"{name} on ")}
+                self._stops = {item for item in self._stops if not is_ended(item, entry.text("what"))}
 
     def _event(self, entry: LogEntry) -> None:
         replay, event = self._replay, entry.event

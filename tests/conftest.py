@@ -36,6 +36,7 @@ _IN_REAL_TIME = (
     "tests/bridge/ground/test_ground_run.py",
     "tests/bridge/remote/test_whole.py",
     "tests/bridge/terminal/test_teleop.py",
+    "tests/bridge/view/test_page_bridge.py",
     "tests/end_to_end/test_demo.py",
     "tests/end_to_end/test_line_follower_demo.py",
     "tests/end_to_end/test_serial_line.py",

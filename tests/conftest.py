@@ -38,12 +38,14 @@ _IN_REAL_TIME = (
     "tests/bridge/ground/test_ground_run.py",
     "tests/bridge/remote/test_whole.py",
     "tests/bridge/terminal/test_teleop.py",
+    "tests/bridge/view/test_page_bridge.py",
     "tests/end_to_end/test_demo.py",
     "tests/end_to_end/test_line_follower_demo.py",
     "tests/end_to_end/test_serial_line.py",
     "tests/end_to_end/test_serial_maze.py",
     "tests/end_to_end/test_twin_ros1.py",
     "tests/end_to_end/test_twin_ros2.py",
+    "tests/end_to_end/test_twin_roslaunch.py",
     "tests/test_tutorial.py",
 )
 

@@ -19,6 +19,7 @@ from robosc_bridge.experiments.processes import interruptible
 from robosc_bridge.experiments.scenario import Outcome, ScenarioError
 from robosc_bridge.simulated.map_picture import draw_map
 from robosc_bridge.simulated.motion import read_motion
+from robosc_bridge.simulated.values import option, seed
 
 ROOT = Path(__file__).resolve().parents[2]
 SPEED = 10.0
@@ -122,7 +123,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument(
         "--scene", default=SCENES[0], metavar="NAME|FILE", help=f"{', '.join(SCENES)}, or a file; default: %(default)s"
     )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of maze-random, and of noise")
+    parser.add_argument("--seed", type=option(seed), default=0, metavar="N", help="of maze-random, and of noise")
     parser.add_argument(
         "--speed", type=float, default=SPEED, metavar="N", help="the world passes N times as fast; default: %(default)g"
     )

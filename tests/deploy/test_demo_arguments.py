@@ -44,3 +44,17 @@ def test_a_speed_that_cannot_be_is_one_clear_error(tmp_path: Path) -> None:
     )
     assert result.returncode == 1
     assert result.stderr == "demo: the speed must be from 0.5 to 25, and is 1000\n"
+
+
+def test_a_seed_that_cannot_be_is_one_clear_error(tmp_path: Path) -> None:
+    result = subprocess.run(
+        [sys.executable, str(DEMO / "demo.py"), "--seed", "-1", "--output", str(tmp_path / "out")],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert result.returncode == 2
+    assert result.stderr.splitlines()[-1] == (
+        "demo.py: error: argument --seed: a whole number from 0 to 2147483647 is needed, not '-1'"
+    )

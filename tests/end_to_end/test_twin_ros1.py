@@ -102,6 +102,14 @@ def test_other_nodes_see_a_turtlebot(serve: Callable[..., tuple[Process, int]], 
     assert last["x_m"] == pytest.approx(odometry()["pose"]["pose"]["position"]["x"], abs=0.1)
 
 
+def test_it_takes_other_names_as_every_node_does(serve: Callable[..., tuple[Process, int]], peer: Peer) -> None:
+    twin, _ = serve("__name:=front", "/scan:=/front/scan", "--scene", "room")
+    peer.subscribe("/front/scan", TYPES["/scan"])
+    until(lambda: bool(peer.received["/front/scan"]), "a scan under its other name", twin)
+    assert "/front" in str(peer.names())
+    assert peer.ends("/front/scan") == ["/front"]
+
+
 @pytest.fixture
 def tf_messages(tmp_path: Path) -> Path:
     """The package tf2_msgs, made of its definition as ROS 1's own build does: where to import it from."""

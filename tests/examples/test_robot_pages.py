@@ -14,7 +14,7 @@ from robosc.model import check
 from support.launch_stub import Recorded, launch_actions
 from support.models import EXAMPLES
 
-ROBOTS = sorted(path.parent.name for path in EXAMPLES.glob("*/README.md") if path.parent.name != "robosc_examples")
+ROBOTS = sorted({path.parent.name for path in EXAMPLES.glob("*/*.rscd")})
 HELPERS = EXAMPLES / "robosc_examples"
 ROOT = EXAMPLES.parent
 

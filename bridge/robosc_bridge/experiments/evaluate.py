@@ -1,12 +1,15 @@
 """`robosc evaluate`: the paper's experiments, run whole, and one report of them."""
 
 import argparse
+import contextlib
 import importlib
+import itertools
 import math
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +19,7 @@ from robosc.source import visible
 
 if TYPE_CHECKING:
     from robosc.supervisor.structure import Supervisor
-    from robosc_bridge.experiments.cycles import CycleTimes
+    from robosc_bridge.experiments.cycles.times import CycleTimes
     from robosc_bridge.experiments.lines_of_code import CodeSize
     from robosc_bridge.experiments.report import FailedRun, Report, ReportedRun
     from robosc_bridge.experiments.scenario import Outcome
@@ -24,6 +27,8 @@ if TYPE_CHECKING:
 CONNECTIONS = ("serial", "ros2", "ros1")
 
 _FASTEST = 100.0
+# As a scene file has it; what that is read with takes too long to import for a command line.
+_MOST_SEED = 2**31 - 1
 _MODULES = "robosc_bridge.experiments"
 
 _DESCRIPTION = """\
@@ -48,7 +53,7 @@ class Experiment:
         name: `maze` or `line`.
         function: Of the connections' modules; runs it.
         serial_module: The one for serial lines.
-        scene: The world, if no other is wanted.
+        scenes: The worlds, one after the other, if no other is wanted.
         speed: How many times as fast as the clock, if nothing else is wanted.
         deployment: Of its supervisor.
     """
@@ -56,15 +61,15 @@ class Experiment:
     name: str
     function: str
     serial_module: str
-    scene: str
+    scenes: tuple[str, ...]
     speed: float
     deployment: Deployment
 
 
 EXPERIMENTS: Mapping[str, Experiment] = {
-    "maze": Experiment("maze", "run_maze", "maze", "maze-rooms", 10.0, Deployment.CONTROLLER),
+    "maze": Experiment("maze", "run_maze", "maze", ("maze-rooms",), 10.0, Deployment.CONTROLLER),
     # The camera shows so many pictures a second of the clock: the follower of a faster world would see too few.
-    "line": Experiment("line", "run_line", "line", "line-oval", 2.0, Deployment.LAYER),
+    "line": Experiment("line", "run_line", "line", ("line-oval", "line-curves"), 2.0, Deployment.LAYER),
 }
 
 
@@ -95,7 +100,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser.add_argument(
         "--scene",
         metavar="NAME|FILE",
-        help="the world, for one experiment (default: maze-rooms, line-oval); --list-scenes of "
+        help="the world, for one experiment (default: maze-rooms; line-oval, then line-curves); --list-scenes of "
         "'python -m robosc_bridge.simulated' names those that come with it",
     )
     parser.add_argument(
@@ -105,7 +110,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="let the world pass N times as fast as the clock (default: 10 for the maze, 2 for the line)",
     )
     parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="of what the scene leaves to chance (default: 0)"
+        "--seed", type=_seed, default=0, metavar="N", help="of what the scene leaves to chance (default: 0)"
     )
     parser.add_argument(
         "-o",
@@ -129,6 +134,15 @@ def _speed(text: str) -> float:
     return value
 
 
+def _seed(text: str) -> int:
+    value = int(text)
+    if not 0 <= value <= _MOST_SEED:
+        raise ValueError
+    return value
+
+
+# What argparse calls them.
+_seed.__name__ = f"whole number from 0 to {_MOST_SEED},"
 _speed.__name__ = f"number above 0, up to {_FASTEST:g},"
 
 
@@ -190,7 +204,7 @@ def evaluated(
         experiments: Which.
         connections: Over what.
         folder: Of the report; every run gets a new folder in it.
-        scene: The world; None: each experiment's own.
+        scene: The world; None: each experiment's own ones.
         speed: How many times as fast as the clock; None: each experiment's own.
         seed: Of what a scene leaves to chance.
         has_cycles: Whether control cycles are measured.
@@ -203,20 +217,21 @@ def evaluated(
     cycles: list[CycleTimes] = []
     sizes: dict[str, tuple[CodeSize, ...]] = {}
     for experiment in experiments:
-        for connection in connections:
-            title = f"{experiment.name} over {connection}"
+        for connection, place in product(connections, experiment.scenes if scene is None else (scene,)):
+            title = f"{experiment.name} over {connection}, {place}"
             found = _run(
                 experiment,
                 connection,
                 folder,
-                scene or experiment.scene,
+                place,
                 speed or experiment.speed,
                 seed,
                 lambda text, title=title: say(f"{title}: {text}"),  # type: ignore[misc]
             )
             if isinstance(found, _Reported):
                 runs.append(found.run)
-            else:
+            elif found not in failures:
+                # What no world can be run without is told once.
                 failures.append(found)
     for experiment in experiments:
         say(f"{experiment.name}: lines of code")
@@ -260,10 +275,12 @@ def _run(
 
 
 def _new_folder(folder: Path, name: str) -> Path:
-    """A folder for a run that is not there yet: what an earlier run has left stays."""
-    number = 1
-    while (place := folder / f"{name}-{number}").exists():
-        number += 1
+    """A new, empty folder for a run: what an earlier one has left stays, and one that is under way has its own."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for number in itertools.count(1):
+        with contextlib.suppress(FileExistsError):
+            (place := folder / f"{name}-{number}").mkdir()
+            break
     return place
 
 
@@ -354,7 +371,7 @@ def _sizes(experiment: Experiment) -> "tuple[tuple[CodeSize, ...], Supervisor]":
 
 
 def _cycles(experiment: Experiment, controller: "Supervisor") -> "tuple[CycleTimes, ...]":
-    from robosc_bridge.experiments.cycles import measure
+    from robosc_bridge.experiments.cycles.measure import measure
 
     return measure(experiment.name, controller)
 

@@ -128,22 +128,8 @@ class Program:
 
     def __enter__(self) -> Self:
         pipe = subprocess.PIPE if self._is_asked else None
-        with self.log.open("w", encoding="utf-8") as log, _interrupts.held():
-            try:
-                process = subprocess.Popen(  # noqa: S603 (our own programs)
-                    [sys.executable, "-I", "-S", _BEGIN, str(os.getpid()), self._interpreter, *self._arguments],
-                    env=environment() if self._variables is None else dict(self._variables),
-                    cwd=self._folder,
-                    stdin=pipe or subprocess.DEVNULL,
-                    stdout=pipe or log,
-                    stderr=log,
-                    start_new_session=True,
-                    text=True,
-                )
-            except OSError as error:
-                raise ScenarioError(f"{self.name} cannot be started: {error.strerror or error}") from error
-            self._process = process
         try:
+            process = self._started(pipe)
             if self._is_preferred:
                 # Now it has one thread, whose priority the others will inherit.
                 with suppress(PermissionError, ProcessLookupError):
@@ -159,6 +145,24 @@ class Program:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.stop()
+
+    def _started(self, pipe: int | None) -> "subprocess.Popen[str]":
+        # What interrupts meanwhile does so when it is noted that the process is there.
+        with self.log.open("w", encoding="utf-8") as log, _interrupts.held():
+            try:
+                self._process = subprocess.Popen(  # noqa: S603 (our own programs)
+                    [sys.executable, "-I", "-S", _BEGIN, str(os.getpid()), self._interpreter, *self._arguments],
+                    env=environment() if self._variables is None else dict(self._variables),
+                    cwd=self._folder,
+                    stdin=pipe or subprocess.DEVNULL,
+                    stdout=pipe or log,
+                    stderr=log,
+                    start_new_session=True,
+                    text=True,
+                )
+            except OSError as error:
+                raise ScenarioError(f"{self.name} cannot be started: {error.strerror or error}") from error
+            return self._process
 
     @property
     def _used(self) -> "subprocess.Popen[str]":
@@ -249,13 +253,16 @@ class Program:
         process = self._process
         if process is None:
             return
-        if process.poll() is None:
-            process.terminate()
-            with suppress(subprocess.TimeoutExpired):
-                process.wait(STOP_LIMIT_S)
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+        try:
+            if process.poll() is None:
+                process.terminate()
+                with suppress(subprocess.TimeoutExpired):
+                    process.wait(STOP_LIMIT_S)
+        finally:
+            # Also where somebody does not wait for it any longer.
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
         if process.stdin is not None:
             # What it has not read is nobody's any more.
             with suppress(OSError):

@@ -15,7 +15,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoes
 
 from robosc._version import __version__
 from robosc.event_logs import LogCheck
-from robosc_bridge.experiments.cycles import CycleTimes
+from robosc_bridge.experiments.cycles.times import CycleTimes
 from robosc_bridge.experiments.lines_of_code import COUNTER, CodeSize
 
 TITLES: Mapping[str, str] = {"maze": "Maze solver", "line": "Line follower"}
@@ -334,7 +334,8 @@ def _bars(sizes: Mapping[str, Sequence[CodeSize]]) -> bytes:
         axes.set_xticks(range(len(names)), names)
         axes.set_ylabel("lines of code")
         axes.spines[["top", "right"]].set_visible(False)
-        axes.legend(frameon=False)
+        # At the "best" place it would cover nothing, but take a slow machine long to find, which matplotlib warns of.
+        figure.legend(loc="outside upper right", ncols=2, frameon=False)
         content = io.BytesIO()
         figure.savefig(content, format="png", dpi=130, metadata={"Software": "RoboSC"})
     return content.getvalue()

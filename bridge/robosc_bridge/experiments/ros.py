@@ -28,6 +28,7 @@ from robosc_bridge.experiments.scenario import Connection, Outcome, Say, Scenari
 from robosc_bridge.experiments.serial import EXAMPLES, scene_of
 from robosc_bridge.experiments.tail import LineCount, Now, latest
 from robosc_bridge.simulated.judge import SETTLE_S, Halt, judge_line, judge_maze
+from robosc_bridge.simulated.scene import scene_names
 
 HELPERS = EXAMPLES / "robosc_examples"
 MAZE_MODEL = EXAMPLES / "maze_solver" / "maze_solver.rscd"
@@ -439,6 +440,7 @@ def _setting(
     speed: float,
     patience_s: float,
 ) -> Setting:
-    source = str(scene.resolve()) if isinstance(scene, Path) else scene
+    # The twin has another working folder.
+    source = scene if isinstance(scene, str) and scene in scene_names() else str(Path(scene).resolve())
     place = scene_of(source, seed)
     return Setting(folder.resolve(), model.resolve(), deployment, place, middleware, source, seed, speed, patience_s)

@@ -19,11 +19,25 @@ from types import FrameType
 from robosc_bridge.simulated.commands import UnknownCommandError, obey
 from robosc_bridge.simulated.floor import Track, oval, parse_track
 from robosc_bridge.simulated.lidar import LIDARS
+from robosc_bridge.simulated.mishaps import Mishaps
 from robosc_bridge.simulated.motion import MotionRecorder
+from robosc_bridge.simulated.output import Output
 from robosc_bridge.simulated.recorder import Recorder
 from robosc_bridge.simulated.robots import BODIES
 from robosc_bridge.simulated.scene import Scene, load_scene, maze_scene, scene_names
+from robosc_bridge.simulated.scene_file import MOST_CELLS
+from robosc_bridge.simulated.timebase import FASTEST
 from robosc_bridge.simulated.turtlebot3 import BASES, SimulatedTurtleBot3
+from robosc_bridge.simulated.values import (
+    FARTHEST_M,
+    angle,
+    coordinate,
+    number,
+    option,
+    seed,
+    together,
+    whole,
+)
 from robosc_bridge.simulated.walls import parse_walls, room
 
 OVAL = "oval"
@@ -37,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: None: those of the process.
 
     Returns:
-        The exit code: 0 when it was interrupted, 1 when it cannot be served.
+        The exit code: 0 when it was interrupted, 1 when it cannot be served, or something has gone wrong meanwhile.
     """
     options = _parser().parse_args(arguments)
     if options.list_scenes:
@@ -49,14 +63,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     def end(number: int, frame: FrameType | None) -> None:
         received.append(number)
 
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, end)
+    for which in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(which, end)
+    mishaps = Mishaps()
     try:
         with contextlib.ExitStack() as stack:
+            stack.enter_context(mishaps)
             recorder = None
             if options.record is not None:
-                recorder = Recorder(stack.enter_context(options.record.open("w", encoding="ascii")))
-            motion = None if options.motion is None else stack.enter_context(options.motion.open("w", encoding="ascii"))
+                recorder = Recorder(stack.enter_context(contextlib.closing(Output(options.record, mishaps.tell))))
+            motion = None
+            if options.motion is not None:
+                motion = stack.enter_context(contextlib.closing(Output(options.motion, mishaps.tell)))
             robot = stack.enter_context(_robot(options, recorder))
             if motion is not None:
                 stack.enter_context(contextlib.closing(MotionRecorder(robot.world, motion)))
@@ -67,12 +85,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             sys.stdout.flush()
             threading.Thread(target=_listen, args=(robot,), name="commands", daemon=True).start()
             # Nor without end: a signal that comes just before a wait begins does not end it.
-            while not received:
+            while not received and not mishaps.has_crashed:
                 time.sleep(_POLL_S)
     except (OSError, ValueError) as error:
         print(f"the robot cannot be simulated: {error}", file=sys.stderr)
         return 1
-    return 0
+    return mishaps.status
 
 
 def _robot(options: argparse.Namespace, recorder: Recorder | None) -> SimulatedTurtleBot3:
@@ -94,8 +112,8 @@ def _robot(options: argparse.Namespace, recorder: Recorder | None) -> SimulatedT
 
 
 def _listen(robot: SimulatedTurtleBot3) -> None:
-    """Obey standard input to its end; the robot is served on after it."""
-    with contextlib.suppress(ValueError):
+    """Obey standard input to its end, or until it cannot be read; the robot is served on after it."""
+    with contextlib.suppress(ValueError, OSError):
         for line in sys.stdin:
             try:
                 answer = obey(robot, line)
@@ -113,7 +131,7 @@ def _scene(options: argparse.Namespace) -> Scene:
     line = _track(options.line)
     if options.maze is not None:
         columns, rows = options.maze
-        return replace(maze_scene(round(columns), round(rows), seed=options.seed), line=line)
+        return replace(maze_scene(columns, rows, seed=options.seed), line=line)
     if options.walls is not None:
         return Scene("walls", parse_walls(options.walls.read_text(encoding="utf-8")), line=line)
     return Scene("room", room(*options.room), line=line)
@@ -125,22 +143,16 @@ def _track(name: str | None) -> Track | None:
     return oval() if name == OVAL else parse_track(Path(name).read_text(encoding="utf-8"))
 
 
-def _numbers(text: str, separator: str, count: int) -> tuple[float, ...]:
-    try:
-        found = tuple(float(word) for word in text.split(separator))
-    except ValueError:
-        found = ()
-    if len(found) != count:
-        raise argparse.ArgumentTypeError(f"{count} numbers with `{separator}` between them are needed, not {text!r}")
-    return found
+def _side(text: str) -> float:
+    return number(text, 0.1, FARTHEST_M)
 
 
-def _size(text: str) -> tuple[float, ...]:
-    return _numbers(text, "x", 2)
+def _cells(text: str) -> int:
+    return whole(text, 1, MOST_CELLS)
 
 
-def _pose(text: str) -> tuple[float, ...]:
-    return _numbers(text, ",", 3)
+def _deviation(text: str) -> float:
+    return number(text, 0.0, 1.0)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -155,9 +167,18 @@ def _parser() -> argparse.ArgumentParser:
     place.add_argument(
         "--scene", metavar="NAME|FILE", help=f"walls, line, goal, obstacles: {', '.join(scene_names())}, or a YAML file"
     )
-    place.add_argument("--room", type=_size, default=(4.0, 3.0), metavar="XxY", help="a room in metres; default: 4x3")
     place.add_argument(
-        "--maze", type=_size, metavar="COLUMNSxROWS", help="a maze of 1 m cells from the first to its exit"
+        "--room",
+        type=option(together((_side, _side), "x")),
+        default=(4.0, 3.0),
+        metavar="XxY",
+        help="a room in metres; default: 4x3",
+    )
+    place.add_argument(
+        "--maze",
+        type=option(together((_cells, _cells), "x")),
+        metavar="COLUMNSxROWS",
+        help="a maze of 1 m cells from the first to its exit",
     )
     place.add_argument("--walls", type=Path, metavar="FILE", help="walls from a file, `x1 y1 x2 y2` in metres a line")
     parser.add_argument(
@@ -166,9 +187,14 @@ def _parser() -> argparse.ArgumentParser:
         help="a line on the floor, and a camera that sees it: an oval from the start, or `x y` in metres a line",
     )
     parser.add_argument(
-        "--pose", type=_pose, metavar="X,Y,HEADING", help="start, in m and rad; default: the scene's, else 0,0,0"
+        "--pose",
+        type=option(together((coordinate, coordinate, angle), ",")),
+        metavar="X,Y,HEADING",
+        help="start, in m and rad; default: the scene's, else 0,0,0",
     )
-    parser.add_argument("--speed", type=float, default=1.0, metavar="N", help="the world passes N times as fast")
+    parser.add_argument(
+        "--speed", type=float, default=1.0, metavar="N", help=f"the world passes N times as fast, up to {FASTEST:g}"
+    )
     parser.add_argument(
         "--wait",
         type=float,
@@ -176,9 +202,14 @@ def _parser() -> argparse.ArgumentParser:
         help="the world waits for its host: no more than so many of its seconds pass after the last bytes from there",
     )
     parser.add_argument(
-        "--noise", type=float, metavar="M", help="standard deviation of the LiDAR in m; default: the scene's, else 0"
+        "--noise",
+        type=option(_deviation),
+        metavar="M",
+        help="standard deviation of the LiDAR in m; default: the scene's, else 0",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the maze and of all that comes by chance")
+    parser.add_argument(
+        "--seed", type=option(seed), default=0, metavar="N", help="of the maze and of all that comes by chance"
+    )
     parser.add_argument("--base-link", type=Path, metavar="PATH", help="where the base's port is to be")
     parser.add_argument("--scanner-link", type=Path, metavar="PATH", help="where the LiDAR's port is to be")
     parser.add_argument("--camera-link", type=Path, metavar="PATH", help="where the camera's socket is to be")

@@ -20,7 +20,7 @@ _MOST_CLIENTS = 4
 
 
 class SimulatedCamera:
-    """A camera that looks at the floor before the robot, until it is closed.
+    """A camera that looks at what is before the robot, until it is closed.
 
     Whoever connects gets every picture from then on; one who does not read misses pictures, never parts of them.
 
@@ -47,7 +47,7 @@ class SimulatedCamera:
         mount = mount or Mount()
         self._world = world
         self._time = world.time
-        self._eye = Eye(mount, world.scene.line, world.scene.floor, world.scene.noise.camera_shades, seed)
+        self._eye = Eye(mount, world.scene, seed)
         self._period_s = 1.0 / mount.rate_hz
         self._due_s = self._time.now_s()
         self._lock = threading.RLock()
@@ -167,7 +167,7 @@ class SimulatedCamera:
                 self._clients[client] = b""
 
     def _send(self) -> None:
-        shades = self._eye.picture(self._world.pose)
+        shades = self._eye.picture(self._world.pose, self._world.obstacles)
         if self.is_covered:
             shades[:] = DARKNESS
         data = b"P5 %d %d 255\n" % (shades.shape[1], shades.shape[0]) + shades.tobytes()

@@ -8,6 +8,7 @@ from robosc_bridge.simulated.line import Faults, SimulatedLine
 from robosc_bridge.simulated.rover import Rover
 from robosc_bridge.simulated.servo import HardwareError, Servo
 from robosc_bridge.simulated.turtlebot3 import SimulatedTurtleBot3
+from robosc_bridge.simulated.values import angle, coordinate, number, voltage, whole
 from robosc_bridge.simulated.world import World
 
 WORLD_HELP = """\
@@ -37,6 +38,10 @@ camera cover|uncover|freeze|go              the camera
 {world}"""
 
 
+# As much as a port takes at once.
+_MOST_GARBAGE = 4096
+
+
 class UnknownCommandError(ValueError):
     """There is no such command, or not with such values."""
 
@@ -52,7 +57,7 @@ def obey(robot: SimulatedTurtleBot3, line: str) -> str:
         What there is to tell; else nothing.
 
     Raises:
-        UnknownCommandError: It is not known.
+        UnknownCommandError: It is not known, or cannot be done.
     """
     words = line.split()
     if not words:
@@ -61,7 +66,8 @@ def obey(robot: SimulatedTurtleBot3, line: str) -> str:
         return _obey(robot, words)
     except UnknownCommandError:
         raise
-    except ValueError as error:
+    # A port whose name another one has taken meanwhile cannot be plugged in again.
+    except (ValueError, OSError) as error:
         raise UnknownCommandError(str(error)) from error
 
 
@@ -83,7 +89,7 @@ def obey_world(world: World, words: list[str]) -> str:
             case ["pose"]:
                 return "pose " + " ".join(f"{value:.4f}" for value in world.pose)
             case ["pose", x, y, heading]:
-                world.place(float(x), float(y), float(heading))
+                world.place(coordinate(x), coordinate(y), angle(heading))
             case ["collisions"]:
                 return f"collisions {world.collisions}"
             case ["goal"]:
@@ -91,7 +97,7 @@ def obey_world(world: World, words: list[str]) -> str:
             case ["obstacle", name, "away" | "back" as what]:
                 world.put_obstacle(name, what == "back")
             case ["obstacle", name, x, y]:
-                world.move_obstacle(name, float(x), float(y))
+                world.move_obstacle(name, coordinate(x), coordinate(y))
             case _:
                 raise UnknownCommandError(f"unknown command {' '.join(words)!r}; `help` lists them")
     except UnknownCommandError:
@@ -113,10 +119,10 @@ def _obey(robot: SimulatedTurtleBot3, words: list[str]) -> str:
             return obey_world(robot.world, words)
         case ["left" | "right" as side, *what] if robot.rover is None:
             _to_servo(robot.left if side == "left" else robot.right, what)
-        case ["battery", voltage] if robot.opencr is not None:
-            robot.opencr.set_battery(float(voltage))
-        case ["battery", voltage] if robot.rover is not None:
-            robot.rover.battery_v = float(voltage)
+        case ["battery", text] if robot.opencr is not None:
+            robot.opencr.set_battery(voltage(text))
+        case ["battery", text] if robot.rover is not None:
+            robot.rover.battery_v = voltage(text)
         case ["rover", *what] if robot.rover is not None:
             _to_rover(robot.rover, what)
         case ["press" | "let" as what, name] if robot.opencr is not None:
@@ -126,11 +132,11 @@ def _obey(robot: SimulatedTurtleBot3, words: list[str]) -> str:
         case ["scanner", "stall" | "go" as what]:
             robot.scanner.is_stalled = what == "stall"
         case ["scanner", "turn", share]:
-            robot.scanner.turn_at(float(share))
+            robot.scanner.turn_at(number(share, 0.01, 2.0))
         case ["camera", what] if robot.camera is not None:
             _to_camera(robot.camera, what)
         case ["base", "answers_as", device_id] if robot.rover is None:
-            answers_as = None if device_id == "own" else int(device_id)
+            answers_as = None if device_id == "own" else whole(device_id, 0, 255)
             # It has one of the two.
             if robot.opencr is not None:
                 robot.opencr.answers_as = answers_as
@@ -163,8 +169,8 @@ def _to_servo(servo: Servo, words: list[str]) -> None:
             servo.block_wheel()
         case ["release"]:
             servo.block_wheel(False)
-        case ["voltage", voltage]:
-            servo.brown_out(float(voltage))
+        case ["voltage", text]:
+            servo.brown_out(voltage(text))
         case _:
             raise UnknownCommandError(f"a servo does not know {' '.join(words)!r}; `help` lists what it knows")
 
@@ -190,7 +196,7 @@ def _to_rover(rover: Rover, words: list[str]) -> None:
         case ["accept"]:
             rover.refusal = ""
         case ["take_over", mode]:
-            rover.take_over(int(mode))
+            rover.take_over(whole(mode, 0, 255))
         case ["disarm"]:
             rover.disarm()
         case ["restart"]:
@@ -207,18 +213,30 @@ def _boolean(text: str) -> bool:
     return text == "true"
 
 
+def _seconds(text: str) -> float:
+    return number(text, 0.0, 3600.0)
+
+
 def _seconds_or_none(text: str) -> float | None:
-    return None if text == "none" else float(text)
+    return None if text == "none" else _seconds(text)
+
+
+def _share(text: str) -> float:
+    return number(text, 0.0, 1.0)
+
+
+def _count(text: str) -> int:
+    return whole(text, 0, 1_000_000)
 
 
 _READERS: dict[str, Callable[[str], object]] = {
-    "delay_s": float,
-    "drop_next": int,
-    "drop_share": float,
-    "corrupt_next": int,
-    "corrupt_share": float,
-    "lose_bytes_share": float,
-    "cut_next": int,
+    "delay_s": _seconds,
+    "drop_next": _count,
+    "drop_share": _share,
+    "corrupt_next": _count,
+    "corrupt_share": _share,
+    "lose_bytes_share": _share,
+    "cut_next": _count,
     "split_s": _seconds_or_none,
     "echo": _boolean,
     "is_deaf": _boolean,
@@ -234,7 +252,10 @@ def _to_line(line: SimulatedLine, words: list[str]) -> None:
         case ["sound"]:
             line.faults.clear()
         case ["garbage", *hexes] if hexes:
-            line.faults.garbage = bytes.fromhex("".join(hexes))
+            found = "".join(hexes)
+            if len(found) > 2 * _MOST_GARBAGE:
+                raise UnknownCommandError(f"garbage has {_MOST_GARBAGE} bytes at most")
+            line.faults.garbage = bytes.fromhex(found)
         case [name, value] if name in _READERS:
             setattr(line.faults, name, _READERS[name](value))
         case _:

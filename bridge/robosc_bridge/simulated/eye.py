@@ -1,16 +1,18 @@
-"""What a camera on the robot sees of the floor: a pinhole without distortion or shadows.
+"""What a camera on the robot sees: a pinhole without distortion or shadows.
 
 Central projection (R. Hartley, A. Zisserman, "Multiple View Geometry in Computer Vision", 2nd ed., Cambridge University
-Press 2004, section 6.1), of the one plane that is drawn: walls are not seen.
+Press 2004, section 6.1), of the floor, and of what stands on it and hides it (`standing`).
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from robosc_bridge.simulated.floor import Track
-from robosc_bridge.simulated.textures import PLAIN, Shades, Texture
+from robosc_bridge.simulated.scene import Obstacle, Scene
+from robosc_bridge.simulated.standing import Rays, Standing
+from robosc_bridge.simulated.textures import Shades
 from robosc_bridge.simulated.walls import Floats
 
 DISTANCE, DARKNESS = 160, 0
@@ -48,61 +50,76 @@ class Eye:
 
     Args:
         mount: The camera.
-        track: The line on the floor; None: there is none.
-        floor: What the floor looks like.
-        deviation: Of the noise of each pixel, of 255.
+        scene: Around it: the floor, the line on it, walls and obstacles, and the noise of each pixel.
         seed: Of the noise.
     """
 
-    def __init__(
-        self, mount: Mount, track: Track | None, floor: Texture = PLAIN, deviation: float = 0.0, seed: int = 0
-    ) -> None:
+    def __init__(self, mount: Mount, scene: Scene, seed: int = 0) -> None:
         self._mount = mount
-        self._track = track
-        self._texture = floor
-        self._deviation = deviation
+        self._scene = scene
         self._chance = np.random.default_rng(seed)
+        self._standing = Standing(rays(mount), scene.walls, scene.wall_height_m)
         points = ground_points(mount)
-        self._is_floor = ~np.isnan(points[:, 0])
-        self._floor: Floats = points[self._is_floor]
+        self._has_floor = ~np.isnan(points[:, 0])
+        self._floor: Floats = points[self._has_floor]
 
-    def picture(self, pose: tuple[float, float, float]) -> Shades:
+    def picture(self, pose: tuple[float, float, float], obstacles: Iterable[Obstacle] | None = None) -> Shades:
         """What is seen from a place.
 
         Args:
             pose: Of the robot: x, y in metres, heading in rad.
+            obstacles: As they are now; None: as at the start.
 
         Returns:
             Shape (height, width).
         """
+        scene = self._scene
         x_m, y_m, heading_rad = pose
         cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
-        points = self._floor @ np.array(((cosine, sine), (-sine, cosine))) + np.array((x_m, y_m))
-        seen = self._texture.shades(points)
-        if self._track is not None:
-            seen[self._track.is_line(points)] = self._track.shade
-        shades = np.full(self._is_floor.shape, DISTANCE, dtype=np.uint8)
-        shades[self._is_floor] = seen
-        if self._deviation:
-            noise = self._chance.normal(0.0, self._deviation, shades.shape)
+        turn = np.array(((cosine, sine), (-sine, cosine)))
+        is_there = [each for each in (scene.obstacles if obstacles is None else obstacles) if each.is_there]
+        stands = self._standing.mask(
+            x_m + cosine * self._mount.x_m,
+            y_m + sine * self._mount.x_m,
+            turn.T,
+            ((each.x_m, each.y_m, each.radius_m) for each in is_there),
+        ).ravel()
+        shades = np.where(stands, np.uint8(scene.wall_shade), np.uint8(DISTANCE))
+        is_floor, floor = self._has_floor, self._floor
+        if stands.any():
+            # What is hidden needs no look at the floor.
+            is_open = ~stands
+            floor = floor[is_open[is_floor]]
+            is_floor = is_floor & is_open
+        points = floor @ turn + np.array((x_m, y_m))
+        seen = scene.floor.shades(points)
+        if scene.line is not None:
+            seen[scene.line.is_line(points)] = scene.line.shade
+        shades[is_floor] = seen
+        if scene.noise.camera_shades:
+            noise = self._chance.normal(0.0, scene.noise.camera_shades, shades.shape)
             shades = np.clip(np.rint(shades + noise), 0, 255).astype(np.uint8)
         return shades.reshape(self._mount.height, self._mount.width)
 
 
+def rays(mount: Mount) -> Rays:
+    """Where the middle of each pixel looks, in the robot's axes (x forward, y left)."""
+    focal = mount.width / 2 / math.tan(mount.field_of_view_rad / 2)
+    right: Floats = (np.arange(mount.width, dtype=np.float64) + 0.5 - mount.width / 2) / focal
+    down: Floats = (np.arange(mount.height, dtype=np.float64) + 0.5 - mount.height / 2) / focal
+    cosine, sine = math.cos(mount.tilt_rad), math.sin(mount.tilt_rad)
+    return Rays(mount.height_m, focal, cosine - down * sine, sine + down * cosine, -right)
+
+
 def ground_points(mount: Mount) -> Floats:
-    """Where the floor is that each pixel shows, in the robot's axes (x forward, y left).
+    """Where the floor is that each pixel shows, in the robot's axes.
 
     Returns:
         Shape (height * width, 2), row by row from above; NaN above the horizon.
     """
-    focal = mount.width / 2 / math.tan(mount.field_of_view_rad / 2)
-    right = (np.arange(mount.width) + 0.5 - mount.width / 2) / focal
-    down = ((np.arange(mount.height) + 0.5 - mount.height / 2) / focal)[:, None]
-    cosine, sine = math.cos(mount.tilt_rad), math.sin(mount.tilt_rad)
-    # Of a ray of length 1 along the axis.
-    forward = cosine - down * sine
-    below = sine + down * cosine
-    lengths = mount.height_m / np.where(below > 1e-9, below, np.nan)
-    x_m = mount.x_m + np.broadcast_to(lengths * forward, (mount.height, mount.width))
-    y_m = -lengths * right
+    seen = rays(mount)
+    lengths = mount.height_m / np.where(seen.below > 1e-9, seen.below, np.nan)
+    shape = (mount.height, mount.width)
+    x_m = np.broadcast_to((mount.x_m + lengths * seen.forward)[:, None], shape)
+    y_m = lengths[:, None] * seen.left
     return np.stack((x_m.ravel(), y_m.ravel()), axis=1)

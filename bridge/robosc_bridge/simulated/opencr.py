@@ -115,7 +115,8 @@ class OpenCr:
         self._low_since_s: float | None = None
         self._start_heading_rad = world.heading_rad
         self._last_speed_m_s = 0.0
-        self._sensed_s = self._time.world_s()
+        self._forward_m_s2 = 0.0
+        self._sensed_s = world.lived_s
         for address, value in (
             (_CHIP, 0x5000), (_INFORMATION, world.body.opencr_information), (6, 5), (7, DEVICE_ID), (9, 2),
         ):  # fmt: skip
@@ -357,15 +358,17 @@ class OpenCr:
         self._put(_TORQUE, len(servos) == 2 and all(servo.table["torque enable"] for servo in servos))
 
     def _sense_motion(self) -> None:
+        """What the inertial sensors feel: the body on the floor, whatever the wheels do."""
         world = self._world
-        speed_m_s, turn_rad_s = world.speed_m_s, world.turn_rad_s
+        speed_m_s, turn_rad_s = world.floor_speed_m_s, world.floor_turn_rad_s
         yaw_rad = world.heading_rad - self._start_heading_rad
-        now_s = self._time.world_s()
-        forward_m_s2 = (speed_m_s - self._last_speed_m_s) / max(now_s - self._sensed_s, CYCLE_S)
-        self._last_speed_m_s, self._sensed_s = speed_m_s, now_s
+        since_s = world.lived_s - self._sensed_s
+        if since_s > 0.0:
+            self._forward_m_s2 = (speed_m_s - self._last_speed_m_s) / since_s
+            self._last_speed_m_s, self._sensed_s = speed_m_s, world.lived_s
         readings = (
             0.0, 0.0, turn_rad_s,
-            forward_m_s2, speed_m_s * turn_rad_s, _GRAVITY_M_S2,
+            self._forward_m_s2, speed_m_s * turn_rad_s, _GRAVITY_M_S2,
             _EARTH_FIELD_T * math.cos(yaw_rad), -_EARTH_FIELD_T * math.sin(yaw_rad), 0.0,
             math.cos(yaw_rad / 2), 0.0, 0.0, math.sin(yaw_rad / 2),
         )  # fmt: skip

@@ -9,7 +9,8 @@ this computer share, the line, `>` to the device or `<` to the host, and the byt
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import TextIO
+
+from robosc_bridge.simulated.output import Sink
 
 Tap = Callable[[bool, float, bytes], None]
 """Takes whether the host has sent them, when, and the bytes; called under the lock of the line's time."""
@@ -36,10 +37,10 @@ class Recorder:
     """Writes records.
 
     Args:
-        stream: Where to; is closed by whoever opened it.
+        stream: Where to, such as an `Output`; is closed by whoever opened it.
     """
 
-    def __init__(self, stream: TextIO) -> None:
+    def __init__(self, stream: Sink) -> None:
         self._stream = stream
 
     def tap(self, line: str) -> Tap:

@@ -315,11 +315,11 @@ class Rover:
 
     def _yaw(self) -> dict[str, float]:
         yaw_rad = math.remainder(-self._world.heading_rad, 2 * math.pi)
-        return {"yaw": yaw_rad, "yawspeed": -self._world.turn_rad_s}
+        return {"yaw": yaw_rad, "yawspeed": -self._world.floor_turn_rad_s}
 
     def _place(self) -> dict[str, float]:
         world = self._world
-        speed_m_s = world.speed_m_s
+        speed_m_s = world.floor_speed_m_s
         return {
             "x": world.x_m + self.shift_m[0],
             "y": -(world.y_m + self.shift_m[1]),
@@ -337,8 +337,8 @@ class Rover:
             x=place["x"],
             y=place["y"],
             q=(math.cos(half_rad), 0.0, 0.0, math.sin(half_rad)),
-            vx=self._world.speed_m_s,
-            yawspeed=-self._world.turn_rad_s,
+            vx=self._world.floor_speed_m_s,
+            yawspeed=-self._world.floor_turn_rad_s,
             pose_covariance=unknown,
             velocity_covariance=unknown,
             frame=_LOCAL_FRD,

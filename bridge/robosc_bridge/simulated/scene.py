@@ -17,7 +17,15 @@ from robosc_bridge.configuration.document import Document, parse_document, read_
 from robosc_bridge.configuration.problems import ConfigurationError, Problem
 from robosc_bridge.configuration.problems import Path as Place
 from robosc_bridge.simulated.floor import Point, Track, spline
-from robosc_bridge.simulated.scene_file import MOST_SEGMENTS, LinePart, MazePart, SceneFile, WallsPart
+from robosc_bridge.simulated.scene_file import (
+    MOST_SEGMENTS,
+    WALL_HEIGHT_M,
+    WALL_SHADE,
+    LinePart,
+    MazePart,
+    SceneFile,
+    WallsPart,
+)
 from robosc_bridge.simulated.textures import PLAIN, Texture
 from robosc_bridge.simulated.walls import CELL_M, Segment, Walls, open_maze
 
@@ -104,6 +112,8 @@ class Scene:
         obstacles: Round things that can be moved.
         floor: What the floor looks like.
         noise: What makes motion and sensors less than ideal.
+        wall_height_m: Of walls and obstacles, as a camera sees them; a LiDAR sees them at any height.
+        wall_shade: Of the same, from 0 (black) to 255 (white).
     """
 
     name: str
@@ -114,6 +124,8 @@ class Scene:
     obstacles: tuple[Obstacle, ...] = ()
     floor: Texture = PLAIN
     noise: Noise = IDEAL
+    wall_height_m: float = WALL_HEIGHT_M
+    wall_shade: int = WALL_SHADE
 
 
 def maze_scene(columns: int, rows: int, *, cell_m: float = CELL_M, seed: int = 0) -> Scene:
@@ -206,6 +218,8 @@ class _Maker:
             tuple(Obstacle(key, it.x_m, it.y_m, it.radius_m, it.is_there) for key, it in said.obstacles.items()),
             Texture(floor.texture, floor.shade, floor.other_shade, floor.size_m, floor.joint_m, self._seed),
             Noise(noise.slip_share, noise.slip_deviation, noise.encoder_deviation, noise.lidar_m, noise.camera_shades),
+            said.walls.height_m,
+            said.walls.shade,
         )
 
     def _maze(self, said: MazePart) -> tuple[Walls, Point]:
@@ -233,7 +247,7 @@ class _Maker:
             points = (*points, points[0])
         try:
             if said.kind == "spline":
-                points = spline(points)
+                points = spline(points, said.width_m)
             return Track(points, said.width_m, said.shade)
         except ValueError as error:
             self._fail(str(error), ("line",))

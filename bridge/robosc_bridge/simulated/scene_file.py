@@ -7,11 +7,19 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
+from robosc_bridge.simulated.values import FARTHEST_M, MOST_SEED
+
 MOST_SEGMENTS = 5_000
 """Of all walls of a scene."""
 
-_Metres = Annotated[float, Meta(ge=-1000, le=1000)]
-_Seed = Annotated[int, Meta(ge=0, le=2**31 - 1)]
+MOST_CELLS = 30
+"""Of a maze, along each side."""
+
+WALL_HEIGHT_M, WALL_SHADE = 0.3, 130
+"""Of walls and obstacles where nothing is said: a grey between the floors and the lines."""
+
+_Metres = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)]
+_Seed = Annotated[int, Meta(ge=0, le=MOST_SEED)]
 _Point = tuple[_Metres, ...]
 # Where a text ends: Python's `$` takes a line feed after it.
 Name = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]{0,39}(?![\s\S])", title="box or box_2")]
@@ -23,7 +31,7 @@ class _Section(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class WallsPart(_Section, frozen=True):
-    """Walls that stand where they are."""
+    """Walls that stand where they are, and how the camera sees walls and obstacles."""
 
     segments: Annotated[
         tuple[tuple[_Metres, ...], ...], Meta(description="Straight walls, `[x1, y1, x2, y2]` in metres each.")
@@ -38,13 +46,17 @@ class WallsPart(_Section, frozen=True):
             description="Four walls, `[x, y, width, height]` each, where x, y is the corner of the least coordinates."
         ),
     ] = ()
+    height_m: Annotated[
+        float, Meta(ge=0.01, le=10, description="Of walls and obstacles, as the camera sees them; the LiDAR sees all.")
+    ] = WALL_HEIGHT_M
+    shade: Annotated[int, Meta(ge=0, le=255, description="Of walls and obstacles: 0 is black, 255 white.")] = WALL_SHADE
 
 
 class MazePart(_Section, frozen=True):
     """A maze with an exit, made by chance."""
 
-    columns: Annotated[int, Meta(ge=1, le=30, description="Cells along x.")]
-    rows: Annotated[int, Meta(ge=1, le=30, description="Cells along y.")]
+    columns: Annotated[int, Meta(ge=1, le=MOST_CELLS, description="Cells along x.")]
+    rows: Annotated[int, Meta(ge=1, le=MOST_CELLS, description="Cells along y.")]
     cell_m: Annotated[
         float, Meta(ge=0.3, le=5, description="Width of a cell; the middle of the first one is the origin.")
     ] = 1.0

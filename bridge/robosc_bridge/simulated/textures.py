@@ -53,8 +53,9 @@ class Texture:
             return np.full(len(points), self.shade, dtype=np.uint8)
         near = np.clip(points, -_FAR_M, _FAR_M)
         if self.kind == "tiles":
-            from_joint = np.mod(near, self.size_m)
-            return self._either((from_joint < self.joint_m).any(axis=1))
+            tiles = near / self.size_m
+            is_joint = (tiles - np.floor(tiles)) * self.size_m < self.joint_m
+            return self._either(is_joint[:, 0] | is_joint[:, 1])
         cells = np.floor(near / self.size_m).astype(np.int64)
         if self.kind == "checkerboard":
             return self._either(cells.sum(axis=1) % 2 == 1)
@@ -66,7 +67,7 @@ class Texture:
 
 
 def _hashed(cells: npt.NDArray[np.int64], seed: int) -> npt.NDArray[np.uint32]:
-    mixed = (cells[:, 0] * 73_856_093 ^ cells[:, 1] * 19_349_663 ^ seed * 83_492_791).astype(np.uint32)
+    mixed = (cells[:, 0] * 73_856_093 ^ cells[:, 1] * 19_349_663 ^ (seed * 83_492_791 & 0xFFFF_FFFF)).astype(np.uint32)
     for factor, shift in ((0x85EBCA6B, 16), (0xC2B2AE35, 13)):
         mixed ^= mixed >> np.uint32(shift)
         mixed *= np.uint32(factor)

@@ -15,7 +15,12 @@ from collections.abc import Callable
 
 from robosc.execution.clock import Clock, ManualClock, SystemClock
 
+FASTEST = 100.0
+"""How many times as fast as the clock a world may pass; a fast computer lives some hundred seconds of it in one."""
+
 _STEP_S = 0.005
+# Who lives for so long at once is too slow for the world's factor.
+_SLOW_S = 0.25
 
 
 class Timebase:
@@ -28,12 +33,12 @@ class Timebase:
             heard again, or for the first time, and is not behind with what was sent to it. None: it never waits.
 
     Raises:
-        ValueError: The factor or the patience is no positive, finite number.
+        ValueError: The factor or the patience is no positive, finite number, or the factor is above `FASTEST`.
     """
 
     def __init__(self, clock: Clock | None = None, factor: float = 1.0, patience_s: float | None = None) -> None:
-        if not (math.isfinite(factor) and factor > 0):
-            raise ValueError(f"the speed factor must be a positive number, and is {factor}")
+        if not 0 < factor <= FASTEST:
+            raise ValueError(f"the speed factor must be a positive number up to {FASTEST:g}, and is {factor:g}")
         if patience_s is not None and not (math.isfinite(patience_s) and patience_s > 0):
             raise ValueError(f"the patience with the host must be a positive number of seconds, and is {patience_s}")
         self.clock: Clock = SystemClock() if clock is None else clock
@@ -71,6 +76,20 @@ class Timebase:
             with self.lock:
                 if not self._unread:
                     self._limit_s = self.world_s() + self._patience_s
+
+    def lived(self, seconds: float, since_s: float) -> None:
+        """Somebody has lived a part of the world's time, and that has taken them time.
+
+        Where it takes longer than that part does by the clock, nobody would ever be up to date: the rest is not lived.
+
+        Args:
+            seconds: Of the world, that were lived.
+            since_s: By the clock, when that was begun.
+        """
+        took_s = self.now_s() - since_s
+        if took_s > _SLOW_S:
+            with self.lock:
+                self._waited_s += max(took_s * self.factor - seconds, 0.0)
 
     @property
     def waits(self) -> bool:

@@ -46,7 +46,7 @@ class Walls:
         self._squares: Floats = np.maximum((self._edges**2).sum(axis=1), 1e-18)
 
     def cast(self, origins: Floats, directions: Floats) -> Floats:
-        """How far rays go until a wall.
+        """How far rays go until a wall; one that goes along a wall meets its near end.
 
         Args:
             origins: Shape (n, 2), metres.
@@ -67,7 +67,18 @@ class Walls:
         lengths = (apart[..., 0] * edges[..., 1] - apart[..., 1] * edges[..., 0]) / cross
         shares = (apart[..., 0] * along[..., 1] - apart[..., 1] * along[..., 0]) / cross
         is_hit = ~is_parallel & (lengths >= 0.0) & (shares >= 0.0) & (shares <= 1.0)
-        found: Floats = np.where(is_hit, lengths, np.inf).min(axis=1)
+        met = np.where(is_hit, lengths, np.inf)
+        if is_parallel.any():
+            is_in_line = is_parallel & (
+                np.abs(apart[..., 0] * along[..., 1] - apart[..., 1] * along[..., 0]) < _PARALLEL
+            )
+            rays, walls = np.nonzero(is_in_line)
+            way = directions[rays]
+            both = np.stack([((ends[walls] - origins[rays]) * way).sum(axis=1) for ends in (self._starts, self._ends)])
+            # Between the ends is who is on the wall.
+            nearest = np.where(both[0] * both[1] <= 0.0, 0.0, both.min(axis=0)) / (way**2).sum(axis=1)
+            met[rays, walls] = np.where(nearest >= 0.0, nearest, np.inf)
+        found: Floats = met.min(axis=1)
         return found
 
     def cast_from(self, x_m: float, y_m: float, directions: Floats) -> Floats:
@@ -90,10 +101,14 @@ class Walls:
         point = np.array((x_m, y_m))
         to_starts, to_ends = self._starts - point, self._ends - point
         crosses = to_starts[:, 0] * to_ends[:, 1] - to_starts[:, 1] * to_ends[:, 0]
-        is_on = np.abs(crosses) < _PARALLEL
-        if is_on.any():
-            # In line with a wall, and maybe on it: rare enough to be looked at pair by pair.
-            return self.cast(np.broadcast_to(point, directions.shape), directions)
+        is_in_line = np.abs(crosses) < _PARALLEL
+        edgeways: list[tuple[float, float]] = []
+        if is_in_line.any():
+            if (to_starts * to_ends).sum(axis=1)[is_in_line].min() <= _PARALLEL:
+                # On a wall: rare enough to be looked at pair by pair.
+                return self.cast(np.broadcast_to(point, directions.shape), directions)
+            edgeways = _near_ends(to_starts[is_in_line], to_ends[is_in_line])
+            to_starts, to_ends, crosses = to_starts[~is_in_line], to_ends[~is_in_line], crosses[~is_in_line]
         across = np.stack((-directions[:, 1], directions[:, 0]))
         nearest = np.zeros(len(directions))
         # Not all at once: what does not fit into the processor's cache is several times as slow.
@@ -106,7 +121,13 @@ class Walls:
             beside_starts *= beside_ends
             np.copyto(inverse, 0.0, where=beside_starts > 0.0)
             np.maximum(nearest, inverse.max(axis=0), out=nearest)
-        with np.errstate(divide="ignore"):
+        for x, y in edgeways:
+            # Only a ray that goes along the wall meets it.
+            along = directions[:, 0] * x + directions[:, 1] * y
+            is_met = (np.abs(directions[:, 0] * y - directions[:, 1] * x) < _PARALLEL) & (along > 0.0)
+            squares = (directions[is_met] ** 2).sum(axis=1)
+            nearest[is_met] = np.maximum(nearest[is_met], squares / along[is_met])
+        with np.errstate(divide="ignore", over="ignore"):
             found: Floats = np.where(nearest > 0.0, 1.0 / nearest, np.inf)
         return found
 
@@ -117,6 +138,11 @@ class Walls:
         point = np.array((x_m, y_m)) - self._starts
         shares = np.clip((point * self._edges).sum(axis=1) / self._squares, 0.0, 1.0)
         return float(np.sqrt(((point - shares[:, None] * self._edges) ** 2).sum(axis=1).min()))
+
+
+def _near_ends(starts: Floats, ends: Floats) -> list[tuple[float, float]]:
+    is_start = (starts**2).sum(axis=1) <= (ends**2).sum(axis=1)
+    return [(x, y) for x, y in np.where(is_start[:, None], starts, ends).tolist()]
 
 
 def room(width_m: float, height_m: float) -> Walls:

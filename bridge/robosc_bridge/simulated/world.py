@@ -15,6 +15,7 @@ from robosc_bridge.simulated.drift import Drift
 from robosc_bridge.simulated.robots import Body
 from robosc_bridge.simulated.rounds import Rounds
 from robosc_bridge.simulated.scene import IDEAL, Obstacle, Scene
+from robosc_bridge.simulated.sweep import Sweep
 from robosc_bridge.simulated.timebase import Timebase
 from robosc_bridge.simulated.walls import Floats, Walls
 
@@ -24,8 +25,6 @@ _STRONGEST_RAD_S2 = 150.0
 _FRICTION_RAD_S2 = 60.0
 # A body that has left a wall by so much has left it; less is the same collision.
 _APART_M = 0.005
-_DEGREES = np.radians(np.arange(360.0))
-_TURN = np.stack((np.cos(_DEGREES), np.sin(_DEGREES)), axis=1)
 
 
 @dataclass
@@ -111,6 +110,9 @@ class World:
         x_m: Of the middle between the wheels.
         y_m: Of the same.
         heading_rad: Counter-clockwise from x, unbounded.
+        floor_speed_m_s: Forward, as it moved on the floor in the last step: slip and walls make it less than what the
+            wheels turn.
+        floor_turn_rad_s: Counter-clockwise, likewise.
         collisions: How often the body has come to a wall or an obstacle.
         is_touching: Whether it is at one now.
         left: The left wheel.
@@ -130,10 +132,13 @@ class World:
         self.body = body
         self.scene = walls if isinstance(walls, Scene) else Scene("walls", walls)
         self.walls = self.scene.walls
+        self._sweep = Sweep(self.walls)
         self.time = time
         self.x_m, self.y_m, self.heading_rad = self.scene.start if pose is None else pose
         self.left = Wheel()
         self.right = Wheel()
+        self.floor_speed_m_s = 0.0
+        self.floor_turn_rad_s = 0.0
         self.collisions = 0
         self.is_touching = False
         self.lived_s = time.world_s()
@@ -239,12 +244,13 @@ class World:
     def catch_up(self) -> None:
         """Live until now, in whole steps; what is commanded now acts from here on."""
         with self.time.lock:
-            now_s = self.time.world_s()
+            began_s, before_s, now_s = self.time.now_s(), self.lived_s, self.time.world_s()
             while self.lived_s + STEP_S <= now_s + 1e-9:
                 self.lived_s += STEP_S
                 self._step()
                 for on_step, _ in self._watchers:
                     on_step(self.lived_s)
+            self.time.lived(self.lived_s - before_s, began_s)
 
     def _step(self) -> None:
         left_rad, right_rad = self.left.step(STEP_S), self.right.step(STEP_S)
@@ -256,6 +262,7 @@ class World:
             left_rad *= 1.0 - drift.slips[0]
             right_rad *= 1.0 - drift.slips[1]
         if left_rad == 0.0 and right_rad == 0.0:
+            self.floor_speed_m_s = self.floor_turn_rad_s = 0.0
             return
         left_m, right_m = left_rad * self.body.wheel_radius_m, right_rad * self.body.wheel_radius_m
         forward_m = (left_m + right_m) / 2
@@ -263,9 +270,11 @@ class World:
         middle_rad = self.heading_rad + turn_rad / 2
         # A round body can always turn, whatever it touches; its wheels slip where it cannot go on.
         self.heading_rad += turn_rad
-        self._go(forward_m, forward_m * math.cos(middle_rad), forward_m * math.sin(middle_rad))
+        has_gone = self._go(forward_m, forward_m * math.cos(middle_rad), forward_m * math.sin(middle_rad))
+        self.floor_speed_m_s, self.floor_turn_rad_s = forward_m * has_gone / STEP_S, turn_rad / STEP_S
 
-    def _go(self, forward_m: float, along_x_m: float, along_y_m: float) -> None:
+    def _go(self, forward_m: float, along_x_m: float, along_y_m: float) -> bool:
+        """Move, unless something is in the way; whether it has."""
         x_m, y_m = self.x_m + along_x_m, self.y_m + along_y_m
         radius_m = self.body.radius_m
         # A distance changes by no more than the way that was gone: most often nobody has to measure.
@@ -278,11 +287,12 @@ class World:
                     self.is_touching = True
                     self.collisions += 1
                     self._tell(Happening("collision", self.x_m, self.y_m, name))
-                return
+                return False
             self._clear_m = nearest_m
             self.is_touching = self.is_touching and nearest_m < radius_m + _APART_M
         self.x_m, self.y_m = x_m, y_m
         self._see_goal()
+        return True
 
     def _nearest(self, x_m: float, y_m: float) -> tuple[float, str]:
         """How far the nearest thing is, and its name; nothing for a wall."""
@@ -303,7 +313,7 @@ class World:
         with self.time.lock:
             self.catch_up()
             cosine, sine = math.cos(self.heading_rad), math.sin(self.heading_rad)
-            x_m, y_m = self.x_m + cosine * self.body.scanner_x_m, self.y_m + sine * self.body.scanner_x_m
+            x_m, y_m = self._scanner_place()
             rounds = self._rounds
         turn = np.array(((cosine, sine), (-sine, cosine)))
         along = directions @ turn
@@ -334,4 +344,11 @@ class World:
         Returns:
             Shape (360,): counter-clockwise from the front, in metres; infinity where nothing is met.
         """
-        return self.cast(None, _TURN)
+        with self.time.lock:
+            self.catch_up()
+            x_m, y_m = self._scanner_place()
+            return self._sweep.lengths_m(x_m, y_m, self.heading_rad, self._rounds)
+
+    def _scanner_place(self) -> tuple[float, float]:
+        aside_m = self.body.scanner_x_m
+        return self.x_m + math.cos(self.heading_rad) * aside_m, self.y_m + math.sin(self.heading_rad) * aside_m

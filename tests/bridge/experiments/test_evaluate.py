@@ -22,7 +22,7 @@ def asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ..
     """What the scenarios were asked for; over ROS 1 none can be run."""
     found: list[tuple[Any, ...]] = []
 
-    def run_maze(folder: Path, scene: str, *, speed: float, say: Any, seed: int) -> Outcome:
+    def run(folder: Path, scene: str, *, speed: float, say: Any, seed: int) -> Outcome:
         found.append((folder.name, scene, speed, seed))
         say("on its way")
         return recorded(folder)
@@ -30,9 +30,9 @@ def asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ..
     def fail(folder: Path, scene: str, **options: Any) -> Outcome:
         raise ScenarioError("ROS 1 is not installed")
 
-    for name, run in (("maze", run_maze), ("ros1", fail)):
+    for name, function in (("maze", run), ("line", run), ("ros1", fail)):
         module = ModuleType(f"robosc_bridge.experiments.{name}")
-        vars(module).update(run_maze=run, MODEL=EXAMPLES / "maze_solver" / "maze_solver.rscd")
+        vars(module).update(run_maze=function, run_line=function, MODEL=EXAMPLES / "maze_solver" / "maze_solver.rscd")
         monkeypatch.setitem(sys.modules, module.__name__, module)
     monkeypatch.chdir(tmp_path)
     return found
@@ -60,6 +60,18 @@ def test_a_report_is_written(asked: list[tuple[Any, ...]], capsys: pytest.Captur
     assert "maze-serial-2/sequence.png" in text
     assert "Table I" not in text
     assert "Figure 13" in text
+
+
+def test_a_line_is_followed_on_each_of_its_scenes_or_on_the_one_that_is_wanted(
+    asked: list[tuple[Any, ...]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    # Why another connection cannot be used is told once for all scenes.
+    assert call("--experiment", "line", "--connection", "serial", "--connection", "ros1", "--no-cycles", "--json") == 1
+    assert asked == [("line-serial-1", "line-oval", 2.0, 0), ("line-serial-2", "line-curves", 2.0, 0)]
+    found = json.loads(capsys.readouterr().out)
+    assert found["not_run"] == [{"experiment": "line", "connection": "ros1", "why": "ROS 1 is not installed"}]
+    assert call("--experiment", "line", "--scene", "line-curves", "--no-cycles") == 0
+    assert asked[2:] == [("line-serial-3", "line-curves", 2.0, 0)]
 
 
 def test_a_scenario_that_cannot_be_run_is_told_beside_those_that_can(
@@ -91,7 +103,17 @@ def test_what_cannot_be_is_one_clear_message(
     assert capsys.readouterr().err == f"robosc: {problem}\n"
 
 
-@pytest.mark.parametrize("arguments", [["--speed", "0"], ["--speed", "nan"], ["--experiment", "golf"], ["--seed", "x"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--speed", "0"],
+        ["--speed", "nan"],
+        ["--experiment", "golf"],
+        ["--seed", "x"],
+        ["--seed", "-1"],
+        ["--seed", "1000000000000000"],
+    ],
+)
 def test_arguments_that_are_wrong(arguments: list[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         call(*arguments)

@@ -8,6 +8,7 @@ import textwrap
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -189,6 +190,44 @@ def test_a_signal_stops_programs_and_a_second_one_changes_nothing(number: signal
     finally:
         outer.kill()
         outer.wait()
+
+
+def test_a_signal_while_a_program_is_started_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[int] = []
+
+    class Interrupted(subprocess.Popen[str]):
+        def __init__(self, *arguments: Any, **options: Any) -> None:
+            super().__init__(*arguments, **options)
+            started.append(self.pid)
+            os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(subprocess, "Popen", Interrupted)
+    program = Program("waiting", script(tmp_path, "import signal; signal.pause()"), tmp_path)
+    with pytest.raises(KeyboardInterrupt), interruptible(), program:
+        pytest.fail("it goes on")
+    assert len(started) == 1
+    assert not is_alive(started[0])
+
+
+def test_a_first_signal_while_a_deaf_program_is_stopped_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    deaf = "import signal; signal.signal(15, signal.SIG_IGN); print('ready', flush=True); signal.pause()"
+    wait = subprocess.Popen.wait
+
+    def interrupted(process: "subprocess.Popen[str]", timeout: float | None = None) -> int:
+        if timeout is not None:
+            os.kill(os.getpid(), signal.SIGINT)
+        return wait(process, timeout)
+
+    with (
+        pytest.raises(KeyboardInterrupt),
+        interruptible(),
+        Program("deaf", script(tmp_path, deaf), tmp_path) as program,
+    ):
+        program.wait_for("^ready$")
+        monkeypatch.setattr(subprocess.Popen, "wait", interrupted)
+    assert program.status == -signal.SIGKILL
 
 
 def test_the_handlers_of_signals_are_as_before_afterwards() -> None:

@@ -132,8 +132,8 @@ def test_it_goes_on_when_its_input_ends() -> None:
     ("arguments", "text"),
     [
         (["--speed", "0"], "speed factor"),
+        (["--speed", "1000"], "the speed factor must be a positive number up to 100, and is 1000"),
         (["--walls", "/nowhere"], "No such file"),
-        (["--maze", "0x2"], "one cell"),
         (["--line", "/nowhere"], "No such file"),
         (["--scene", "nowhere"], "there is no scene and no file 'nowhere'"),
         (["--scene", "/dev/null"], "is not a regular file"),
@@ -154,10 +154,27 @@ def test_what_cannot_be_simulated_is_told(
     assert found.err.count("\n") == 1
 
 
-def test_wrong_arguments_are_told(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        main(["--room", "3"])
-    assert "2 numbers with `x` between them" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("option", "value", "text"),
+    [
+        ("--room", "3", "2 numbers with `x` between them"),
+        ("--room", "nanx3", "a number from 0.1 to 1000"),
+        ("--maze", "0x2", "a whole number from 1 to 30"),
+        ("--maze", "100000x1", "a whole number from 1 to 30"),
+        ("--maze", "2.5x3", "a whole number from 1 to 30"),
+        ("--pose", "nan,0,0", "a number from -1000 to 1000"),
+        ("--pose", "0,0,1e300", "a number from -1000 to 1000"),
+        ("--noise", "nan", "a number from 0 to 1"),
+        ("--noise", "-1", "a number from 0 to 1"),
+        ("--seed", "-1", "a whole number from 0 to 2147483647"),
+        ("--seed", "1000000000000000", "a whole number from 0 to 2147483647"),
+    ],
+)
+def test_wrong_arguments_are_told(option: str, value: str, text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main([option, value])
+    assert caught.value.code == 2
+    assert f"argument {option}: {text}" in capsys.readouterr().err
 
 
 def test_a_wall_map_is_read(
@@ -254,6 +271,35 @@ def test_what_is_not_known_is_told(robot: SimulatedTurtleBot3, line: str) -> Non
         obey(robot, line)
 
 
+@pytest.mark.parametrize(
+    "line",
+    ["pose nan 0 0", "pose 1e308 0 0", "pose 0 0 1e308", "battery nan", "battery 1e300", "battery -1",
+     "left voltage nan", "right voltage inf", "base delay_s nan", "scanner delay_s 1e30", "scanner split_s 1e30",
+     "scanner split_s -1", "base drop_share nan", "base drop_share 1.1", "base corrupt_next -1",
+     "base cut_next 1000000000000", "base answers_as 99999", "scanner turn 1e-9", "scanner turn nan",
+     f"base garbage {'00' * 5000}"],
+)  # fmt: skip
+def test_numbers_that_no_device_can_bear_are_refused(robot: SimulatedTurtleBot3, line: str) -> None:
+    with pytest.raises(UnknownCommandError, match=r"is needed, not|at most"):
+        obey(robot, line)
+    # And nothing has changed.
+    robot.advance(0.2)
+    assert robot.base_faults == robot.scanner_faults == Faults()
+    assert robot.world.pose == (0.0, 0.0, 0.0)
+
+
+def test_a_port_whose_place_was_taken_is_told(tmp_path: Path) -> None:
+    link = tmp_path / "base"
+    with SimulatedTurtleBot3(clock=ManualClock(), base_link=link) as robot:
+        obey(robot, "base disconnect")
+        link.touch()
+        with pytest.raises(UnknownCommandError, match="exists"):
+            obey(robot, "base reconnect")
+        link.unlink()
+        obey(robot, "base reconnect")
+        assert robot.base_line.is_connected
+
+
 def test_servos_have_no_buttons() -> None:
     with SimulatedTurtleBot3(base="dynamixel", clock=ManualClock()) as robot:
         for line in ("battery 11.0", "press button_1"):
@@ -283,6 +329,15 @@ def test_a_rover_is_told() -> None:
         assert not rover.is_silent
         obey(robot, "battery 10.5")
         assert rover.battery_v == 10.5
-        for line in ("left overheat", "rover jump", "rover refuse", "rover take_over x", "base answers_as 7", "rover"):
+        for line in (
+            "left overheat",
+            "rover jump",
+            "rover refuse",
+            "rover take_over x",
+            "rover take_over 1000",
+            "battery 70",
+            "base answers_as 7",
+            "rover",
+        ):
             with pytest.raises(UnknownCommandError):
                 obey(robot, line)

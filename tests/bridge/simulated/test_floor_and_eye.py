@@ -5,14 +5,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from robosc_bridge.simulated import Eye, Mount, Track, oval, parse_track
+from robosc_bridge.simulated import Eye, Mount, Scene, Track, Walls, oval, parse_track
 from robosc_bridge.simulated.eye import DISTANCE, ground_points
 from robosc_bridge.simulated.floor import SHADE as LINE
+from robosc_bridge.simulated.floor import Point
 from robosc_bridge.simulated.textures import PLAIN
 
 FLOOR = PLAIN.shade
 STRAIGHT = Track([(-1.0, 0.0), (3.0, 0.0)], width_m=0.04)
+BARE = Scene("bare", Walls(()))
+LINED = replace(BARE, line=STRAIGHT)
 # Straight down from 1 m with a right angle of view: one metre to each side.
 ABOVE = Mount(x_m=0.0, height_m=1.0, tilt_rad=math.pi / 2, field_of_view_rad=math.pi / 2, width=100, height=50)
 
@@ -36,6 +41,29 @@ def test_a_track_of_any_direction_is_drawn_as_wide_as_it_is() -> None:
         distance_m = track.distance_m(*point)
         if abs(distance_m - 0.05) > 0.004:
             assert bool(is_line) is (distance_m < 0.05), point
+
+
+PLACES = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.lists(PLACES, min_size=2, max_size=6), st.floats(0.005, 1.0), st.integers(0, 4))
+def test_a_track_is_drawn_as_a_slow_twin_draws_it(points: list[Point], width_m: float, repeats: int) -> None:
+    # Also upright pieces, and such as are but a point.
+    points = [*points, *([(points[-1][0], 0.3)] * repeats)]
+    track = Track(points, width_m)
+    corner = np.array(points).min(axis=0) - width_m
+    for column, row in np.random.default_rng(1).integers((0, 0), track._is_line.shape, (300, 2)).tolist():
+        x_m, y_m = corner + (np.array((column, row)) + 0.5) * 0.005
+        beyond_m = track.distance_m(float(x_m), float(y_m)) - width_m / 2
+        # At the very edge, rounding decides.
+        assert bool(track._is_line[column, row]) is (beyond_m <= 0.0) or abs(beyond_m) < 1e-9
+
+
+def test_many_pieces_are_drawn_part_by_part(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = oval()
+    monkeypatch.setattr("robosc_bridge.simulated.floor._COLUMNS_AT_ONCE", 40)
+    assert (oval()._is_line == whole._is_line).all()
 
 
 def test_the_oval_is_closed_and_goes_through_the_start() -> None:
@@ -94,7 +122,7 @@ def test_the_edges_of_the_picture_are_half_the_field_of_view_aside() -> None:
 
 
 def test_the_line_is_seen_where_it_is() -> None:
-    eye = Eye(ABOVE, STRAIGHT)
+    eye = Eye(ABOVE, LINED)
     for pose, column in (
         ((0.0, 0.0, 0.0), 50),
         ((0.0, 0.3, 0.0), 65),
@@ -112,7 +140,7 @@ def test_the_line_is_seen_where_it_is() -> None:
 
 def test_above_the_horizon_there_is_no_floor() -> None:
     level = replace(Mount(), tilt_rad=0.0)
-    picture = Eye(level, STRAIGHT).picture((0.0, 0.0, 0.0))
+    picture = Eye(level, LINED).picture((0.0, 0.0, 0.0))
     assert (picture[:60] == DISTANCE).all()
     assert set(np.unique(picture[60:])) == {LINE, FLOOR}
-    assert (Eye(Mount(), None).picture((0.0, 0.0, 0.0)) == FLOOR).all()
+    assert (Eye(Mount(), BARE).picture((0.0, 0.0, 0.0)) == FLOOR).all()

@@ -230,6 +230,24 @@ def test_nothing_is_no_success() -> None:
     assert judge_line(YARD, empty) == ("nothing was recorded",)
 
 
+def test_a_record_with_a_hole_is_no_success(path: Path) -> None:
+    motion = recorded(YARD, there, path)
+    assert judge_maze(YARD, motion) == ()
+    hole = [sample for sample in motion.samples if not 4.8 < sample.world_s < 5.2]
+    (fault,) = judge_maze(YARD, Motion(tuple(hole), motion.happenings))
+    assert fault == "nothing was recorded from 4.80 s to 5.20 s"
+
+
+def test_a_record_that_its_writer_did_not_end_is_no_success(path: Path) -> None:
+    recorded(YARD, there, path)
+    lines = path.read_bytes().splitlines(keepends=True)
+    assert b'"end"' in lines[-1]
+    path.write_bytes(b"".join(lines[:-1]))
+    assert judge_maze(YARD, read_motion(path)) == (
+        "the record has no end: whoever wrote it was killed, or had no room",
+    )
+
+
 def test_scenes_without_goal_or_line_are_not_judged() -> None:
     bare = Scene("bare", Walls(()))
     for judge in (judge_maze, judge_line, lateral_errors_m):

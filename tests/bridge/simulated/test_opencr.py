@@ -3,12 +3,13 @@
 import math
 import struct
 from collections.abc import Iterator
+from contextlib import contextmanager
 
 import pytest
 from dynamixel_sdk import PacketHandler
 
 from robosc.execution.clock import ManualClock
-from robosc_bridge.simulated import OpenCr, SimulatedTurtleBot3, Walls
+from robosc_bridge.simulated import Noise, OpenCr, Scene, SimulatedTurtleBot3, Walls
 from support.wire import sdk_port
 
 OPEN_SPACE = Walls(())
@@ -226,6 +227,58 @@ def test_torque_is_switched_for_both_and_read_back_from_both(station: Station) -
     station.robot.advance(0.025)
     assert station.robot.right.table["torque enable"]
     assert station.read(149, "B") == 0
+
+
+@contextmanager
+def station_in(noise: Noise, walls: Walls = OPEN_SPACE) -> Iterator[Station]:
+    with SimulatedTurtleBot3(scene=Scene("floor", walls, noise=noise), clock=ManualClock()) as robot:
+        station = Station(robot)
+        yield station
+        station.port.closePort()
+
+
+def test_the_gyroscope_feels_how_the_body_turns_and_not_the_wheels() -> None:
+    with station_in(Noise(slip_share=0.5)) as station:
+        station.live(0.3)
+        station.command(0, 50)
+        station.live(1.0)
+        before_rad = station.robot.world.pose[2]
+        station.live(1.0)
+        turned_rad = station.robot.world.pose[2] - before_rad
+        assert turned_rad == pytest.approx(0.25, rel=0.03)
+        assert station.read(68, "f") == pytest.approx(turned_rad, rel=0.01)
+        station.command(0, 0)
+        station.live(0.5)
+        assert station.read(68, "f") == 0.0
+
+
+def test_accelerations_are_those_of_the_body() -> None:
+    """It is felt when it comes to a wall; and no more while its wheels turn there."""
+    with station_in(Noise(), Walls([(0.205, -1.0, 0.205, 1.0)])) as station:
+        station.live(0.3)
+        station.command(20)
+        felt_m_s2 = []
+        for _ in range(8):
+            station.beat()
+            for _ in range(5):
+                station.robot.advance(0.02)
+                felt_m_s2.append(station.read(72, "f"))
+        assert station.robot.world.collisions == 1
+        # From 0 to 0.2 m/s and back, over one cycle of 20 ms at the wall.
+        assert sum(felt_m_s2) * 0.02 == pytest.approx(0.0, abs=0.005)
+        assert min(felt_m_s2) == pytest.approx(-0.2 / 0.02, rel=0.05)
+        assert sum(each for each in felt_m_s2 if each > 0) * 0.02 == pytest.approx(0.2, rel=0.05)
+        assert felt_m_s2[-10:] == [0.0] * 10
+        assert station.wheels()[0] > 0
+
+
+def test_who_drives_a_curve_is_pressed_outwards(station: Station) -> None:
+    station.live(0.3)
+    station.command(10, 50)
+    station.live(1.0)
+    assert station.read(68, "f") == pytest.approx(0.5, rel=0.03)
+    # Towards the middle of the curve, which is on the left.
+    assert station.read(76, "f") == pytest.approx(0.1 * 0.5, rel=0.05)
 
 
 def test_profile_accelerations_reach_the_servos(station: Station) -> None:

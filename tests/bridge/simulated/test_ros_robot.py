@@ -212,7 +212,10 @@ def test_the_world_is_told_what_to_do_as_behind_serial_lines() -> None:
     assert last(Battery, lived(robot, 1.1)).voltage_v == 10.9
 
 
-@pytest.mark.parametrize("wrong", ["dance", "battery", "battery nan", "battery full", "obstacle box back", "goal"])
+@pytest.mark.parametrize(
+    "wrong",
+    ["dance", "battery", "battery nan", "battery 1e300", "pose nan 0 0", "battery full", "obstacle box back", "goal"],
+)
 def test_what_it_cannot_do_is_told(wrong: str) -> None:
     with pytest.raises(UnknownCommandError):
         obey(in_room(), wrong)
@@ -265,6 +268,7 @@ def test_a_command_line_that_cannot_be_is_refused() -> None:
     with pytest.raises(SceneError):
         make_robot(options("--scene", "nowhere"))
     with pytest.raises(ValueError, match="speed"):
-        make_robot(options("--speed", "-1"))
-    with pytest.raises(SystemExit):
-        options("--command-timeout", "nan")
+        make_robot(options("--speed", "1e6"))
+    for wrong in (("--command-timeout", "nan"), ("--seed", "-1"), ("--seed", "10000000000")):
+        with pytest.raises(SystemExit):
+            options(*wrong)

@@ -171,6 +171,13 @@ def test_the_most_that_a_file_may_say_is_soon_read() -> None:
     with pytest.raises(SceneError, match="long"):
         parsed(f"line: {{points: [{', '.join(['[0, 0], [20, 20]'] * 400)}]}}")
     parsed(f"line: {{points: [{zigzag}]}}")
+    # The widest line, through as many points as a list may have, all over the place where it may be.
+    rows = [(column, row / 2) for row in range(40) for column in (range(23) if row % 2 else range(22, -1, -1))]
+    meander = ", ".join(f"[{x_m * 0.99:.2f}, {y_m}]" for x_m, y_m in rows)
+    for kind in ("straight", "spline"):
+        line = parsed(f"line: {{kind: {kind}, width_m: 1, points: [{meander}]}}").line
+        assert line is not None
+        assert line.is_line(np.array([(5.0, 5.25), (-0.9, 5.0)])).tolist() == [True, False]
     walls = ", ".join(f"[0, {y}, 1, {y}]" for y in range(1000))
     assert len(parsed(f"walls: {{segments: [{walls}]}}").walls.segments) == 1000
     parsed("maze: {columns: 30, rows: 30}")
@@ -206,6 +213,12 @@ def test_textures_are_what_they_are_called() -> None:
     assert board[:5].tolist() == [220, 180, 220, 180, 220]
     tiles = Texture("tiles", 200, 90, 0.1, 0.01).shades(POINTS)
     assert tiles[:5].tolist() == [200, 200, 200, 200, 90]
+
+
+def test_speckle_takes_any_seed() -> None:
+    far = Texture("speckle", 200, 100, 0.1, seed=10**15).shades(POINTS)
+    assert (far == Texture("speckle", 200, 100, 0.1, seed=10**15).shades(POINTS)).all()
+    assert (far != Texture("speckle", 200, 100, 0.1, seed=-1).shades(POINTS)).any()
 
 
 def test_speckle_is_random_within_its_shades_and_the_same_for_the_same_seed() -> None:

@@ -33,7 +33,6 @@ from robosc_bridge.skills.line import line_offset
 from robosc_bridge.skills.settings import LineSettings
 
 SIZES = st.floats(-5, 5, allow_nan=False)
-SEGMENTS = st.lists(st.tuples(SIZES, SIZES, SIZES, SIZES), max_size=40)
 DISCS = st.lists(st.tuples(SIZES, SIZES, st.floats(0.01, 2.0)), max_size=5)
 YARD = Scene("yard", room(4.0, 2.0), goal=Goal(1.0, 0.0, 0.2), obstacles=(Obstacle("box", 1.0, 0.5, 0.1),))
 
@@ -49,8 +48,17 @@ def drive(world: World, left_rad_s: float, right_rad_s: float, seconds: float) -
     world.catch_up()
 
 
+# Between two ends that are nearer to each other than a ray's hair, rounding decides.
+MILLIMETRES = SIZES.map(lambda size: round(size, 3))
+
+
 @settings(deadline=None)
-@given(SEGMENTS, SIZES, SIZES, st.lists(st.floats(-7, 7), min_size=1, max_size=20))
+@given(
+    st.lists(st.tuples(MILLIMETRES, MILLIMETRES, MILLIMETRES, MILLIMETRES), max_size=40),
+    MILLIMETRES,
+    MILLIMETRES,
+    st.lists(st.floats(-7, 7), min_size=1, max_size=20),
+)
 def test_fast_rays_agree_with_slow_ones(
     segments: list[tuple[float, float, float, float]], x_m: float, y_m: float, angles: list[float]
 ) -> None:
@@ -109,7 +117,11 @@ def test_discs_do_not_mind_how_long_a_direction_is(
     directions = _directions(np.arange(12.0))
     many = Rounds(discs).cast(np.tile((x_m, y_m), (12, 1)), directions * length)
     one = Rounds(discs).cast(np.array([(x_m, y_m)]), directions)
-    assert np.allclose(many * length, one, rtol=1e-6, atol=1e-6)
+    aside = np.array([(disc[0] - x_m) * directions[:, 1] - (disc[1] - y_m) * directions[:, 0] for disc in discs])
+    # A ray that just grazes a disc is met or not by rounding.
+    radii = np.array([disc[2] for disc in discs]).reshape(-1, 1)
+    grazes = (np.abs(np.abs(aside.reshape(-1, 12)) - radii) < 1e-6).any(axis=0)
+    assert (np.isclose(many * length, one, rtol=1e-6, atol=1e-6) | grazes).all()
 
 
 @settings(deadline=None, max_examples=15)
@@ -207,7 +219,7 @@ def test_an_ideal_world_has_no_chance_in_it() -> None:
 def test_the_line_detector_sees_the_line_of_a_scene(name: str) -> None:
     scene = load_scene(name, seed=3)
     assert scene.line is not None
-    eye = Eye(Mount(), scene.line, scene.floor, scene.noise.camera_shades, 3)
+    eye = Eye(Mount(), scene, 3)
     settings_ = LineSettings()
     points = scene.line.points
     for place in range(0, len(points) - 30, 60):
@@ -226,13 +238,15 @@ def test_the_line_detector_sees_the_line_of_a_scene(name: str) -> None:
 @pytest.mark.parametrize("kind", ["tiles", "checkerboard", "speckle"])
 def test_a_textured_floor_without_a_line_shows_none(kind: str) -> None:
     texture = Texture(kind, 215, 150, 0.1)  # type: ignore[arg-type]
-    picture = Eye(Mount(), None, texture, 5.0, 1).picture((0.3, 0.2, 0.1))
+    scene = Scene("floor", Walls(()), floor=texture, noise=Noise(camera_shades=5.0))
+    picture = Eye(Mount(), scene, 1).picture((0.3, 0.2, 0.1))
     assert len(np.unique(picture)) > 10
     assert line_offset(picture, LineSettings()) is None
 
 
 def test_noise_of_the_camera_is_as_large_as_told_and_seeded() -> None:
-    first, same, other = (Eye(Mount(), None, deviation=6.0, seed=seed).picture((0.0, 0.0, 0.0)) for seed in (1, 1, 2))
+    scene = Scene("noisy", Walls(()), noise=Noise(camera_shades=6.0))
+    first, same, other = (Eye(Mount(), scene, seed).picture((0.0, 0.0, 0.0)) for seed in (1, 1, 2))
     assert (first == same).all()
     assert (first != other).any()
     assert float(first.std()) == pytest.approx(6.0, rel=0.05)

@@ -10,8 +10,12 @@ from hypothesis import strategies as st
 
 from robosc.execution.clock import ManualClock, SystemClock
 from robosc_bridge.simulated import BODIES, Timebase, Walls, World, maze, parse_walls, room
+from robosc_bridge.simulated.world import STEP_S
 
 SIZES = st.floats(-5, 5, allow_nan=False)
+MILLIMETRES = SIZES.map(lambda size: round(size, 3))
+# Also along the axes, where walls often are.
+ANGLES = st.one_of(st.floats(-7, 7), st.integers(-4, 4).map(lambda quarters: quarters * math.pi / 2))
 SEGMENTS = st.lists(st.tuples(SIZES, SIZES, SIZES, SIZES), max_size=6)
 
 
@@ -37,7 +41,12 @@ def slow_range(walls: Walls, x: float, y: float, angle: float) -> float:
         # x + t dx = x1 + u (x2 - x1), and so for y: Cramer's rule.
         ex, ey = x2 - x1, y2 - y1
         determinant = ex * dy - ey * dx
-        if abs(determinant) < 1e-9:
+        if abs(determinant) < 1e-12:
+            if abs(dx * (y1 - y) - dy * (x1 - x)) < 1e-12:
+                # Along the wall: to its near end, or it stands on it.
+                ends = [dx * (end_x - x) + dy * (end_y - y) for end_x, end_y in ((x1, y1), (x2, y2))]
+                if max(ends) >= 0:
+                    best = min(best, max(min(ends), 0.0))
             continue
         t = (ex * (y1 - y) - ey * (x1 - x)) / determinant
         u = (dx * (y1 - y) - dy * (x1 - x)) / determinant
@@ -47,13 +56,13 @@ def slow_range(walls: Walls, x: float, y: float, angle: float) -> float:
 
 
 @settings(deadline=None)
-@given(SEGMENTS, SIZES, SIZES, st.floats(-7, 7))
+@given(st.lists(st.tuples(*[MILLIMETRES] * 4), max_size=6), MILLIMETRES, MILLIMETRES, ANGLES)
 def test_rays_agree_with_a_slow_twin(segments: list[tuple[float, float, float, float]], x: float, y: float,
                                      angle: float) -> None:  # fmt: skip
     walls = Walls(segments)
     found = float(walls.cast(np.array([(x, y)]), np.array([(math.cos(angle), math.sin(angle))]))[0])
     expected = slow_range(walls, x, y, angle)
-    # At a wall's very end, and along it, rounding decides.
+    # At a wall's very end, rounding decides.
     ends = [slow_range(walls, x, y, angle + turn) for turn in (-1e-6, 1e-6)]
     assert any(found == pytest.approx(value, rel=1e-3, abs=1e-3) for value in (expected, *ends))
 
@@ -160,10 +169,50 @@ def test_the_world_passes_faster_by_its_factor() -> None:
     assert fast.pose == pytest.approx(slow.pose)
 
 
-@pytest.mark.parametrize("factor", [0.0, -1.0, math.inf, math.nan])
-def test_a_factor_is_positive_and_finite(factor: float) -> None:
-    with pytest.raises(ValueError, match="speed factor"):
+@pytest.mark.parametrize("factor", [0.0, -1.0, 100.1, 1e300, math.inf, math.nan])
+def test_a_factor_is_positive_and_no_more_than_can_be_lived(factor: float) -> None:
+    with pytest.raises(ValueError, match="speed factor must be a positive number up to 100"):
         Timebase(factor=factor)
+    assert Timebase(factor=100.0).factor == 100.0
+
+
+class ReadClock(SystemClock):
+    """A clock that goes when it is told; the devices take it for the computer's."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.now_s = 0.0
+
+    def monotonic(self) -> float:
+        return self.now_s
+
+
+def test_a_world_that_takes_too_long_to_live_passes_more_slowly() -> None:
+    clock = ReadClock()
+    time = Timebase(clock, factor=10.0)
+    world = World(BODIES["burger"], Walls(()), time)
+
+    def dawdle(world_s: float) -> None:
+        # Three times as long as the step is by the clock.
+        clock.now_s += 3 * STEP_S / 10.0
+
+    world.watch(dawdle, lambda world_s, happening: None)
+    clock.now_s = 1.0
+    for _ in range(3):
+        # What it has taken to live a part is no more than that part again.
+        before_s = world.lived_s
+        world.catch_up()
+        assert world.lived_s - before_s == pytest.approx(10.0)
+        assert time.world_s() - world.lived_s == pytest.approx(10.0)
+
+    # What takes but a moment is made up for.
+    clock.now_s = 0.0
+    time = Timebase(clock, factor=10.0)
+    world = World(BODIES["burger"], Walls(()), time)
+    world.watch(dawdle, lambda world_s, happening: None)
+    clock.now_s = 0.01
+    world.catch_up()
+    assert time.world_s() - world.lived_s == pytest.approx(0.3)
 
 
 def test_only_a_manual_clock_is_advanced() -> None:

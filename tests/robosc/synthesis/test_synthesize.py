@@ -25,7 +25,7 @@ from support.models import EXAMPLE_NAMES, example_model
 from support.random_systems import kind, random_system, wide_system
 
 ENGINES = ("cudd", "autoref")
-EXAMPLES = int(os.environ.get("ROBOSC_RANDOM_SYSTEMS", "1000"))
+EXAMPLES = int(os.environ.get("ROBOSC_RANDOM_SYSTEMS", "2000"))
 """Random systems in one run; set the variable to try more."""
 
 PARTS = 4

@@ -1,9 +1,8 @@
 """What can be done by a line of text to the twin behind ROS."""
 
-import math
-
 from robosc_bridge.simulated.commands import WORLD_HELP, UnknownCommandError, obey_world
 from robosc_bridge.simulated.ros.robot import RosRobot
+from robosc_bridge.simulated.values import voltage
 
 HELP = f"""\
 scanner cover|uncover                       the LiDAR
@@ -36,17 +35,10 @@ def obey(robot: RosRobot, line: str) -> str:
         case ["camera", "cover" | "uncover" as what]:
             robot.is_camera_covered = what == "cover"
         case ["battery", text]:
-            robot.battery_v = _voltage(text)
+            try:
+                robot.battery_v = voltage(text)
+            except ValueError as error:
+                raise UnknownCommandError(str(error)) from error
         case _:
             return obey_world(robot.world, words)
     return ""
-
-
-def _voltage(text: str) -> float:
-    try:
-        found = float(text)
-    except ValueError:
-        found = math.nan
-    if not 0 <= found < 100:
-        raise UnknownCommandError(f"a battery has 0 V to 100 V, not {text!r}")
-    return found

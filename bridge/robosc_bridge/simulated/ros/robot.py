@@ -92,11 +92,10 @@ class RosRobot:
         self._time = world.time
         self._mount = mount = mount or Mount()
         scene = world.scene
-        self._eye = None if scene.line is None else Eye(mount, scene.line, scene.floor, scene.noise.camera_shades, seed)
+        self._eye = None if scene.line is None else Eye(mount, scene, seed)
         self._nearest_m: float = LIDARS[lidar].nearest_m  # type: ignore[attr-defined]
         self._farthest_m: float = LIDARS[lidar].farthest_m  # type: ignore[attr-defined]
         self._turn_s: float = 1.0 / LIDARS[lidar].nominal_hz  # type: ignore[attr-defined]
-        self._angles_rad = [math.radians(degree) for degree in range(BEAMS)]
         self._encoding = encoding
         self._timeout_s = command_timeout_s
         self._noise_m = scene.noise.lidar_m
@@ -215,7 +214,7 @@ class RosRobot:
             # Something is too near: who reads it stops.
             ranges_m = np.full(BEAMS, -np.inf)
         else:
-            ranges_m = np.array(self.world.ranges(self._angles_rad))
+            ranges_m = self.world.scan()
             if self._noise_m:
                 ranges_m += [self._chance.gauss(0.0, self._noise_m) for _ in range(BEAMS)]
         ranges_m[ranges_m > self._farthest_m] = np.inf
@@ -223,7 +222,7 @@ class RosRobot:
         return Scan(stamp_s, ranges_m.astype(np.float32), self._nearest_m, self._farthest_m, self._turn_s)
 
     def _picture(self, eye: Eye, stamp_s: float) -> Picture:
-        shades = eye.picture(self.world.pose)
+        shades = eye.picture(self.world.pose, self.world.obstacles)
         if self.is_camera_covered:
             shades[:] = DARKNESS
         height, width = shades.shape

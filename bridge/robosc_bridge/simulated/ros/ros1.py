@@ -50,6 +50,7 @@ class RospySide:
     Args:
         python: Its interpreter.
         module: What it runs, importable from its folder.
+        names: Other names as rospy takes them, such as `__name:=robot` or `/scan:=/front/scan`.
 
     Attributes:
         dropped: Frames that were not sent because it does not take them.
@@ -58,11 +59,11 @@ class RospySide:
         MissingRosError: There is no such interpreter.
     """
 
-    def __init__(self, python: str = PYTHON, module: Path = _SIDE) -> None:
+    def __init__(self, python: str = PYTHON, module: Path = _SIDE, names: Sequence[str] = ()) -> None:
         self.dropped = 0
         try:
             self._process = subprocess.Popen(  # noqa: S603 (the interpreter that the user names)
-                [python, "-m", module.name],
+                [python, "-m", module.name, *names],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 env=_environment(module.parent),
@@ -270,11 +271,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0 when it was interrupted, 1 when it cannot be served.
     """
-    options = _parser().parse_args(arguments)
+    given = sys.argv[1:] if arguments is None else arguments
+    # As with every node of ROS 1, and as roslaunch gives them.
+    names = [word for word in given if ":=" in word]
+    options = _parser().parse_args([word for word in given if ":=" not in word])
 
     @contextlib.contextmanager
     def face(robot: RosRobot, pacer: Pacer, ended: threading.Event) -> Any:
-        with RospySide(options.python) as side:
+        with RospySide(options.python, names=names) as side:
             yield Ros1Face(
                 robot,
                 pacer,
@@ -291,7 +295,8 @@ def _parser() -> argparse.ArgumentParser:
     found = parser(
         "python -m robosc_bridge.simulated.ros.ros1",
         "Serve a simulated TurtleBot3 as a ROS 1 node until interrupted. It sends /scan, /odom, /battery_state, "
-        "/clock, /tf and, where there is a line, /camera/image_raw, and obeys /cmd_vel.",
+        "/clock, /tf and, where there is a line, /camera/image_raw, and obeys /cmd_vel. What has `:=` in it is a name "
+        "for rospy, such as /scan:=/front/scan.",
     )
     found.add_argument(
         "--stamped", action="store_true", help="velocities come as geometry_msgs/TwistStamped, not as Twist"

@@ -20,13 +20,16 @@ from typing import Protocol
 from robosc.execution.clock import ManualClock
 from robosc_bridge.simulated.commands import UnknownCommandError
 from robosc_bridge.simulated.lidar import LIDARS
+from robosc_bridge.simulated.mishaps import Mishaps
 from robosc_bridge.simulated.motion import MotionRecorder
+from robosc_bridge.simulated.output import Output
 from robosc_bridge.simulated.robots import BODIES
 from robosc_bridge.simulated.ros.commands import obey
 from robosc_bridge.simulated.ros.readings import Reading
 from robosc_bridge.simulated.ros.robot import COMMAND_TIMEOUT_S, ENCODINGS, RosRobot
 from robosc_bridge.simulated.scene import load_scene, scene_names
-from robosc_bridge.simulated.timebase import Timebase
+from robosc_bridge.simulated.timebase import FASTEST, Timebase
+from robosc_bridge.simulated.values import number, option, seed
 from robosc_bridge.simulated.world import World
 
 READY = "ready"
@@ -116,29 +119,31 @@ def serve(options: argparse.Namespace, make_face: MakeFace) -> int:
         make_face: Opens its node.
 
     Returns:
-        The exit code: 0 when it was interrupted, 1 when it cannot be served.
+        The exit code: 0 when it was interrupted, 1 when it cannot be served, or something has gone wrong meanwhile.
     """
     ended = threading.Event()
 
     def end(number: int, frame: FrameType | None) -> None:
         ended.set()
 
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, end)
+    for which in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(which, end)
+    mishaps = Mishaps()
     try:
         with contextlib.ExitStack() as stack:
+            stack.enter_context(mishaps)
             robot, pacer = make_robot(options)
             if options.motion is not None:
-                stream = stack.enter_context(options.motion.open("w", encoding="ascii"))
+                stream = stack.enter_context(contextlib.closing(Output(options.motion, mishaps.tell)))
                 stack.enter_context(contextlib.closing(MotionRecorder(robot.world, stream)))
             face = stack.enter_context(make_face(robot, pacer, ended))
             print(READY, flush=True)
             threading.Thread(target=_listen, args=(robot,), name="commands", daemon=True).start()
-            run(robot, pacer, face, ended.is_set)
+            run(robot, pacer, face, lambda: ended.is_set() or mishaps.has_crashed)
     except (MissingRosError, ServingError, OSError, ValueError) as error:
         print(f"the robot cannot be simulated: {error}", file=sys.stderr)
         return 1
-    return 0
+    return mishaps.status
 
 
 def run(robot: RosRobot, pacer: Pacer, face: Face, should_end: Callable[[], bool]) -> None:
@@ -178,8 +183,8 @@ def make_robot(options: argparse.Namespace) -> tuple[RosRobot, Pacer]:
 
 
 def _listen(robot: RosRobot) -> None:
-    """Obey standard input to its end; the robot is served on after it."""
-    with contextlib.suppress(ValueError):
+    """Obey standard input to its end, or until it cannot be read; the robot is served on after it."""
+    with contextlib.suppress(ValueError, OSError):
         for line in sys.stdin:
             try:
                 answer = obey(robot, line)
@@ -187,13 +192,6 @@ def _listen(robot: RosRobot) -> None:
                 answer = f"error: {error}"
             if answer:
                 print(answer, flush=True)
-
-
-def _timeout_s(text: str) -> float:
-    found = float(text)
-    if not 0 <= found <= 3600:
-        raise argparse.ArgumentTypeError(f"a time from 0 to 3600 s is needed, not {text}")
-    return found
 
 
 def parser(prog: str, description: str) -> argparse.ArgumentParser:
@@ -220,11 +218,15 @@ def parser(prog: str, description: str) -> argparse.ArgumentParser:
     found.add_argument(
         "--encoding", choices=ENCODINGS, default="mono8", help="of the camera's pictures; default: %(default)s"
     )
-    found.add_argument("--speed", type=float, default=1.0, metavar="N", help="the world passes N times as fast")
-    found.add_argument("--seed", type=int, default=0, help="of whatever the scene leaves to chance, and of noise")
+    found.add_argument(
+        "--speed", type=float, default=1.0, metavar="N", help=f"the world passes N times as fast, up to {FASTEST:g}"
+    )
+    found.add_argument(
+        "--seed", type=option(seed), default=0, metavar="N", help="of whatever the scene leaves to chance, and of noise"
+    )
     found.add_argument(
         "--command-timeout",
-        type=_timeout_s,
+        type=option(lambda text: number(text, 0.0, 3600.0)),
         default=COMMAND_TIMEOUT_S,
         metavar="S",
         help="how long a velocity holds, on the computer's clock; 0: for ever; default: %(default)s",

@@ -33,7 +33,7 @@ demo: $(READY) ## lead a simulated robot out of a maze, from model to serial byt
 WORKERS := $(shell echo $$(( $$(nproc 2>/dev/null || echo 2) + 1 )))
 
 test: $(READY) ## run every test; TESTS=... chooses, WORKERS=... says how many at a time
-	$(BIN)/python -m pytest -n $(WORKERS) --dist loadscope --durations 20 $(TESTS)
+	@PYTHON=$(BIN)/python WORKERS=$(WORKERS) sh tests/run.sh $(TESTS)
 
 # mutmut names what it changes by its path, so the packages must lie where it is started.
 MUTMUT := PYTHONPATH=$(CURDIR)/out/mutmut $(CURDIR)/$(BIN)/python -m mutmut

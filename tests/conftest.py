@@ -25,7 +25,8 @@ hypothesis.settings.register_profile("busy", deadline=None, suppress_health_chec
 hypothesis.settings.load_profile("busy")
 
 
-# They measure how quickly a robot reacts, and would disturb each other.
+# They measure how quickly a robot reacts, and would disturb each other: `make test` runs them when all others are
+# through. `pytest -m real_time` runs them alone. Single tests of other files carry the marker themselves.
 _IN_REAL_TIME = (
     "tests/bridge/daemon/test_assembly.py",
     "tests/bridge/daemon/test_faults.py",
@@ -36,6 +37,7 @@ _IN_REAL_TIME = (
     "tests/bridge/ground/test_ground_run.py",
     "tests/bridge/remote/test_whole.py",
     "tests/bridge/terminal/test_teleop.py",
+    "tests/bridge/view/test_page_bridge.py",
     "tests/end_to_end/test_demo.py",
     "tests/end_to_end/test_line_follower_demo.py",
     "tests/end_to_end/test_serial_line.py",
@@ -65,10 +67,13 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> _Scheduling:
     return _Scheduling(config, log)
 
 
+@pytest.hookimpl(tryfirst=True)  # Before `-m` chooses.
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """A test in real time is tried again if the machine was late: only a calm one can tell."""
+    """A test in real time is marked, and tried again if the machine was late: only a calm one can tell."""
     for item in items:
-        if _is_in_real_time(item):
+        if item.nodeid.startswith(_IN_REAL_TIME):
+            item.add_marker(pytest.mark.real_time)
+        if item.get_closest_marker("real_time") is not None:
             item.add_marker(pytest.mark.flaky(reruns=4, only_rerun=[MachineLateError.__name__]))
 
 
@@ -79,7 +84,7 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, None, None]:
     Raises:
         MachineLateError: It failed, and did not.
     """
-    if not _is_in_real_time(item):
+    if item.get_closest_marker("real_time") is None:
         return (yield)
     with preferred(), Lateness() as lateness:
         try:
@@ -88,10 +93,6 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, None, None]:
             if lateness.worst_s > LATE_S:
                 raise MachineLateError(f"its process had to wait for {lateness.worst_s:.3f} s") from error
             raise
-
-
-def _is_in_real_time(item: pytest.Item) -> bool:
-    return item.nodeid.startswith(_IN_REAL_TIME)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -21,6 +21,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from judge import judge_log, judge_motion, read_lines, table
+from robosc_bridge.experiments.domains import own_domain
 
 ROOT = Path(__file__).resolve().parents[2]
 MODEL = ROOT / "examples" / "line_follower" / "line_follower.rscd"
@@ -84,14 +85,14 @@ def stop(name: str, child: subprocess.Popen[str]) -> None:
     child.wait()
 
 
-def ros_environment(folder: Path) -> dict[str, str]:
+def ros_environment(folder: Path, domain: int) -> dict[str, str]:
     """ROS 2 on this machine only, in a domain of our own, with its logs in our folder."""
     profile = folder / "discovery.xml"
     profile.write_text(DISCOVERY_PROFILE, encoding="utf-8")
     return {
         **os.environ,
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-        "ROS_DOMAIN_ID": str(os.getpid() % 100 + 1),
+        "ROS_DOMAIN_ID": str(domain),
         "ROS_LOG_DIR": str(folder / "ros_log"),
         "FASTRTPS_DEFAULT_PROFILES_FILE": str(profile),
         "PYTHONDONTWRITEBYTECODE": "1",
@@ -132,8 +133,8 @@ def run_client(arguments: Sequence[str], environment: dict[str, str]) -> None:
 
 def run(folder: Path, model_path: Path) -> list[str]:
     """The whole demonstration with one model; returns what was wrong."""
-    environment = ros_environment(folder)
     with ExitStack() as stack:
+        environment = ros_environment(folder, stack.enter_context(own_domain()))
         server_log = folder / "server.log"
         server = stack.enter_context(
             process("the server", [tool("robosc-server"), "--port", "0"], environment, server_log)

@@ -79,6 +79,31 @@ def add_deployment_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_given_supervisor_options(parser: argparse.ArgumentParser, stands: str) -> None:
+    """For what takes a model or its supervisor as `--model`: how a model is synthesized.
+
+    Args:
+        parser: Of the command.
+        stands: That the supervisor `stands` or `stood` somewhere.
+    """
+    parser.add_argument(
+        "--deployment",
+        choices=[str(deployment) for deployment in Deployment],
+        help=f"where the supervisor {stands} (default: as a .rsup file says; for a model: controller)",
+    )
+    for short, name, what in (("-L", "library", "libraries"), ("-I", "interface", "ROS packages")):
+        parser.add_argument(
+            short,
+            f"--{name}-path",
+            action="append",
+            default=[],
+            type=Path,
+            metavar="DIR",
+            help=f"another folder with {what} of the model, as for 'robosc synth' (may be repeated)",
+        )
+    add_engine_options(parser)
+
+
 def add_engine_argument(parser: argparse.ArgumentParser) -> None:
     """The engine for decision diagrams."""
     parser.add_argument(

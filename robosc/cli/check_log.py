@@ -5,10 +5,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robosc.cli import synth
-from robosc.cli.arguments import add_engine_options, read_bundle
-from robosc.cli.output import ExitCode, UsageError, diagnostics_json, print_json
-from robosc.cli.sign import read_supervisor
+from robosc.cli.arguments import add_given_supervisor_options
+from robosc.cli.given import given_supervisor
+from robosc.cli.output import ExitCode, UsageError, print_json
 from robosc.model.structure import Deployment
 from robosc.source import visible
 
@@ -51,22 +50,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="the model (.rscd), which is synthesized, or its supervisor (.rsup), which is believed: 'robosc verify' "
         "checks it",
     )
-    parser.add_argument(
-        "--deployment",
-        choices=[str(deployment) for deployment in Deployment],
-        help="where the supervisor stood (default: as a .rsup file says; for a model: controller)",
-    )
-    for short, name, what in (("-L", "library", "libraries"), ("-I", "interface", "ROS packages")):
-        parser.add_argument(
-            short,
-            f"--{name}-path",
-            action="append",
-            default=[],
-            type=Path,
-            metavar="DIR",
-            help=f"another folder with {what} of the model, as for 'robosc synth' (may be repeated)",
-        )
-    add_engine_options(parser)
+    add_given_supervisor_options(parser, "stood")
     parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
     parser.set_defaults(run=run)
 
@@ -87,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise UsageError(f"cannot read {log}: {error.strerror or error}") from error
     except LogError as error:
         raise UsageError(str(error)) from error
-    supervisor = _supervisor(arguments)
+    supervisor = given_supervisor(arguments, is_json=arguments.json)
     if supervisor is None:
         return ExitCode.FAILED
     deployment = None if arguments.deployment is None else Deployment(arguments.deployment)
@@ -97,26 +81,6 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         _print(log, found, supervisor)
     return ExitCode.OK if found.has_passed else ExitCode.FAILED
-
-
-def _supervisor(arguments: argparse.Namespace) -> "Supervisor | None":
-    """The supervisor to check against; None where there is none, which has been told."""
-    from robosc.supervisor import decode
-
-    if arguments.model.suffix == ".rsup":
-        return decode(read_supervisor(arguments.model))
-    chosen = arguments.deployment
-    arguments.deployment = chosen or str(Deployment.CONTROLLER)
-    bundle = read_bundle(arguments)
-    # What a log tells has happened, however it would have gone on.
-    made = synth.make(arguments, bundle, allow_livelock=True)
-    arguments.deployment = chosen
-    if made.supervisor is None:
-        if arguments.json:
-            print_json({"status": str(made.status), **synth.reasons_json(made), **diagnostics_json(made.diagnostics)})
-        else:
-            synth.report_problems(made, bundle)
-    return made.supervisor
 
 
 def _document(found: "LogCheck", run_: "LoggedRun", supervisor: "Supervisor") -> dict[str, object]:

@@ -205,8 +205,6 @@ class _Checking:
                 problems.append(f"{event} happened although {pending} was still to be taken before any request")
             if self._awaited:
                 problems.append(f"{event} happened before the first message on {', '.join(sorted(self._awaited))}")
-            if self._deployment is Deployment.CONTROLLER:
-                problems += self._provided_otherwise(event, entry.data)
         self._seen(event)
         if kind != EventKind.CANCEL and entry.is_controllable is not replay.is_controllable(event):
             # A cancel is the caller's or the layer's own; both stand in the log of a layer.
@@ -215,6 +213,8 @@ class _Checking:
         why = replay.refusal(event) if replay.is_controllable(event) else ""
         if why:
             problems.append(f"{event} was not allowed: {why}")
+        elif kind == EventKind.REQUEST and self._deployment is Deployment.CONTROLLER:
+            problems += self._provided_otherwise(event, entry.data)
         if why and not replay.is_possible(event):
             replay.adopt(event, entry.state)
         else:

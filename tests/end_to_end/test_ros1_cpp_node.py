@@ -238,6 +238,7 @@ def test_state_prefix_stale_sensors_and_other_scans(start: Start, peer: Peer) ->
     assert "there is no parameter 'perod'" in node.stdout + node.stderr
     until(lambda: bool(peer.messages("/robot1/state")), "a state")
     state = json.loads(peer.messages("/robot1/state")[-1]["data"])
+    assert state["communications"] == {}
     assert state["definition"]["name"] == "LineFollower"
     numbers = {
         transition["id"]

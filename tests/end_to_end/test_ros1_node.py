@@ -313,6 +313,7 @@ def test_the_state_is_published_as_semantics_says(robot: Robot) -> None:
     )
     state = content()
     assert state["current"]["LineDetector"] == {"state": "line_found", "variables": {"current_correction": "0.25"}}
+    assert state["communications"] == {}
     assert state["definition"]["name"] == "LineFollower"
     taken = {number for message in robot.peer.values("/state") for number in json.loads(message["data"])["transitions"]}
     assert taken

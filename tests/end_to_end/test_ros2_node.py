@@ -224,6 +224,7 @@ def test_the_state_is_published_as_semantics_says(start: StartNode, peer: Peer) 
     state = content()
     assert state["current"]["LineDetector"] == {"state": "line_found", "variables": {"current_correction": "0.25"}}
     assert state["current"]["LidarSensor"] == {"state": "safe", "variables": {"ahead": "clear"}}
+    assert state["communications"] == {}
     definition = state["definition"]
     assert definition["name"] == "LineFollower"
     names = [component["name"] for component in definition["components"]]

@@ -178,12 +178,10 @@ def test_without_ros_2_it_says_what_is_missing(tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A domain of its own for all that is started: a folder for what it writes."""
-    with own_domain() as domain:
-        for name, value in environment(domain, tmp_path / "ros").items():
-            monkeypatch.setenv(name, value)
-        yield tmp_path / "run"
+def alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder for what is written; messages are strict."""
+    monkeypatch.setenv("ROS_PYTHON_CHECK_FIELDS", "1")
+    return tmp_path / "run"
 
 
 def test_the_maze_solver_gets_out_of_the_spiral(alone: Path, record_property: Callable[[str, object], None]) -> None:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 pytest.importorskip("cv2", reason="OpenCV (the extra examples) is not installed")
 
-from robosc_examples.line import LineSettings, find_line
+from robosc_examples.line import find_line
+from robosc_examples.line_runs import LineSettings
 
 WHOLE = LineSettings(top=0.0, smallest=0.0, largest=1.0)
 FLOOR, LINE = 220, 30

@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 
 cv2 = pytest.importorskip("cv2", reason="OpenCV (the extra examples) is not installed")
 
-from robosc_examples.line import LineSettings  # noqa: E402
 from robosc_examples.line import find_line as find_line_with_opencv  # noqa: E402
-from robosc_examples.line_runs import USUAL, RunSettings, find_line  # noqa: E402
+from robosc_examples.line_runs import LineSettings, find_line  # noqa: E402
 
 DARK, LIGHT = 30, 220
 
@@ -39,11 +38,7 @@ def test_they_agree(rows: list[list[bool]], looked_at: tuple[float, float], is_d
     expected = find_line_with_opencv(picture, LineSettings(is_dark=is_dark, top=top, bottom=bottom))
     padded = np.pad(picture, ((0, 0), (0, padding)), constant_values=DARK)
     found = find_line(
-        padded.tobytes(), width, height, width + padding, RunSettings(is_dark=is_dark, top=top, bottom=bottom)
+        padded.tobytes(), width, height, width + padding, LineSettings(is_dark=is_dark, top=top, bottom=bottom)
     )
     if has_one_largest(seen if is_dark else (1 - seen).astype(np.uint8)):
         assert found == pytest.approx(expected) if expected is not None else found is None
-
-
-def test_they_have_the_same_settings() -> None:
-    assert USUAL._asdict() == LineSettings()._asdict()

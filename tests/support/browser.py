@@ -62,6 +62,10 @@ class Visit:
         """Until a JavaScript expression, or function of an argument, is true."""
         self.page.wait_for_function(condition, arg=argument, timeout=20_000)
 
+    def found(self, question: str, argument: Any = None) -> Any:
+        """What a JavaScript function answers, as soon as it answers with anything but nothing, false or zero."""
+        return self.page.wait_for_function(question, arg=argument, timeout=20_000).json_value()
+
     def picture(self, name: str) -> Path:
         """Keeps a picture of the page."""
         SCREENSHOTS.mkdir(parents=True, exist_ok=True)

@@ -4,7 +4,7 @@ import asyncio
 import json
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,14 @@ LIMIT_S = 20.0
 Message = Mapping[str, Any]
 
 
+def _latest_of(messages: Iterable[Message], before: Message | None = None) -> Message | None:
+    """The update that counts after these messages; a definition makes the one before it void."""
+    for message in messages:
+        if message["type"] in ("definition", "update"):
+            before = message if message["type"] == "update" else None
+    return before
+
+
 class StandIn:
     """The server, in a thread of its own; a context manager.
 
@@ -36,7 +44,7 @@ class StandIn:
         self.texts: list[str] = []
         self.port = 0
         self._greeting = greeting
-        self._latest: Message | None = None
+        self._latest = _latest_of(greeting)
         self._sockets: set[web.WebSocketResponse] = set()
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="stand-in", daemon=True)
@@ -72,6 +80,7 @@ class StandIn:
     def greet(self, greeting: list[Message]) -> None:
         """What whoever comes from now on is told first."""
         self._greeting = greeting
+        self._latest = _latest_of(greeting)
 
     def send(self, *messages: Message) -> None:
         """To all pages, in this order."""
@@ -158,9 +167,7 @@ class StandIn:
                 await self._send_texts([json.dumps(self._latest)])
 
     async def _send(self, messages: tuple[Message, ...]) -> None:
-        for message in messages:
-            if message["type"] in ("definition", "update"):
-                self._latest = message if message["type"] == "update" else None
+        self._latest = _latest_of(messages, self._latest)
         await self._send_texts([json.dumps(message) for message in messages])
 
     async def _send_texts(self, texts: list[str]) -> None:

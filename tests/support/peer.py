@@ -1,8 +1,11 @@
 """A device that answers as a test says, on a real pseudo-terminal."""
 
 import contextlib
+import fcntl
 import os
 import select
+import sys
+import termios
 import threading
 import time
 import tty
@@ -57,6 +60,11 @@ class Peer:
         """Send something; what does not fit into the buffer of the line is lost."""
         with contextlib.suppress(BlockingIOError):
             os.write(self._master, data)
+
+    @property
+    def unread(self) -> int:
+        """Bytes that have arrived at the near end, and that nobody there has read."""
+        return int.from_bytes(fcntl.ioctl(self._slave, termios.FIONREAD, bytes(4)), sys.byteorder)
 
     def close(self) -> None:
         os.write(self._waker, b"\0")

@@ -19,7 +19,7 @@ def recorded(folder: Path, faults: tuple[str, ...] = ()) -> Outcome:
         folder: Where to; made anew.
         faults: What was wrong with its motion.
     """
-    folder.mkdir(parents=True)
+    folder.mkdir(parents=True, exist_ok=True)
     supervisor = example_supervisor("maze_solver/maze_solver")
     (folder / "maze.rsup").write_bytes(encode(supervisor))
     bench = Bench(InterpretedSystem(supervisor))

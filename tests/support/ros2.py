@@ -1,28 +1,23 @@
 """Real ROS 2 in tests: nodes as processes, a peer that talks to them, isolated domains, no fixed sleeps."""
 
 import contextlib
-import fcntl
-import itertools
 import os
 import subprocess
 import sys
-import tempfile
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from robosc_bridge.experiments.domains import own_domain
 from support.process import Process
+
+__all__ = ["Peer", "RosProcess", "environment", "own_domain", "wait_until"]
 
 DISCOVERY_LIMIT_S = 15.0
 ORDERLY_END_S = 3.0
-
-LAST_DOMAIN = 101
-"""Above it, ROS 2 would use ports that the system hands out."""
-
-_used = itertools.count()
 
 _PROFILE = """<?xml version="1.0" encoding="UTF-8"?>
 <profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
@@ -32,26 +27,6 @@ _PROFILE = """<?xml version="1.0" encoding="UTF-8"?>
   </discovery_config></builtin></rtps></participant>
 </profiles>
 """
-
-
-@contextlib.contextmanager
-def own_domain() -> Iterator[int]:
-    """A domain id that no other test of this user has, whichever process it runs in."""
-    folder = Path(tempfile.gettempdir()) / f"robosc-ros-domains-{os.getuid()}"
-    folder.mkdir(exist_ok=True)
-    # Processes start looking at different places, so that they rarely meet. The next test of a process gets the next
-    # domain: what the last one left behind may take a while to go.
-    start = os.getpid() + 7 * next(_used)
-    for offset in range(LAST_DOMAIN):
-        domain = 1 + (start + offset) % LAST_DOMAIN
-        with (folder / str(domain)).open("w") as lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                continue
-            yield domain
-            return
-    raise RuntimeError("every ROS domain is in use")
 
 
 def environment(domain: int, folder: Path) -> dict[str, str]:

@@ -1,7 +1,9 @@
 """`robosc evaluate`: the paper's experiments, run whole, and one report of them."""
 
 import argparse
+import contextlib
 import importlib
+import itertools
 import math
 import sys
 import time
@@ -17,7 +19,7 @@ from robosc.source import visible
 
 if TYPE_CHECKING:
     from robosc.supervisor.structure import Supervisor
-    from robosc_bridge.experiments.cycles import CycleTimes
+    from robosc_bridge.experiments.cycles.times import CycleTimes
     from robosc_bridge.experiments.lines_of_code import CodeSize
     from robosc_bridge.experiments.report import FailedRun, Report, ReportedRun
     from robosc_bridge.experiments.scenario import Outcome
@@ -273,10 +275,12 @@ def _run(
 
 
 def _new_folder(folder: Path, name: str) -> Path:
-    """A folder for a run that is not there yet: what an earlier run has left stays."""
-    number = 1
-    while (place := folder / f"{name}-{number}").exists():
-        number += 1
+    """A new, empty folder for a run: what an earlier one has left stays, and one that is under way has its own."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for number in itertools.count(1):
+        with contextlib.suppress(FileExistsError):
+            (place := folder / f"{name}-{number}").mkdir()
+            break
     return place
 
 
@@ -367,7 +371,7 @@ def _sizes(experiment: Experiment) -> "tuple[tuple[CodeSize, ...], Supervisor]":
 
 
 def _cycles(experiment: Experiment, controller: "Supervisor") -> "tuple[CycleTimes, ...]":
-    from robosc_bridge.experiments.cycles import measure
+    from robosc_bridge.experiments.cycles.measure import measure
 
     return measure(experiment.name, controller)
 

@@ -14,10 +14,10 @@ from robosc.model.structure import Deployment
 from robosc_api.security import Credentials
 from robosc_bridge.experiments.processes import Program, finish
 from robosc_bridge.experiments.scenario import Outcome, Say, ScenarioError
-from robosc_bridge.experiments.serial import EXAMPLES, Rig, Setting, log_faults, running, scene_of
+from robosc_bridge.experiments.serial import EXAMPLES, Rig, Setting, running, scene_of
 from robosc_bridge.experiments.tail import LineCount, Now, latest
 from robosc_bridge.simulated.judge import Halt, judge_line
-from robosc_bridge.simulated.motion import Motion, MotionError, read_motion
+from robosc_bridge.simulated.motion import Motion
 from robosc_bridge.simulated.scene import Scene
 from robosc_bridge.terminal.client import BridgeClient, RefusedError, UnreachableError, Wish
 
@@ -67,7 +67,7 @@ def run_line(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: i
     if place.line is None or BOX not in {each.name for each in place.obstacles}:
         raise ScenarioError(f"the scene {place.name} needs a line, and an obstacle called {BOX}")
     setting = Setting(
-        folder.resolve(), model.resolve(), Deployment.LAYER, scene, place, seed, speed, "lds02", CHANNELS, SKILLS
+        folder.resolve(), model.resolve(), Deployment.LAYER, place, scene, seed, speed, "lds02", CHANNELS, SKILLS
     )
     say("starting the synthesis server, the simulated robot, the bridge and the follower")
     with running(setting) as rig:
@@ -81,26 +81,10 @@ def run_line(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: i
             finish(follower)
             figures = rig.finish()
             asked = follower.wait_for(r"^asked (\d+) times, blocked (\d+) times$")
-    try:
-        motion = read_motion(rig.motion)
-    except MotionError as error:
-        raise ScenarioError(str(error)) from error
-    return Outcome(
-        name="line",
-        connection="serial",
-        folder=folder,
-        event_log=rig.event_log,
-        motion=rig.motion,
-        supervisor=rig.supervisor,
-        scene=place,
-        faults=(*play.faults, *judge_line(place, motion, play.halts), *log_faults(rig)),
-        figures={
-            **figures,
-            **line_figures(place, motion),
-            "asked": float(asked[1]),
-            "blocked": float(asked[2]),
-        },
-    )
+    motion = setting.read_motion()
+    faults = (*play.faults, *judge_line(place, motion, play.halts))
+    told = {"asked": float(asked[1]), "blocked": float(asked[2])}
+    return setting.outcome("line", "serial", faults, {**figures, **line_figures(place, motion), **told})
 
 
 class _Play:
@@ -117,7 +101,7 @@ class _Play:
         self._rig = rig
         self._follower = follower
         self._say = say
-        self._events = LineCount(rig.event_log)
+        self._events = LineCount(rig.setting.event_log)
         self._begin_s = time.monotonic()
         self._what = ""
 
@@ -139,7 +123,7 @@ class _Play:
 
     def _drive(self, what: str) -> None:
         """Until it has driven some way."""
-        now = latest(self._rig.motion)
+        now = latest(self._rig.setting.motion)
         driven_m = 0.0
         for after in self._looks(f"did not drive {what}", what):
             driven_m += math.dist((now.x_m, now.y_m), (after.x_m, after.y_m))
@@ -155,7 +139,7 @@ class _Play:
             let_go: Lets it go on.
             is_at_once: Whether it has to from now on; else from when it does.
         """
-        told_s = latest(self._rig.motion).world_s
+        told_s = latest(self._rig.setting.motion).world_s
         begin_s: float | None = None
         for now in self._looks(f"did not stand still {what}", f"stands {what}"):
             if not now.is_standing:
@@ -173,7 +157,7 @@ class _Play:
         while time.monotonic() < end_s:
             self._rig.require()
             self._follower.require()
-            now = latest(self._rig.motion)
+            now = latest(self._rig.setting.motion)
             self._say(
                 f"{what}: x {now.x_m:+.2f} m  y {now.y_m:+.2f} m  {self._events.look()} events  "
                 f"{now.world_s:.1f} s of the world in {time.monotonic() - self._begin_s:.1f} s"

@@ -5,10 +5,10 @@ from pathlib import Path
 
 from robosc.model.structure import Deployment
 from robosc_bridge.experiments.scenario import Outcome, Say, ScenarioError
-from robosc_bridge.experiments.serial import EXAMPLES, Rig, Setting, log_faults, running, scene_of
+from robosc_bridge.experiments.serial import EXAMPLES, Rig, Setting, running, scene_of
 from robosc_bridge.experiments.tail import LineCount, latest
 from robosc_bridge.simulated.judge import judge_maze
-from robosc_bridge.simulated.motion import Motion, MotionError, read_motion
+from robosc_bridge.simulated.motion import Motion
 
 MODEL = EXAMPLES / "maze_solver" / "narrow_maze.rscd"
 SCENES = ("maze-rooms", "maze-spiral", "maze-random")
@@ -48,36 +48,23 @@ def run_maze(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: i
     if place.goal is None:
         raise ScenarioError(f"the scene {place.name} has no goal: there is no way out of it")
     setting = Setting(
-        folder.resolve(), model.resolve(), Deployment.CONTROLLER, scene, place, seed, speed, "lds01", CHANNELS, {}
+        folder.resolve(), model.resolve(), Deployment.CONTROLLER, place, scene, seed, speed, "lds01", CHANNELS, {}
     )
     say("starting the synthesis server, the simulated robot and the bridge")
     with running(setting) as rig:
         _until_out(rig, say)
         figures = rig.finish()
-    try:
-        motion = read_motion(rig.motion)
-    except MotionError as error:
-        raise ScenarioError(str(error)) from error
-    return Outcome(
-        name="maze",
-        connection="serial",
-        folder=folder,
-        event_log=rig.event_log,
-        motion=rig.motion,
-        supervisor=rig.supervisor,
-        scene=place,
-        faults=(*judge_maze(place, motion), *log_faults(rig)),
-        figures={**figures, **way_figures(motion)},
-    )
+    motion = setting.read_motion()
+    return setting.outcome("maze", "serial", judge_maze(place, motion), {**figures, **way_figures(motion)})
 
 
 def _until_out(rig: Rig, say: Say) -> None:
     """Wait until the robot is there, or has had time enough."""
-    events = LineCount(rig.event_log)
+    events = LineCount(rig.setting.event_log)
     begin_s = time.monotonic()
     while rig.simulator.ask("goal") == "not yet":
         rig.require()
-        now = latest(rig.motion)
+        now = latest(rig.setting.motion)
         passed_s = time.monotonic() - begin_s
         say(
             f"x {now.x_m:+.2f} m  y {now.y_m:+.2f} m  {events.look():5} events  "

@@ -1,7 +1,7 @@
 """Programs of a scenario as processes: each in a session of its own, stopped in order, none left behind.
 
 A terminal sends Ctrl-C to every process of its session; theirs are others, so that whoever runs the scenario brings
-them to rest one after the other.
+them to rest one after the other. Where that process is killed, each is told to end by the kernel.
 """
 
 import os
@@ -26,6 +26,7 @@ STOP_LIMIT_S = 15.0
 
 ANSWER_LIMIT_S = 10.0
 _POLL_S = 0.02
+_BEGIN = str(Path(__file__).with_name("begin.py"))
 _PREFERRED = -15
 _SHOWN_BYTES = 4096
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -84,7 +85,7 @@ def environment() -> dict[str, str]:
 
 
 class Program:
-    """A Python program that runs as long as the `with` block.
+    """A Python program that runs as long as the `with` block, and no longer than the thread that has entered it.
 
     Args:
         name: In messages, and of its log file.
@@ -127,22 +128,8 @@ class Program:
 
     def __enter__(self) -> Self:
         pipe = subprocess.PIPE if self._is_asked else None
-        with self.log.open("w", encoding="utf-8") as log, _interrupts.held():
-            try:
-                process = subprocess.Popen(  # noqa: S603 (our own programs)
-                    [self._interpreter, *self._arguments],
-                    env=environment() if self._variables is None else dict(self._variables),
-                    cwd=self._folder,
-                    stdin=pipe or subprocess.DEVNULL,
-                    stdout=pipe or log,
-                    stderr=log,
-                    start_new_session=True,
-                    text=True,
-                )
-            except OSError as error:
-                raise ScenarioError(f"{self.name} cannot be started: {error.strerror or error}") from error
-            self._process = process
         try:
+            process = self._started(pipe)
             if self._is_preferred:
                 # Now it has one thread, whose priority the others will inherit.
                 with suppress(PermissionError, ProcessLookupError):
@@ -158,6 +145,24 @@ class Program:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.stop()
+
+    def _started(self, pipe: int | None) -> "subprocess.Popen[str]":
+        # What interrupts meanwhile does so when it is noted that the process is there.
+        with self.log.open("w", encoding="utf-8") as log, _interrupts.held():
+            try:
+                self._process = subprocess.Popen(  # noqa: S603 (our own programs)
+                    [sys.executable, "-I", "-S", _BEGIN, str(os.getpid()), self._interpreter, *self._arguments],
+                    env=environment() if self._variables is None else dict(self._variables),
+                    cwd=self._folder,
+                    stdin=pipe or subprocess.DEVNULL,
+                    stdout=pipe or log,
+                    stderr=log,
+                    start_new_session=True,
+                    text=True,
+                )
+            except OSError as error:
+                raise ScenarioError(f"{self.name} cannot be started: {error.strerror or error}") from error
+            return self._process
 
     @property
     def _used(self) -> "subprocess.Popen[str]":
@@ -248,13 +253,16 @@ class Program:
         process = self._process
         if process is None:
             return
-        if process.poll() is None:
-            process.terminate()
-            with suppress(subprocess.TimeoutExpired):
-                process.wait(STOP_LIMIT_S)
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+        try:
+            if process.poll() is None:
+                process.terminate()
+                with suppress(subprocess.TimeoutExpired):
+                    process.wait(STOP_LIMIT_S)
+        finally:
+            # Also where somebody does not wait for it any longer.
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
         if process.stdin is not None:
             # What it has not read is nobody's any more.
             with suppress(OSError):

@@ -15,7 +15,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoes
 
 from robosc._version import __version__
 from robosc.event_logs import LogCheck
-from robosc_bridge.experiments.cycles import CycleTimes
+from robosc_bridge.experiments.cycles.times import CycleTimes
 from robosc_bridge.experiments.lines_of_code import COUNTER, CodeSize
 
 TITLES: Mapping[str, str] = {"maze": "Maze solver", "line": "Line follower"}

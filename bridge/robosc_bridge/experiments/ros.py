@@ -15,21 +15,20 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robosc.errors import RoboscError
-from robosc.event_logs import check_log, read_log
 from robosc.language import load_bundle
 from robosc.model.structure import Deployment
-from robosc.supervisor import Supervisor, decode, encode, make_supervisor
+from robosc.supervisor import Supervisor, encode, make_supervisor
 from robosc.targets import generate, write_files
 from robosc_bridge.experiments.line import BOX, FREE_M, HELD_S, line_figures
 from robosc_bridge.experiments.line import MODEL as LINE_MODEL
 from robosc_bridge.experiments.maze import LIMIT_S, WORLD_LIMIT_S, way_figures
 from robosc_bridge.experiments.processes import Program, finish
+from robosc_bridge.experiments.records import Recorded
 from robosc_bridge.experiments.scenario import Connection, Outcome, Say, ScenarioError
 from robosc_bridge.experiments.serial import EXAMPLES, scene_of
 from robosc_bridge.experiments.tail import LineCount, Now, latest
 from robosc_bridge.simulated.judge import SETTLE_S, Halt, judge_line, judge_maze
-from robosc_bridge.simulated.motion import Motion, MotionError, read_motion
-from robosc_bridge.simulated.scene import Scene
+from robosc_bridge.simulated.scene import scene_names
 
 HELPERS = EXAMPLES / "robosc_examples"
 MAZE_MODEL = EXAMPLES / "maze_solver" / "maze_solver.rscd"
@@ -90,15 +89,11 @@ class Middleware(ABC):
 
 
 @dataclass(frozen=True)
-class Setting:
+class Setting(Recorded):
     """What is run.
 
     Attributes:
         middleware: On which.
-        folder: Where everything is written.
-        model: That the supervisor is made of.
-        deployment: Where it stands.
-        scene: The world.
         source: Name or file of the scene.
         seed: Of what the scene leaves to chance.
         speed: How many times as fast as the clock the world passes.
@@ -106,10 +101,6 @@ class Setting:
     """
 
     middleware: Middleware
-    folder: Path
-    model: Path
-    deployment: Deployment
-    scene: Scene
     source: str
     seed: int
     speed: float
@@ -119,29 +110,6 @@ class Setting:
     def settle_s(self) -> float:
         """Of the world: how long the robot may take to stand still."""
         return SETTLE_S + REACTION_S * self.speed
-
-    @property
-    def motion(self) -> Path:
-        """The record of the robot's motion."""
-        return self.folder / "motion.jsonl"
-
-    @property
-    def supervisor(self) -> Path:
-        """The supervisor that is executed."""
-        return self.folder / f"{self.model.stem}.rsup"
-
-    @property
-    def events(self) -> Path:
-        """Where the event log goes."""
-        return self.folder / "events"
-
-    @property
-    def event_log(self) -> Path:
-        """The log of the execution; raises ScenarioError if there is none."""
-        found = sorted(self.events.glob("*.jsonl"))
-        if len(found) != 1:
-            raise ScenarioError(f"{len(found)} event logs in {self.events}, where one was to be")
-        return found[0]
 
 
 class Stage:
@@ -327,8 +295,10 @@ def run_maze(
             if stage.simulator.ask("goal") != "not yet" or now.world_s > WORLD_LIMIT_S:
                 break
         figures = stage.finish()
-    motion = _motion(setting)
-    return _outcome("maze", setting, judge_maze(setting.scene, motion), {**figures, **way_figures(motion)})
+    motion = setting.read_motion()
+    return setting.outcome(
+        "maze", setting.middleware.connection, judge_maze(setting.scene, motion), {**figures, **way_figures(motion)}
+    )
 
 
 def run_line(
@@ -378,10 +348,10 @@ def run_line(
         watch.stand("the stop button", lambda: panel.tell("resume"))
         watch.drive("after the resume button")
         figures = stage.finish()
-    motion = _motion(setting)
+    motion = setting.read_motion()
     judged = judge_line(place, motion, watch.halts, settle_s=setting.settle_s, least_m=3 * FREE_M)
     faults = (*watch.faults, *judged)
-    return _outcome("line", setting, faults, {**figures, **line_figures(place, motion)})
+    return setting.outcome("line", setting.middleware.connection, faults, {**figures, **line_figures(place, motion)})
 
 
 class _Watch:
@@ -470,39 +440,7 @@ def _setting(
     speed: float,
     patience_s: float,
 ) -> Setting:
-    source = str(scene.resolve()) if isinstance(scene, Path) else scene
+    # The twin has another working folder.
+    source = scene if isinstance(scene, str) and scene in scene_names() else str(Path(scene).resolve())
     place = scene_of(source, seed)
-    return Setting(middleware, folder.resolve(), model.resolve(), deployment, place, source, seed, speed, patience_s)
-
-
-def _motion(setting: Setting) -> Motion:
-    try:
-        return read_motion(setting.motion)
-    except MotionError as error:
-        raise ScenarioError(str(error)) from error
-
-
-def _outcome(name: str, setting: Setting, faults: Sequence[str], figures: Mapping[str, float]) -> Outcome:
-    return Outcome(
-        name=name,
-        connection=setting.middleware.connection,
-        folder=setting.folder,
-        event_log=setting.event_log,
-        motion=setting.motion,
-        supervisor=setting.supervisor,
-        scene=setting.scene,
-        faults=(*faults, *_log_faults(setting)),
-        figures=figures,
-    )
-
-
-def _log_faults(setting: Setting) -> tuple[str, ...]:
-    """What is wrong with the event log, replayed on the supervisor: each request must have been allowed then."""
-    try:
-        found = check_log(read_log(setting.event_log), decode(setting.supervisor.read_bytes()), setting.deployment)
-    except (RoboscError, OSError) as error:
-        return (f"the event log cannot be checked: {error}",)
-    faults = [f"line {each.line} of the event log: {each.sentence}" for each in found.violations]
-    if not found.requests:
-        faults.append("the event log has no request at all")
-    return (*faults, *found.notes)
+    return Setting(folder.resolve(), model.resolve(), deployment, place, middleware, source, seed, speed, patience_s)

@@ -1,17 +1,14 @@
 """The scenarios over ROS 2: a generated rclpy node, the nodes of the example robots and the twin as a ROS 2 node."""
 
 import importlib.util
-import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
 from robosc_bridge.experiments import ros
+from robosc_bridge.experiments.domains import own_domain
 from robosc_bridge.experiments.processes import environment
 from robosc_bridge.experiments.scenario import Outcome, Say, ScenarioError
-
-LAST_DOMAIN = 101
-"""Above it, ROS 2 would use ports that the system hands out."""
 
 # Fast DDS announces itself at once and often with this profile; its default finds peers seconds later now and then.
 _PROFILE = """<?xml version="1.0" encoding="UTF-8"?>
@@ -23,9 +20,12 @@ _PROFILE = """<?xml version="1.0" encoding="UTF-8"?>
 </profiles>
 """
 
+_OF_OTHERS = ("ROS_DISCOVERY_SERVER", "ROS_STATIC_PEERS", "FASTDDS_DEFAULT_PROFILES_FILE", "ROS_LOCALHOST_ONLY")
+"""Variables that lead to nodes elsewhere."""
+
 
 class Ros2(ros.Middleware):
-    """ROS 2 on this machine alone, in a domain of its own unless the environment has one."""
+    """ROS 2 on this machine alone, in a domain of its own, whatever the environment says: a robot may listen there."""
 
     connection = "ros2"
     helpers = "robosc_examples"
@@ -38,13 +38,14 @@ class Ros2(ros.Middleware):
             raise ScenarioError("ROS 2 is not there: source its setup file, or install RoboSC with its extra `ros2`")
         profile = folder / "discovery.xml"
         profile.write_text(_PROFILE, encoding="utf-8")
-        usual = {
-            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-            "ROS_DOMAIN_ID": str(1 + os.getpid() % LAST_DOMAIN),
-            "ROS_LOG_DIR": str(folder / "ros_log"),
-            "FASTRTPS_DEFAULT_PROFILES_FILE": str(profile),
-        }
-        yield {**usual, **environment()}
+        with own_domain() as domain:
+            yield {
+                **{name: value for name, value in environment().items() if name not in _OF_OTHERS},
+                "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+                "ROS_DOMAIN_ID": str(domain),
+                "ROS_LOG_DIR": str(folder / "ros_log"),
+                "FASTRTPS_DEFAULT_PROFILES_FILE": str(profile),
+            }
 
     def given(self, parameters: Mapping[str, object], remappings: Mapping[str, str]) -> list[str]:
         """After `--ros-args`."""

@@ -12,11 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from robosc.errors import RoboscError
-from robosc.event_logs import check_log, read_log
 from robosc.model.structure import Deployment
-from robosc.supervisor import decode
 from robosc_bridge.experiments.processes import Program, finish
+from robosc_bridge.experiments.records import Recorded
 from robosc_bridge.experiments.scenario import ScenarioError
 from robosc_bridge.simulated.scene import Scene, SceneError, load_scene, scene_names
 
@@ -35,15 +33,11 @@ _MOST_SUPERVISOR_BYTES = 64 * 1024 * 1024
 
 
 @dataclass(frozen=True)
-class Setting:
+class Setting(Recorded):
     """What is run.
 
     Attributes:
-        folder: Where everything is written.
-        model: That the supervisor is made of.
-        deployment: Where it stands.
         source: Name or file of the scene.
-        scene: The robot's world, as it is read from there.
         seed: Of what the scene leaves to chance.
         speed: How many times as fast as the clock the world passes.
         lidar: Which the robot has. LDS-01 measures up to 3.5 m, LDS-02 up to 8 m.
@@ -51,11 +45,7 @@ class Setting:
         skills: Further lines of its section `skills`, by skill.
     """
 
-    folder: Path
-    model: Path
-    deployment: Deployment
     source: str | Path
-    scene: Scene
     seed: int
     speed: float
     lidar: Literal["lds01", "lds02"]
@@ -80,24 +70,6 @@ class Rig:
     bridge: Program
     address: str
     used_s: tuple[float, float]
-
-    @property
-    def motion(self) -> Path:
-        """The record of the robot's motion."""
-        return self.setting.folder / "motion.jsonl"
-
-    @property
-    def event_log(self) -> Path:
-        """The log of the execution; raises ScenarioError if there is none."""
-        found = sorted((self.setting.folder / "events").glob("*.jsonl"))
-        if len(found) != 1:
-            raise ScenarioError(f"{len(found)} event logs in {self.setting.folder / 'events'}, where one was to be")
-        return found[0]
-
-    @property
-    def supervisor(self) -> Path:
-        """As the client received it."""
-        return self.setting.folder / f"{self.setting.model.stem}.rsup"
 
     def require(self) -> None:
         """Raise ScenarioError if a process has ended by itself."""
@@ -176,7 +148,7 @@ def configuration(setting: Setting, base: str, scanner: str, camera: str | None)
         "skills:",
         *(f"  {name}: {{{text}}}" for name, text in skills.items()),
         "remote: {grpc_address: 127.0.0.1:0}",
-        f'log: {{folder: "{setting.folder / "events"}"}}',
+        f'log: {{folder: "{setting.events}"}}',
         "channels:",
         *(f'  "{identifier}": {text}' for identifier, text in setting.channels.items()),
     ]
@@ -224,7 +196,7 @@ def running(setting: Setting) -> Iterator[Rig]:
         rig = Rig(setting, simulator, bridge, address, (bridge.cpu_s, simulator.cpu_s))
         _wait_for_supervisor(client)
         (kept,) = (folder / "kept").glob("*.rsup")
-        if kept.read_bytes() != rig.supervisor.read_bytes():
+        if kept.read_bytes() != setting.supervisor.read_bytes():
             raise ScenarioError("client and bridge were sent different supervisors of the same model")
         yield rig
 
@@ -242,7 +214,7 @@ def _simulator(stack: ExitStack, setting: Setting) -> tuple[Program, dict[str, s
             seed=setting.seed,
             speed=setting.speed,
             wait=PATIENCE_S,
-            motion=folder / "motion.jsonl",
+            motion=setting.motion,
         ),
         folder,
         is_preferred=True,
@@ -267,7 +239,7 @@ def _client(setting: Setting, server: str) -> Program:
             setting.model,
             server=server,
             deployment=setting.deployment,
-            output=setting.folder / f"{setting.model.stem}.rsup",
+            output=setting.supervisor,
         ),
         setting.folder,
     )
@@ -286,16 +258,3 @@ def _wait_for_supervisor(client: Program) -> None:
 def _words(begin: str, *places: Path, **options: object) -> list[str]:
     """A command's words: its beginning, files, and options with their names."""
     return [*begin.split(), *map(str, places), *(f"--{name}={value}" for name, value in options.items())]
-
-
-def log_faults(rig: Rig) -> tuple[str, ...]:
-    """What is wrong with the event log, replayed on the supervisor: each request must have been allowed then."""
-    try:
-        data = rig.supervisor.read_bytes()
-        found = check_log(read_log(rig.event_log), decode(data), rig.setting.deployment)
-    except (RoboscError, OSError) as error:
-        return (f"the event log cannot be checked: {error}",)
-    faults = [f"log line {each.line}: {each.sentence}" for each in found.violations]
-    if not found.requests:
-        faults.append("the event log has no request at all")
-    return (*faults, *found.notes)

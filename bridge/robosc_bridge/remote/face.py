@@ -4,7 +4,6 @@ import asyncio
 import contextlib
 import logging
 import os
-import threading
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from robosc_api.malformed import MalformedRequests
 from robosc_api.security import Guard, SecurityError, ServerSecurity, TokenFile, add_port
 from robosc_bridge.configuration.structure import Configuration
 from robosc_bridge.daemon.operations import Operations
+from robosc_bridge.daemon.served_face import ServedFace
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.remote import convert
 from robosc_bridge.remote.condition import Condition
@@ -44,7 +44,6 @@ PING_S, PING_LIMIT_S = 5.0, 3.0
 """After so long without a word a caller is asked whether it is there, and taken for gone if it does not answer."""
 
 _HANDSHAKE_LIMIT_S = 3.0
-_START_LIMIT_S, _STOP_LIMIT_S = 10.0, 5.0
 _GRACE_S = 0.5
 _LOOK_S = 1.0
 
@@ -87,36 +86,18 @@ def _path(text: str | None) -> Path | None:
     return None if text is None else Path(text)
 
 
-class RemoteFace:
+class RemoteFace(ServedFace):
     """A server in a thread of its own; `serve` makes one that listens.
 
     Args:
         operations: The daemon.
         settings: Where and how it listens.
-
-    Attributes:
-        address: `HOST:PORT` that it listens on; empty: it does not yet.
     """
 
     def __init__(self, operations: Operations, settings: RemoteSettings) -> None:
-        self.address = ""
+        super().__init__("remote face", "remote", RemoteError, (SecurityError, ValueError, OSError))
         self._operations = operations
         self._settings = settings
-        self._failure: BaseException | None = None
-        self._is_ready = threading.Event()
-        self._loop: asyncio.AbstractEventLoop | None = None
-        self._end = asyncio.Event()
-        self._thread = threading.Thread(target=self._run, name="remote face", daemon=True)
-
-    @property
-    def name(self) -> str:
-        """For the log."""
-        return self._thread.name
-
-    @property
-    def is_alive(self) -> bool:
-        """Whether it serves."""
-        return self._thread.is_alive() and self._failure is None
 
     def start(self) -> None:
         """Listen.
@@ -124,38 +105,10 @@ class RemoteFace:
         Raises:
             RemoteError: It cannot.
         """
-        self._thread.start()
-        if not self._is_ready.wait(_START_LIMIT_S):
-            raise RemoteError(f"remote: the server has not begun within {_START_LIMIT_S:g} seconds")
-        if self._failure is not None:
-            self._thread.join(_STOP_LIMIT_S)
-            raise RemoteError(f"remote: {self._failure}") from self._failure
+        super().start()
         _log.info("the remote face listens on %s", self.address)
 
-    def stop(self) -> None:
-        """End every call and give the port back; may be called again."""
-        if self._loop is not None and self._thread.is_alive():
-            try:
-                self._loop.call_soon_threadsafe(self._end.set)
-            except RuntimeError:
-                return  # It has just ended by itself.
-            self._thread.join(_STOP_LIMIT_S)
-            if self._thread.is_alive():
-                _log.error("the remote face has not ended within %g seconds", _STOP_LIMIT_S)
-
-    def _run(self) -> None:
-        try:
-            asyncio.run(self._serve())
-        except (SecurityError, ValueError, OSError) as error:
-            self._failure = error
-        except Exception as error:
-            self._failure = error
-            _log.exception("the remote face has failed")
-        finally:
-            self._is_ready.set()
-
     async def _serve(self) -> None:
-        self._loop = asyncio.get_running_loop()
         settings = self._settings
         security = settings.security
         guard = Guard(
@@ -173,7 +126,7 @@ class RemoteFace:
         reflection.enable_server_reflection(names, server)
         self.address = add_port(server, settings.address, security)
         await server.start()
-        self._is_ready.set()
+        self._is_listening()
         places = Places(int(self.address.rpartition(":")[2]), MAXIMUM_CONNECTIONS)
         try:
             while not self._end.is_set():

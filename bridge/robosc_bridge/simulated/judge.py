@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from robosc_bridge.simulated.motion import Event, Motion, Sample
+from robosc_bridge.simulated.motion import SAMPLE_S, Event, Motion, Sample
 from robosc_bridge.simulated.robots import BODIES
 from robosc_bridge.simulated.scene import Scene
 
@@ -24,6 +24,8 @@ SETTLE_S = 1.0
 
 # Places are rounded, and a body that touches is let a hair into what it touches by nobody.
 _SLACK_M = 1e-4
+# Twice as far as samples are written.
+_MOST_APART_S = 2 * SAMPLE_S
 # Between two samples nothing that obeys its motors gets farther: 50 ms at 1 m/s, and some.
 _JUMP_M = 0.1
 
@@ -131,7 +133,12 @@ def _record_faults(motion: Motion) -> Iterator[str]:
     """What no robot does: then nothing else that the record tells can be relied on."""
     if not motion.samples:
         yield "nothing was recorded"
+    if not motion.has_ended:
+        yield "the record has no end: whoever wrote it was killed, or had no room"
     for before, after in zip(motion.samples, motion.samples[1:], strict=False):
+        if after.world_s - before.world_s > _MOST_APART_S:
+            yield f"nothing was recorded from {before.world_s:.2f} s to {after.world_s:.2f} s"
+            return
         jump_m = math.hypot(after.x_m - before.x_m, after.y_m - before.y_m)
         if jump_m > _JUMP_M:
             yield f"at {after.world_s:.2f} s it is suddenly {jump_m:.2f} m away: moved by hand, or time is missing"

@@ -1,9 +1,11 @@
 """The record of a robot's motion: where it was, how fast, and what happened to it, as JSON Lines.
 
-A sample every 50 ms of the world and one at the end, and what happens when it happens; each line is written at once:
+A sample every 50 ms of the world, what happens when it happens, and the end, with a sample before it where the robot
+was elsewhere since; each line is written at once:
 
     {"time": 1767225600.05, "world_s": 0.05, "x_m": 0.0, "y_m": 0.0, "heading_rad": 0.0, "linear_m_s": 0.1, ...}
     {"time": 1767225612.4, "world_s": 12.4, "happening": "goal", "x_m": 1.2, "y_m": 0.61}
+    {"time": 1767225613.0, "world_s": 13.0, "happening": "end", "x_m": 1.25, "y_m": 0.61}
 
 `time` is in seconds since 1970, `world_s` in seconds of the world since the simulation began.
 """
@@ -67,7 +69,7 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         time: Seconds since 1970.
         world_s: Of the world, since the simulation began.
-        happening: A collision, the goal reached for the first time, an obstacle moved, put away or put back.
+        happening: A collision, the goal reached for the first time, an obstacle moved, put away or put back; the end.
         x_m: Where the robot was; of an obstacle, where that is now.
         y_m: The same.
         name: Of the obstacle that was met or moved; nothing for walls and the goal.
@@ -77,7 +79,7 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     time: _Number
     world_s: _Number
-    happening: Literal["collision", "goal", "obstacle"]
+    happening: Literal["collision", "goal", "obstacle", "end"]
     x_m: _Number
     y_m: _Number
     name: Annotated[str, msgspec.Meta(max_length=40)] = ""
@@ -91,11 +93,13 @@ class Motion:
 
     Attributes:
         samples: In the order of time.
-        happenings: In the order of time.
+        happenings: In the order of time, but the end.
+        has_ended: Whether the recorder has written its end: one that was killed, or whose disk was full, has not.
     """
 
     samples: tuple[Sample, ...]
     happenings: tuple[Event, ...]
+    has_ended: bool = True
 
 
 class MotionRecorder:
@@ -120,9 +124,15 @@ class MotionRecorder:
     def close(self) -> None:
         """Watch no more, and write where the robot is at the end."""
         with self._world.time.lock:
-            self._world.catch_up()
-            if self._steps % _EVERY:
-                self._write(self._sample(self._world.lived_s, self._steps % _EVERY * STEP_S))
+            world = self._world
+            world.catch_up()
+            steps = self._steps % _EVERY
+            # It may have been put down elsewhere since a sample, with no step after it.
+            if steps or self._last != (world.x_m, world.y_m, world.heading_rad):
+                self._write(self._sample(world.lived_s, (steps or _EVERY) * STEP_S))
+            end_s = round(world.lived_s, _DIGITS)
+            x_m, y_m = round(world.x_m, _DIGITS), round(world.y_m, _DIGITS)
+            self._write(Event(self._time(world.lived_s), end_s, "end", x_m, y_m))
             self._world.unwatch(self._step, self._happen)
 
     def _step(self, world_s: float) -> None:
@@ -203,7 +213,8 @@ def read_motion(path: Path) -> Motion:
                 _check_order(path, number, samples, happenings)
     except OSError as error:
         raise MotionError(f"{path}: cannot be read: {error.strerror}") from error
-    return Motion(tuple(samples), tuple(happenings))
+    has_ended = bool(happenings) and happenings[-1].happening == "end"
+    return Motion(tuple(samples), tuple(event for event in happenings if event.happening != "end"), has_ended)
 
 
 def _check_order(path: Path, number: int, samples: list[Sample], happenings: list[Event]) -> None:

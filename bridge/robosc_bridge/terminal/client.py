@@ -27,6 +27,8 @@ _OPTIONS = (
     ("grpc.max_receive_message_length", 16 * 2**20),
     # A proxy for web pages, set in the environment, is none for a robot in the next room.
     ("grpc.enable_http_proxy", 0),
+    # Else all clients of a process share one connection to an address, and a stop would wait for one that hangs.
+    ("grpc.use_local_subchannel_pool", 1),
     # A cable that is pulled and a bridge that hangs are noticed while a stream waits.
     ("grpc.keepalive_time_ms", 5000),
     ("grpc.keepalive_timeout_ms", 3000),

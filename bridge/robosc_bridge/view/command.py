@@ -8,9 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from robosc.cli.arguments import add_engine_options, read_bundle
+from robosc.cli.arguments import add_given_supervisor_options
 from robosc.cli.output import CommandError, ExitCode, UsageError
-from robosc.model.structure import Deployment
 
 if TYPE_CHECKING:
     from robosc.supervisor import Supervisor
@@ -55,22 +54,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="with --log or --ros2: the model (.rscd), which is synthesized, or its supervisor (.rsup); without it the "
         "page of a node cannot tell which requests are enabled",
     )
-    parser.add_argument(
-        "--deployment",
-        choices=[str(deployment) for deployment in Deployment],
-        help="where the supervisor stands (default: as a .rsup file says; for a model: controller)",
-    )
-    for short, name, what in (("-L", "library", "libraries"), ("-I", "interface", "ROS packages")):
-        parser.add_argument(
-            short,
-            f"--{name}-path",
-            action="append",
-            default=[],
-            type=Path,
-            metavar="DIR",
-            help=f"another folder with {what} of the model, as for 'robosc synth' (may be repeated)",
-        )
-    add_engine_options(parser)
+    add_given_supervisor_options(parser, "stands")
     parser.add_argument(
         "--scene",
         metavar="NAME|FILE",
@@ -223,20 +207,12 @@ def _log(path: Path) -> Any:
 
 
 def _supervisor(arguments: argparse.Namespace) -> "Supervisor":
-    from robosc.cli import synth
-    from robosc.cli.sign import read_supervisor
-    from robosc.supervisor import decode
+    from robosc.cli.given import given_supervisor
 
-    if arguments.model.suffix == ".rsup":
-        return decode(read_supervisor(arguments.model))
-    arguments.deployment = arguments.deployment or str(Deployment.CONTROLLER)
-    bundle = read_bundle(arguments)
-    # It is looked at, not executed.
-    made = synth.make(arguments, bundle, allow_livelock=True)
-    if made.supervisor is None:
-        synth.report_problems(made, bundle)
+    found = given_supervisor(arguments)
+    if found is None:
         raise CommandError(f"there is no supervisor of {arguments.model}", ExitCode.FAILED)
-    return made.supervisor
+    return found
 
 
 def _settings(arguments: argparse.Namespace) -> "ViewSettings":

@@ -5,7 +5,7 @@ import contextlib
 import json
 import logging
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from typing import Any
 
 from google.protobuf.json_format import MessageToDict
@@ -34,7 +34,9 @@ _log = logging.getLogger(__name__)
 RATE_HZ = 25.0
 """Most responses of the bridge a second; what it tells is at most so old."""
 
-_THREAD_LIMIT_S = 5.0
+FOLLOW_S = 0.5
+"""A stop that was not answered for so long is followed by the next one; before, they would only crowd the way."""
+
 _KINDS = {1: "incoming message", 2: "outgoing message", 3: "service", 4: "action"}
 
 
@@ -51,6 +53,9 @@ class RemoteBridge:
         self._address = address
         self._credentials = credentials
         self._scene = scene
+        self._defining: asyncio.Task[Robot] | None = None
+        self._stop_sent: asyncio.Task[None] | None = None
+        self._stop_to_send: asyncio.Task[None] | None = None
 
     async def run(self, sink: Sink) -> None:
         """Tell what the bridge tells, until cancelled.
@@ -59,8 +64,10 @@ class RemoteBridge:
             SourceLostError: It cannot be reached any more.
             SourceWrongError: It refuses, or is none.
         """
-        robot = await self._asked(lambda client: robot_told(client.definition(), self._scene))
-        await sink.define(robot)
+        if self._defining is None or self._defining.done():
+            self._defining = _kept(self._asked(lambda client: robot_told(client.definition(), self._scene)))
+        # Those who come and go while a bridge does not answer ask it once.
+        await sink.define(await asyncio.shield(self._defining))
         watch = _Watch(self._address, self._credentials, asyncio.get_running_loop())
         watch.start()
         try:
@@ -77,15 +84,12 @@ class RemoteBridge:
         Raises:
             RefusedError: It does not do it.
         """
-
-        def want(client: BridgeClient) -> None:
-            if command is Command.STOP:
-                client.stop()
-            else:
-                client.want(ClientWish(str(command)))
-
         try:
-            await self._asked(want)
+            if command is Command.STOP:
+                # It is sent, whether or not anybody waits for the answer.
+                await asyncio.shield(self._stop())
+            else:
+                await self._asked(lambda client: client.want(ClientWish(str(command))))
         except (SourceLostError, SourceWrongError) as error:
             raise RefusedError(str(error)) from error
 
@@ -96,6 +100,21 @@ class RemoteBridge:
             RefusedError: Always.
         """
         raise not_replayed()
+
+    def _stop(self) -> asyncio.Task[None]:
+        """A stop that is sent from now on: one that waits to be sent serves all who want it meanwhile."""
+        if self._stop_to_send is None:
+            before = self._stop_sent
+            if before is None or before.done():
+                self._stop_sent = _kept(self._asked(BridgeClient.stop))
+                return self._stop_sent
+            self._stop_to_send = _kept(self._stop_after(before))
+        return self._stop_to_send
+
+    async def _stop_after(self, before: asyncio.Task[None]) -> None:
+        await asyncio.wait([before], timeout=FOLLOW_S)
+        self._stop_sent, self._stop_to_send = self._stop_to_send, None
+        await self._asked(BridgeClient.stop)
 
     async def _asked[Found](self, ask: Callable[[BridgeClient], Found]) -> Found:
         """Ask over a connection of its own: one that hangs must not hold up a stop."""
@@ -119,6 +138,13 @@ class RemoteBridge:
         # A thread of its own: those of a pool may all be waiting for a bridge that does not answer.
         threading.Thread(target=work, name="live view asks", daemon=True).start()
         return await future
+
+
+def _kept[Found](work: Coroutine[Any, Any, Found]) -> asyncio.Task[Found]:
+    """Work that is begun now and goes on, whoever waits for it; what becomes of it need not be asked for."""
+    task = asyncio.Task(work, loop=asyncio.get_running_loop(), eager_start=True)
+    task.add_done_callback(lambda done: done.cancelled() or done.exception())
+    return task
 
 
 def _settle(loop: asyncio.AbstractEventLoop, future: Any, found: Any = None, error: Exception | None = None) -> None:

@@ -36,7 +36,7 @@ MAXIMUM_CONNECTIONS = 128
 """At the same time, those of pages among them."""
 
 MAXIMUM_WAITING = 4
-"""Commands of one page that wait for their answer; a stop waits for none."""
+"""Commands of one page that wait for their answer; stops are not counted."""
 
 REQUESTS_A_S, BURST = 20.0, 60
 """Of one page, beside stops; one that sends more is cut off."""
@@ -45,10 +45,10 @@ REQUEST_LIMIT_S = 10.0
 """For a request to be sent, and for a WebSocket to be asked for."""
 
 SEND_LIMIT_S = 30.0
-"""A page that takes no byte for so long is cut off."""
+"""A page that has no room for its next message for so long is cut off."""
 
 PING_S = 10.0
-"""A page that does not answer to a ping within half of it is gone."""
+"""A page of which nothing came for so long is sent a ping, and is gone unless it answers within half of that time."""
 
 BATCH_S = 0.02
 """Least time between two batches of messages to a page."""
@@ -68,9 +68,6 @@ HEADERS = {
 _BACKLOG = 16
 _SWEEP_S = 1.0
 _CLOSE_LIMIT_S = 2.0
-
-_STOPS: set[asyncio.Task[None]] = set()
-"""Stops that are under way: somebody must hold them, and the pages that wanted them may be gone."""
 
 _Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
@@ -105,7 +102,7 @@ class ViewServer:
         self._sweep: asyncio.Task[None] | None = None
         self._silent: dict[Any, float] = {}
         self._viewers = 0
-        self._sockets: set[web.WebSocketResponse] = set()
+        self._sockets: dict[web.WebSocketResponse, asyncio.Transport] = {}
 
     async def start(self) -> None:
         """Listen.
@@ -126,7 +123,13 @@ class ViewServer:
         app.router.add_get("/", self._index, allow_head=False)
         app.router.add_get("/page/{name}", self._asset, allow_head=False)
         app.router.add_get("/stream", self._stream, allow_head=False)
-        self._runner = web.AppRunner(app, access_log=None, handle_signals=False, keepalive_timeout=REQUEST_LIMIT_S)
+        self._runner = web.AppRunner(
+            app,
+            access_log=None,
+            handle_signals=False,
+            keepalive_timeout=REQUEST_LIMIT_S,
+            shutdown_timeout=_CLOSE_LIMIT_S,
+        )
         await self._runner.setup()
         loop = asyncio.get_running_loop()
         try:
@@ -137,6 +140,7 @@ class ViewServer:
                 ssl=context,
                 backlog=_BACKLOG,
                 ssl_handshake_timeout=None if context is None else REQUEST_LIMIT_S,
+                ssl_shutdown_timeout=None if context is None else _CLOSE_LIMIT_S,
             )
         except OSError as error:
             await self._runner.cleanup()
@@ -155,10 +159,10 @@ class ViewServer:
             self._server.close()
         for hub in {*self._hubs, *([self._shared] if self._shared else [])}:
             await hub.close()
-        closing = [socket.close(code=WSCloseCode.GOING_AWAY, message=b"the server ends") for socket in self._sockets]
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(_CLOSE_LIMIT_S):
-                await asyncio.gather(*closing, return_exceptions=True)
+        closing = [_close(socket, WSCloseCode.GOING_AWAY, b"the server ends") for socket in self._sockets]
+        await asyncio.gather(*closing, return_exceptions=True)
+        for transport in self._sockets.values():
+            transport.abort()
         if self._runner is not None:
             await self._runner.cleanup()
 
@@ -242,18 +246,25 @@ class ViewServer:
         page = web.WebSocketResponse(max_msg_size=MAXIMUM_BYTES, compress=False, heartbeat=PING_S, autoping=True)
         page.headers.update(HEADERS)
         await page.prepare(request)
-        self._sockets.add(page)
+        # Kept, since the request forgets it when the connection ends.
+        transport = request.transport
+        if transport is None:
+            return page  # It has ended already.
+        self._sockets[page] = transport
         viewer = hub.join()
         session = _Session(page, viewer, hub.source, self._access, str(request.remote))
-        writing = asyncio.create_task(_write(page, viewer))
+        writing = asyncio.create_task(_write(page, viewer, transport))
         try:
             await session.read()
         finally:
-            self._sockets.discard(page)
+            del self._sockets[page]
             writing.cancel()
             session.close()
             await asyncio.gather(writing, return_exceptions=True)
             await hub.leave(viewer)
+            # One that is only closed stays until everything was sent, which a page that reads nothing never lets be.
+            if transport.get_write_buffer_size() > 0:
+                transport.abort()
         return page
 
 
@@ -264,7 +275,7 @@ class _Full(asyncio.Protocol):
         transport.abort()  # type: ignore[attr-defined]
 
 
-async def _write(page: web.WebSocketResponse, viewer: Viewer) -> None:
+async def _write(page: web.WebSocketResponse, viewer: Viewer, transport: asyncio.Transport) -> None:
     """Send what there is, as fast as the page reads."""
     try:
         while not page.closed:
@@ -275,9 +286,14 @@ async def _write(page: web.WebSocketResponse, viewer: Viewer) -> None:
     except (ConnectionError, RuntimeError):
         pass  # It has gone.
     except TimeoutError:
-        transport = page._req.transport if page._req is not None else None
-        if transport is not None:
-            transport.abort()
+        transport.abort()
+
+
+async def _close(page: web.WebSocketResponse, code: WSCloseCode, why: bytes) -> None:
+    """End a stream; a page that does not even take that is not waited for."""
+    with contextlib.suppress(TimeoutError):
+        async with asyncio.timeout(_CLOSE_LIMIT_S):
+            await page.close(code=code, message=why)
 
 
 class _Session:
@@ -292,6 +308,7 @@ class _Session:
         self._access = access
         self._by = f"live view at {by}"
         self._tasks: set[asyncio.Task[None]] = set()
+        self._stops: set[asyncio.Task[None]] = set()
         self._left = float(BURST)
         self._last_s = asyncio.get_running_loop().time()
 
@@ -299,15 +316,15 @@ class _Session:
         """Do what the page asks for, until it leaves."""
         async for message in self._page:
             if message.type is not WSMsgType.TEXT:
-                await self._page.close(code=WSCloseCode.UNSUPPORTED_DATA, message=b"only texts are understood")
+                await _close(self._page, WSCloseCode.UNSUPPORTED_DATA, b"only texts are understood")
                 return
             if not self._take(message.data):
-                await self._page.close(code=WSCloseCode.POLICY_VIOLATION, message=b"too many requests")
+                await _close(self._page, WSCloseCode.POLICY_VIOLATION, b"too many requests")
                 return
 
     def close(self) -> None:
-        """The page has left: commands that wait for an answer are taken back. Stops are not commands."""
-        for task in self._tasks:
+        """The page has left: commands that wait for an answer are taken back. Of a stop only its answer is."""
+        for task in (*self._tasks, *self._stops):
             task.cancel()
 
     def _take(self, text: str) -> bool:
@@ -340,10 +357,11 @@ class _Session:
         self._viewer.answer(refused_text(str(command), why))
 
     def _stop(self) -> None:
-        # Begun before anything else is looked at, and ended by nobody: also of a page that is closed at once.
+        # Handed over before anything else is looked at: also of a page that is closed at once.
         task = asyncio.Task(self._do(Command.STOP), loop=asyncio.get_running_loop(), eager_start=True)
-        _STOPS.add(task)
-        task.add_done_callback(_STOPS.discard)
+        if not task.done():
+            self._stops.add(task)
+            task.add_done_callback(self._stops.discard)
 
     def _start(self, command: Command) -> None:
         task = asyncio.create_task(self._do(command))

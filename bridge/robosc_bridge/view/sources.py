@@ -92,6 +92,8 @@ class Source(Protocol):
     async def order(self, command: Command, by: str) -> None:
         """Want something of the robot; returns once it is done.
 
+        A stop is certain as soon as this first waits: it is carried out even if nobody awaits its answer any more.
+
         Raises:
             RefusedError: It is not done.
         """

@@ -1,34 +1,10 @@
 """Where a line on the floor runs in a picture. Without ROS."""
 
-from typing import NamedTuple
-
 import cv2
 import numpy as np
 
+from robosc_examples.line_runs import USUAL, LineSettings
 from robosc_examples.pictures import Picture
-
-
-class LineSettings(NamedTuple):
-    """What counts as a line.
-
-    Attributes:
-        threshold: Shade that parts the line from the floor, 0 (black) to 255.
-        is_dark: Whether the line is the darker of the two.
-        top: Where the rows that are looked at begin, as a share of the height from above.
-        bottom: Where they end.
-        smallest: Smallest share of the looked-at pixels that is a line.
-        largest: Largest; a picture that is dark all over shows no line.
-    """
-
-    threshold: float = 100.0
-    is_dark: bool = True
-    top: float = 0.6
-    bottom: float = 1.0
-    smallest: float = 0.005
-    largest: float = 0.6
-
-
-USUAL = LineSettings()
 
 
 def find_line(picture: Picture, settings: LineSettings = USUAL) -> float | None:

@@ -7,7 +7,8 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Empty, Float32
 
 from robosc_examples.camera import Camera
-from robosc_examples.line import USUAL, LineSettings, find_line
+from robosc_examples.line import find_line
+from robosc_examples.line_runs import USUAL, LineSettings
 from robosc_examples.motion import clamped
 from robosc_examples.pictures import grey_picture
 from robosc_examples.program import ParameterError, run

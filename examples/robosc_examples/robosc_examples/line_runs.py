@@ -7,8 +7,8 @@ Rosenfeld, J. L. Pfaltz, "Sequential operations in digital picture processing", 
 from typing import NamedTuple
 
 
-class RunSettings(NamedTuple):
-    """What counts as a line; see `line.LineSettings`.
+class LineSettings(NamedTuple):
+    """What counts as a line, here and for `line.find_line`.
 
     Attributes:
         threshold: Shade that parts the line from the floor, 0 (black) to 255.
@@ -27,10 +27,10 @@ class RunSettings(NamedTuple):
     largest: float = 0.6
 
 
-USUAL = RunSettings()
+USUAL = LineSettings()
 
 
-def find_line(data: bytes, width: int, height: int, step: int, settings: RunSettings = USUAL) -> "float | None":
+def find_line(data: bytes, width: int, height: int, step: int, settings: LineSettings = USUAL) -> "float | None":
     """How far the line is off the middle, to the left above zero, as a share of the width; None without a line.
 
     The line is the largest patch of its shade, the pixels of which touch at edges or corners; its centre of mass is

@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
+from robosc.automata.plants import communication_plant_name
 from robosc.expressions import (
     ArrayType,
     BooleanType,
@@ -17,12 +18,12 @@ from robosc.expressions import (
 )
 from robosc.model.structure import Communication, CommunicationKind, EventKind
 from robosc.targets.c99.header import batch, batch_parameters
-from robosc.targets.c99.layout import Layout, event_data
+from robosc.targets.c99.layout import PLANT_LOCATIONS, Layout, event_data
 from robosc.targets.c99.provide import Field, request_field
 from robosc.targets.c99.text import comment, string_literal
 from robosc.targets.c99.unit import Unit
 from robosc.targets.cpp.naming import require_field_name
-from robosc.targets.events import is_controllable
+from robosc.targets.events import has_plant_location, is_controllable
 from robosc.targets.python.text import indent
 from robosc.targets.ros.state_topic import state_topic
 
@@ -55,7 +56,7 @@ class Writer:
         """The header without what stands at the top of every file."""
         layout = self.layout
         tables = self._tables()
-        states = [*self._put_state(), *self._put_taken()]
+        states = [*self._put_state(), *self._put_communications(), *self._put_taken()]
         requests = self._put_request()
         received = [line for number, identifier in enumerate(received_topics(layout)) for line in
                     self._receive(number, identifier)]  # fmt: skip
@@ -152,6 +153,26 @@ class Writer:
         if isinstance(type_, StringType):
             return [f"put_json(out, {place});"]
         return [f"put_value(out, {place}, is_text);"]
+
+    def _put_communications(self) -> list[str]:
+        layout = self.layout
+        called = [item for item in layout.model.communications if has_plant_location(item)]
+        lines = ["out += '{';"]
+        for place, item in enumerate(called):
+            names = ", ".join(string_literal(location) for location in PLANT_LOCATIONS[item.kind])
+            key = ("," if place else "") + json.dumps(item.name) + ":"
+            lines += [
+                "{",
+                f"    static const char* const names[] = {{{names}}};",
+                f"    out += {string_literal(key)};",
+                f"    put_json(out, names[state.{layout.locations[communication_plant_name(item)]}]);",
+                "}",
+            ]
+        return _function(
+            f"inline void put_communications(std::string& out, [[maybe_unused]] const {layout.prefix}_state_t& state)",
+            [*lines, "out += '}';"],
+            comment("Where each service and action is, as JSON, for /state."),
+        )
 
     def _put_taken(self) -> list[str]:
         layout = self.layout

@@ -12,6 +12,7 @@ from robosc._version import __version__
 from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Communication, CommunicationKind, Deployment, Interface, Model
 from robosc.supervisor.structure import Supervisor
+from robosc.targets.events import has_plant_location
 from robosc.targets.python.generate import header
 from robosc.targets.python.layout import make_layout
 from robosc.targets.python.naming import snake_case
@@ -110,6 +111,7 @@ def context(
         "uncontrollable": layout.uncontrollable,
         "definition": tables.definition,
         "transitions": tables.transitions,
+        "called": tuple(item.name for item in model.communications if has_plant_location(item)),
     }
 
 

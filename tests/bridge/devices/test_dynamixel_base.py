@@ -141,6 +141,7 @@ def test_motors_fresh_from_the_factory_are_found_if_wanted(bench: Rig, caplog: p
     bench.base.close()
 
 
+@pytest.mark.real_time
 def test_the_wheels_speed_up_as_wanted(bench: Rig) -> None:
     bench.base = DynamixelBase(bench.robot.base_path, BURGER, acceleration_rad_s2=5.0, answer_limit_s=PATIENT_S)
     bench.start()
@@ -170,6 +171,7 @@ def test_arguments_out_of_their_range_are_refused(arguments: dict[str, object]) 
 # What the motors tell of themselves.
 
 
+@pytest.mark.real_time
 @pytest.mark.parametrize(
     ("provoke", "fault"),
     [("overload", MotorFault.OVERLOAD), ("overheat", MotorFault.OVERHEATING)],
@@ -266,6 +268,7 @@ def test_a_pause_that_trips_the_watchdogs_is_told_and_nothing_goes_on_by_itself(
     assert bench.goals_rad_s() != (0.0, 0.0)
 
 
+@pytest.mark.real_time
 def test_a_watchdog_that_trips_unseen_is_told_soon(bench: Rig) -> None:
     bench.start()
     bench.drive(FORWARD, 0.2)
@@ -275,6 +278,7 @@ def test_a_watchdog_that_trips_unseen_is_told_soon(bench: Rig) -> None:
     assert time.monotonic() - begin_s < 0.3
 
 
+@pytest.mark.real_time
 def test_torque_that_is_lost_without_a_word_is_told_soon(bench: Rig) -> None:
     bench.start()
     bench.drive(FORWARD, 0.2)
@@ -288,6 +292,7 @@ def test_torque_that_is_lost_without_a_word_is_told_soon(bench: Rig) -> None:
     assert bench.goals_rad_s() == (0.0, 0.0)
 
 
+@pytest.mark.real_time
 @pytest.mark.parametrize("turns", [-3, 0, 7])
 def test_a_motor_that_restarts_in_motion_has_not_jumped_and_stops_both(turns: int) -> None:
     with rig("dynamixel") as bench:
@@ -337,6 +342,7 @@ def test_a_motor_that_was_away_has_not_jumped(bench: Rig) -> None:
     assert (reading.pose.x_m, reading.pose.heading_rad) == (0.0, 0.0)
 
 
+@pytest.mark.real_time
 def test_a_restart_without_any_silence_is_found_where_the_position_jumps(bench: Rig) -> None:
     bench.robot.left.set_position(50_000)
     bench.start()

@@ -74,6 +74,7 @@ def test_it_goes_where_it_is_told_in_the_worked_packets_fields(bench: Bench) -> 
     assert (bench.rover.targets[-1]["vx"], bench.rover.targets[-1]["yaw_rate"]) == pytest.approx((-0.5, -2.0))
 
 
+@pytest.mark.real_time
 def test_targets_are_repeated_and_new_ones_go_at_once(bench: Bench) -> None:
     bench.start()
     before = len(bench.rover.targets)
@@ -92,6 +93,7 @@ def test_targets_are_repeated_and_new_ones_go_at_once(bench: Bench) -> None:
     assert len(bench.rover.targets) - before < 15
 
 
+@pytest.mark.real_time
 def test_our_heartbeat_goes_on_while_it_is_driven_and_never_without(any_bench: Bench) -> None:
     bench = any_bench
     bench.base.open()
@@ -104,6 +106,7 @@ def test_our_heartbeat_goes_on_while_it_is_driven_and_never_without(any_bench: B
     assert len(bench.rover.heartbeats) - before == 0
 
 
+@pytest.mark.real_time
 def test_a_driver_that_dies_stops_the_vehicle(bench: Bench) -> None:
     bench.start()
     bench.drive(FORWARD, 0.2)

@@ -23,6 +23,7 @@ from support.rovers import BODY, FORWARD, KEY, Bench, rig
 from support.wire import wait_until
 
 
+@pytest.mark.real_time
 def test_silence_is_told_in_time(any_bench: Bench) -> None:
     bench = any_bench
     bench.start()
@@ -35,6 +36,7 @@ def test_silence_is_told_in_time(any_bench: Bench) -> None:
     assert 0.8 < time.monotonic() - begin_s < 1.4
 
 
+@pytest.mark.real_time
 def test_lost_heartbeats_are_told_though_telemetry_goes_on(bench: Bench) -> None:
     bench.start()
     bench.rover._due_s[0] = math.inf
@@ -57,6 +59,7 @@ def test_a_vehicle_that_starts_anew_must_be_opened_again(bench: Bench) -> None:
     assert bench.drive(FORWARD, 0.2).is_torque_on
 
 
+@pytest.mark.real_time
 def test_an_unplugged_line_is_told_at_once_and_can_be_plugged_in_again(bench: Bench) -> None:
     assert isinstance(bench.line, SimulatedLine)
     bench.start()

@@ -101,6 +101,7 @@ def test_closing_leaves_a_vehicle_that_a_person_drives_to_them(bench: Bench) -> 
     assert bench.speed_m_s == pytest.approx(-0.1)
 
 
+@pytest.mark.real_time
 def test_a_vehicle_that_is_held_is_told(bench: Bench) -> None:
     bench.start()
     bench.drive(FORWARD, 0.3)

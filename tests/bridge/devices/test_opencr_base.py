@@ -239,6 +239,7 @@ def test_motors_that_restart_in_a_pause_have_not_jumped(bench: Rig) -> None:
     assert (reading.pose.x_m, reading.pose.heading_rad) == (0.0, 0.0)
 
 
+@pytest.mark.real_time
 def test_torque_that_is_gone_is_a_fault_that_stays_until_torque_is_switched_on_anew(bench: Rig) -> None:
     bench.start()
     bench.drive(Velocity(0.1), 0.2)

@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from robosc.supervisor.structure import Supervisor
-from robosc_bridge.experiments.cycles import PAPER, measure
 from robosc_bridge.experiments.cycles.driving import measured_driving
+from robosc_bridge.experiments.cycles.measure import measure
+from robosc_bridge.experiments.cycles.times import PAPER
 from robosc_bridge.experiments.ros1 import missing
 from support.generated import example_supervisor
 

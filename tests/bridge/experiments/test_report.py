@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from robosc_bridge.experiments.cycles import CycleTimes
+from robosc_bridge.experiments.cycles.times import CycleTimes
 from robosc_bridge.experiments.evaluate import reported
 from robosc_bridge.experiments.lines_of_code import CodeSize
 from robosc_bridge.experiments.report import FailedRun, Report, ReportedRun, machine_facts, write_report

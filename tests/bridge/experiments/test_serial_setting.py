@@ -30,7 +30,7 @@ def test_the_configuration_is_one_that_the_bridge_takes(name: str, speed: float,
     scene = scene_of(scenario.SCENES[0], 0)
     skills = line.SKILLS if name == "line" else {}
     setting = Setting(
-        tmp_path, scenario.MODEL, deployment, scenario.SCENES[0], scene, 0, speed, "lds01", scenario.CHANNELS, skills
+        tmp_path, scenario.MODEL, deployment, scene, scenario.SCENES[0], 0, speed, "lds01", scenario.CHANNELS, skills
     )
     text = configuration(setting, "/dev/base", "/dev/scanner", camera)
     loaded = parse(text.encode(), "bridge.yaml")

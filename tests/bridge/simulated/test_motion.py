@@ -115,6 +115,17 @@ def test_what_happens_is_recorded(path: Path) -> None:
     assert motion.samples[-1].collisions == 2
 
 
+@pytest.mark.parametrize("seconds", [0.1, 0.12])
+def test_the_last_sample_is_where_it_was_put_at_last(path: Path, seconds: float) -> None:
+    def act(world: World) -> None:
+        drive(world, 0.0, 0.0, seconds)
+        world.place(1.0, 0.5, 0.0)
+
+    samples = recorded(YARD, act, path).samples
+    assert [sample.world_s for sample in samples] == pytest.approx([0.0, 0.05, 0.1, seconds])
+    assert (samples[-2].x_m, samples[-1].x_m, samples[-1].y_m) == (0.0, 1.0, 0.5)
+
+
 def test_a_line_is_written_at_once() -> None:
     world = World(BODIES["burger"], YARD, Timebase(ManualClock()))
     stream = io.StringIO()
@@ -217,6 +228,24 @@ def test_nothing_is_no_success() -> None:
     empty = Motion((), ())
     assert judge_maze(YARD, empty) == ("nothing was recorded",)
     assert judge_line(YARD, empty) == ("nothing was recorded",)
+
+
+def test_a_record_with_a_hole_is_no_success(path: Path) -> None:
+    motion = recorded(YARD, there, path)
+    assert judge_maze(YARD, motion) == ()
+    hole = [sample for sample in motion.samples if not 4.8 < sample.world_s < 5.2]
+    (fault,) = judge_maze(YARD, Motion(tuple(hole), motion.happenings))
+    assert fault == "nothing was recorded from 4.80 s to 5.20 s"
+
+
+def test_a_record_that_its_writer_did_not_end_is_no_success(path: Path) -> None:
+    recorded(YARD, there, path)
+    lines = path.read_bytes().splitlines(keepends=True)
+    assert b'"end"' in lines[-1]
+    path.write_bytes(b"".join(lines[:-1]))
+    assert judge_maze(YARD, read_motion(path)) == (
+        "the record has no end: whoever wrote it was killed, or had no room",
+    )
 
 
 def test_scenes_without_goal_or_line_are_not_judged() -> None:

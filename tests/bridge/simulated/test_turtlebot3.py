@@ -2,6 +2,7 @@
 
 import threading
 import time
+from typing import NamedTuple
 
 import pytest
 from dynamixel_sdk import GroupSyncWrite, PacketHandler
@@ -33,22 +34,53 @@ def test_unknown_parts_are_told(robot: str, base: str, lidar: str) -> None:
     assert threading.active_count() == before
 
 
+class Look(NamedTuple):
+    """Where the robot was at some time between two others: a busy machine may make a look long."""
+
+    before_s: float
+    x_m: float
+    after_s: float
+
+
+def here(robot: SimulatedTurtleBot3, later_s: float = 0.0) -> Look:
+    """Where it is, or will be when so much time has passed."""
+    time.sleep(later_s)
+    return Look(time.monotonic(), robot.world.pose[0], time.monotonic())
+
+
+def drive_off(robot: SimulatedTurtleBot3) -> float:
+    """Let both servos turn forward; how fast that is, in m/s of the world."""
+    port, handler = sdk_port(robot.base_path), PacketHandler(2.0)
+    for device_id in (1, 2):
+        assert handler.write1ByteTxRx(port, device_id, 64, 1) == (0, 0)
+    goals = GroupSyncWrite(port, handler, 104, 4)
+    for device_id in (1, 2):
+        goals.addParam(device_id, [100, 0, 0, 0])
+    goals.txPacket()
+    port.closePort()
+    return 100 * 7.913672e-4
+
+
 @pytest.mark.parametrize("factor", [1.0, 5.0])
-def test_it_drives_by_its_clock(factor: float) -> None:
+def test_it_drives_as_far_as_its_time_passes(factor: float) -> None:
     with SimulatedTurtleBot3(base="dynamixel", walls=Walls(()), factor=factor, clock=ManualClock()) as robot:
-        port, handler = sdk_port(robot.base_path), PacketHandler(2.0)
-        for device_id in (1, 2):
-            assert handler.write1ByteTxRx(port, device_id, 64, 1) == (0, 0)
-        goals = GroupSyncWrite(port, handler, 104, 4)
-        for device_id in (1, 2):
-            goals.addParam(device_id, [100, 0, 0, 0])
-        goals.txPacket()
+        speed_m_s = drive_off(robot)
         # What was written is heard in the first step, and the wheels have their speed soon.
         robot.advance(0.2)
         x_m = robot.world.pose[0]
         robot.advance(0.5)
-        assert robot.world.pose[0] - x_m == pytest.approx(100 * 7.913672e-4 * 0.5 * factor, rel=1e-6)
-        port.closePort()
+        assert robot.world.pose[0] - x_m == pytest.approx(speed_m_s * 0.5 * factor, rel=1e-6)
+
+
+@pytest.mark.parametrize("factor", [1.0, 5.0])
+def test_it_drives_by_the_computers_clock(factor: float) -> None:
+    with SimulatedTurtleBot3(base="dynamixel", walls=Walls(()), factor=factor) as robot:
+        speed_m_s = drive_off(robot) * factor
+        wait_until(lambda: robot.world.pose[0] > 0.0)
+        first, second = here(robot), here(robot, 0.5)
+        passed_m = second.x_m - first.x_m
+        assert passed_m > 0.95 * speed_m_s * (second.before_s - first.after_s)
+        assert passed_m < 1.05 * speed_m_s * (second.after_s - first.before_s)
 
 
 def test_a_watchdog_trips_by_the_computers_clock_however_fast_the_world_is() -> None:

@@ -31,6 +31,8 @@ def seen(browser: Browser, server: StandIn) -> Iterator[Visit]:
 
 def test_a_lost_connection_is_unmistakable_and_ends_by_itself(server: StandIn, seen: Visit) -> None:
     seen.page.get_by_label("Filter components by name").fill("Base")
+    # What the reader has chosen is done before the robot comes anew.
+    seen.wait("() => document.querySelector('#components-count').textContent === '1 of 3'")
     server.away()
     seen.wait(FRESHNESS_IS, "lost")
     banner = seen.page.get_by_role("alert")
@@ -65,7 +67,8 @@ def test_a_loop_that_hangs_is_told_with_its_age(server: StandIn, seen: Visit) ->
     server.send(update(age_s=75.0))
     seen.wait(FRESHNESS_IS, "old")
     assert seen.page.get_by_role("alert").inner_text() == "The bridge's loop hangs: nothing shown here is live."
-    assert re.fullmatch(r"The state below is 7\d s old\.", seen.text("#stale-age"))
+    told = re.fullmatch(r"The state below is (\d+) s old\.", seen.text("#stale-age"))
+    assert told is not None and int(told[1]) >= 75
 
 
 def test_a_source_that_is_gone_says_why_until_it_is_back(server: StandIn, seen: Visit) -> None:

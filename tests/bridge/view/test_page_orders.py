@@ -42,7 +42,10 @@ def test_escape_stops_wherever_the_keyboard_is(server: StandIn, seen: Visit, foc
     if focus == "dialog":
         seen.page.get_by_role("button", name="Enlarge the graph of Base").click()
     elif focus != "body":
+        # What is not shown yet cannot have the keyboard.
+        seen.page.locator(focus).wait_for()
         seen.page.locator(focus).focus()
+        assert seen.page.evaluate("(wanted) => document.activeElement.matches(wanted)", focus)
     seen.page.keyboard.press("Escape")
     assert server.wait_for_messages(1) == [{"type": "stop"}]
     server.send({"type": "done", "what": "stop"})

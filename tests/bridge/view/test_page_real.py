@@ -1,7 +1,6 @@
 """The page before the real server: what it shows equals the state of the robot, or of its log at any of its moments."""
 
 import asyncio
-import json
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,35 +14,11 @@ from robosc.event_logs import read_log
 from robosc.execution.event_log import json_line, plain
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.view.replay import Recording, Replay
-from support.browser import Visit, visit
+from support.browser import visit
 from support.generated import example_supervisor
 from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed
 from support.view_servers import served
-
-# In the browser: state and variables of each component, places of services and actions, and the enabled requests.
-SHOWN = """() => {
-  const text = (element) => element.textContent.trim();
-  const pair = (line) => [text(line.querySelector("dt")), text(line.querySelector("dd"))];
-  const components = {};
-  const places = {};
-  for (const card of document.querySelectorAll(".card")) {
-    const lines = [...card.querySelectorAll(".variables > div")];
-    const active = [...card.querySelectorAll(".state.is-active")].map((state) => state.dataset.state);
-    if (active.length > 0) {
-      components[card.dataset.component] = {
-        state: active.join(),
-        variables: Object.fromEntries(lines.map(pair)),
-      };
-    }
-    for (const place of card.querySelectorAll(".place")) {
-      places[text(place.parentElement.querySelector("bdi"))] = text(place);
-    }
-  }
-  const enabled = [...document.querySelectorAll('.request[data-enabled="true"]')].map((item) => item.dataset.request);
-  return { components, places, enabled };
-}"""
-EQUALS = f"(wanted) => JSON.stringify(({SHOWN})()) === wanted"
-
+from support.view_shown import entries_shown, shows, wanted
 
 NEWEST = """(number) => {
   const numbers = [...document.querySelectorAll(".row")].map((row) => Number(row.dataset.number));
@@ -51,43 +26,9 @@ NEWEST = """(number) => {
 }"""
 
 
-def _in_words(value: Any) -> str:
-    if isinstance(value, float):
-        # To a browser 0.0 and 0 are one number.
-        return f"{value:g}"
-    return value if isinstance(value, str) else json.dumps(value)
-
-
-def wanted(components: Any, places: Any, enabled: list[str]) -> str:
-    """What `SHOWN` is to be, as the browser writes it."""
-    told = {
-        name: {
-            "state": part["state"],
-            "variables": {variable: _in_words(value) for variable, value in part["variables"].items()},
-        }
-        for name, part in components.items()
-    }
-    return json.dumps({"components": told, "places": places, "enabled": enabled}, separators=(",", ":"))
-
-
 def state_of(robot: LiveRobot) -> str:
     requests = [f"{name}.request" for name in robot.snapshot().enabled]
     return wanted(plain(robot.system.state()), dict(robot.locations()), requests)
-
-
-def shows(seen: Visit, state: str) -> None:
-    seen.wait("(count) => document.querySelectorAll('.card').length >= count", 1)
-    try:
-        seen.wait(EQUALS, state)
-    except Exception:
-        assert json.dumps(seen.page.evaluate(SHOWN), separators=(",", ":")) == state
-        raise
-
-
-def entries_shown(seen: Visit) -> list[Any]:
-    with seen.page.expect_download() as download:
-        seen.page.get_by_role("button", name="Save").click()
-    return [json.loads(line) for line in download.value.path().read_text(encoding="utf-8").splitlines()]
 
 
 @pytest.mark.parametrize("name", ["maze_solver/maze_solver", "navigation/navigation", "sixty components"])

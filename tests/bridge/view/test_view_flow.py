@@ -9,8 +9,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import pytest
+
 from robosc.execution.event_log import plain
 from robosc_bridge.remote import RemoteSettings, serve
+from robosc_bridge.view import server as server_module
 from robosc_bridge.view.hub import MAXIMUM_EVENTS
 from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed
 from support.pages_open import LIMIT_S, OpenPage, opened
@@ -148,7 +151,12 @@ def test_the_lit_transitions_lead_from_state_to_state() -> None:
         asyncio.run(look(face.url))
 
 
-def test_who_does_not_read_loses_entries_is_told_how_many_and_is_heard_all_the_same() -> None:
+def test_who_does_not_read_loses_entries_is_told_how_many_and_is_heard_all_the_same(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # It is never silent for so long that it would be cut off.
+    monkeypatch.setattr(server_module, "PING_S", 10 * LIMIT_S)
+    monkeypatch.setattr(server_module, "SEND_LIMIT_S", 10 * LIMIT_S)
     robot = LiveRobot(supervisor_without_synthesis(large_model(3)))
     # So large that the buffers on the way hold few of them.
     note = {"time": time.time(), "kind": "device", "what": "x" * 250}

@@ -2,9 +2,8 @@
 
 import asyncio
 import json
-import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -13,11 +12,13 @@ import pytest
 
 from robosc.supervisor import Supervisor
 from robosc.targets import generate
+from robosc.targets.c99.layout import PLANT_LOCATIONS
 from robosc_bridge.view.definition import DefinitionError
 from robosc_bridge.view.ros2_topic import MAXIMUM_CHARACTERS, StateReader, StateTopic
+from robosc_bridge.view.telling import Portrait, Teller
 from support.generated import example_supervisor, imported
 from support.live import large_model, supervisor_without_synthesis
-from support.pages_open import opened
+from support.pages_open import LIMIT_S, OpenPage, opened
 from support.ros2 import Peer, environment, own_domain
 from support.view_servers import served
 
@@ -49,6 +50,11 @@ class Node:
         reading = self.system.read(event, data) if event.endswith((".response", ".feedback")) else None
         return self.system.step(event, reading) is not None
 
+    def places(self) -> dict[str, str]:
+        """Where services and actions are."""
+        called = [item for item in self._model.communications if item.kind in PLANT_LOCATIONS]
+        return {item.name: self.system.location(item.name) for item in called}
+
     def enabled(self) -> list[str]:
         names = [f"{item.name}.request" for item in self._model.communications]
         return [name for name in names if name in self._requests() and self.system.enabled(name)]
@@ -67,6 +73,7 @@ def test_each_text_tells_state_and_events(large: Supervisor, tmp_path: Path) -> 
     mentioned = {event for event, parts in reader.read(node.system.report(), 1.0)[0].table.items() if parts}
     told: list[str] = []
     taken: list[str] = []
+    places: set[str] = set()
     states = {name: part["state"] for name, part in node.system.state().items()}
     for _ in range(200):
         event = node.step()
@@ -76,6 +83,8 @@ def test_each_text_tells_state_and_events(large: Supervisor, tmp_path: Path) -> 
         states = {name: part["state"] for name, part in node.system.state().items()}
         robot, status, entries = reader.read(node.system.report(), 2.0)
         assert {name: part["state"] for name, part in status.components.items()} == states
+        assert status.communications == node.places()
+        places |= set(status.communications.values())
         # An event that changes nothing anywhere has no transition.
         if any(before[name] in states_of for name, states_of in robot.table[event].items()):
             taken.append(event)
@@ -83,6 +92,7 @@ def test_each_text_tells_state_and_events(large: Supervisor, tmp_path: Path) -> 
         assert all(entry["controllable"] == entry["event"].endswith(".request") for entry in entries)
     assert told == taken
     assert len(told) > 50
+    assert places == {"idle", "waiting", "ready", "failed"}
 
 
 def test_many_events_in_one_text_are_told_one_by_one(large: Supervisor, tmp_path: Path) -> None:
@@ -106,6 +116,24 @@ def test_without_the_model_the_automata_are_shown_all_the_same(large: Supervisor
     ]
 
 
+def test_a_node_of_before_does_not_tell_where_services_are(large: Supervisor, tmp_path: Path) -> None:
+    text = Node(large, tmp_path).system.report()
+    told = json.loads(text)
+    # In C++ it is told in the same words: the test of those nodes has this list, too.
+    assert list(told) == ["current", "communications", "transitions", "definition"]
+    assert told.pop("communications") == {"hold2": "idle", "hold5": "idle"}
+    reader = StateReader(large)
+    robot, status, _ = reader.read(json.dumps(told), 1.0)
+    assert status.communications == {}
+    shown = json.loads(Teller(Portrait(robot)).update(status, 1, 0.0))
+    named = {*shown["enabled"], *(item["event"] for item in shown["disabled"])}
+    assert set(robot.requests) - named == {"hold2.request", "hold5.request"}
+    # One that tells leaves nothing open.
+    shown = json.loads(Teller(Portrait(robot)).update(reader.read(text, 1.0)[1], 1, 0.0))
+    assert shown["communications"] == {"hold2": "idle", "hold5": "idle"}
+    assert {*shown["enabled"], *(item["event"] for item in shown["disabled"])} == set(robot.requests)
+
+
 def test_what_makes_no_sense_is_told_in_a_sentence(large: Supervisor, tmp_path: Path) -> None:
     good = json.loads(Node(large, tmp_path).system.report())
     wrong = [
@@ -119,6 +147,11 @@ def test_what_makes_no_sense_is_told_in_a_sentence(large: Supervisor, tmp_path: 
         json.dumps({**good, "current": {"Sensor0": {"state": 3, "variables": {}}}}),
         json.dumps({**good, "current": {"Sensor0": {"state": "clear"}}}),
         json.dumps({**good, "transitions": "x"}),
+        json.dumps({**good, "communications": []}),
+        json.dumps({**good, "communications": {"hold2": "executing"}}),
+        json.dumps({**good, "communications": {"hold2": ["idle"]}}),
+        json.dumps({**good, "communications": {"seen0": "idle"}}),
+        json.dumps({**good, "communications": {"nothing": "idle"}}),
     ]
     for text in wrong:
         with pytest.raises(DefinitionError) as error:
@@ -144,49 +177,52 @@ def test_a_node_is_shown_over_dds(peer: Peer, tmp_path: Path) -> None:
 
     supervisor = example_supervisor(MAZE)
     node = Node(supervisor, tmp_path / "package")
-    steps = threading.Event()
-    end = threading.Event()
-    taken: list[str] = []
+    publisher = peer.publisher(String, "/robot1/state")
 
-    def publish() -> None:
-        publisher = peer.publisher(String, "/robot1/state")
-        while not end.wait(0.02):
-            if steps.is_set() and len(taken) < 30:
-                event = node.step()
-                taken.extend([] if event is None else [event])
+    async def told(page: OpenPage, fits: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:
+        """What fits, while the node publishes now and then: never so much that the topic would let go of something."""
+        waiting = asyncio.create_task(page.until(fits))
+        while not waiting.done():
             publisher.publish(String(data=node.system.report()))
+            await asyncio.wait([waiting], timeout=0.5)
+        return await waiting
+
+    def is_now(message: dict[str, Any]) -> bool:
+        return (
+            message["type"] == "update"
+            and {name: part["state"] for name, part in message["components"].items()}
+            == {name: part["state"] for name, part in node.system.state().items()}
+            and message["communications"] == node.places()
+            and message["enabled"] == node.enabled()
+        )
 
     async def look() -> None:
-        async with served(lambda: StateTopic("/robot1", supervisor)) as server, opened(server.url) as page:
-            definition = await page.told("definition")
+        async with (
+            asyncio.timeout(LIMIT_S),
+            served(lambda: StateTopic("/robot1", supervisor)) as server,
+            opened(server.url) as page,
+        ):
+            definition = await told(page, lambda message: message["type"] == "definition")
             assert (definition["robot"], definition["source"]) == (supervisor.model.name, "ros2")
             assert definition["can_command"] is False
-            await page.told("update")
-            steps.set()
-
-            def is_final(message: dict[str, Any]) -> bool:
-                return (
-                    len(taken) >= 30
-                    and message["type"] == "update"
-                    and {name: part["state"] for name, part in message["components"].items()}
-                    == {name: part["state"] for name, part in node.system.state().items()}
-                    and message["enabled"] == node.enabled()
-                )
-
-            told = await page.until(is_final)
-            assert len(told["enabled"]) + len(told["disabled"]) == len(definition["requests"])
-            while len(page.entries()) < 10:
+            await told(page, is_now)
+            reader, wanted = StateReader(supervisor), []
+            for _ in range(30):
+                while node.step() is None:
+                    pass
+                text = node.system.report()
+                wanted += [item["event"] for item in reader.read(text, 1.0)[2]]
+                publisher.publish(String(data=text))
+                shown = await told(page, is_now)
+                assert len(shown["enabled"]) + len(shown["disabled"]) == len(definition["requests"])
+            assert len(wanted) >= 10
+            while len(page.entries()) < len(wanted):
                 await page.next()
+            assert [entry["event"] for entry in page.entries()] == wanted
             await page.send(type="stop")
             assert (await page.told("refused"))["what"] == "stop"
 
-    thread = threading.Thread(target=publish)
-    thread.start()
-    try:
-        asyncio.run(look())
-    finally:
-        end.set()
-        thread.join()
+    asyncio.run(look())
 
 
 @pytest.mark.ros2

@@ -27,7 +27,7 @@ from robosc.expressions import (
     domain,
 )
 from robosc.expressions.evaluate import evaluate
-from support.random_systems import systems
+from support.random_systems import any_systems
 from support.systems import automaton, edge, operation, read, received, state, system
 
 DIGIT = IntegerType(0, 2)
@@ -331,7 +331,7 @@ def _some_states(subject: Semantics, count: int) -> list[State]:
 
 
 @settings(deadline=None, max_examples=120)
-@given(systems())
+@given(any_systems())
 def test_agrees_with_the_naive_reading_of_the_definition(drawn: System) -> None:
     subject, naive = Semantics(drawn), _Naive(drawn)
     for at in _some_states(subject, 12):
@@ -353,7 +353,7 @@ def test_agrees_with_the_naive_reading_of_the_definition(drawn: System) -> None:
 
 
 @settings(deadline=None, max_examples=60)
-@given(systems())
+@given(any_systems())
 def test_compiled_expressions_mean_the_same_as_evaluated_ones(drawn: System) -> None:
     places = {subject: place for place, subject in enumerate(subjects(drawn))}
     naive = _Naive(drawn)

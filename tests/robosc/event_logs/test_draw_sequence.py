@@ -48,6 +48,18 @@ def test_time_window_and_events_are_chosen() -> None:
     assert [row.event for row in sequence_of(SHORT, events=("move.request",)).rows] == ["move.request"]
 
 
+def test_a_fault_after_the_last_event_is_drawn() -> None:
+    entries = [
+        LogEntry(1, 9.0, "restart", "", False, {"what": ""}),
+        LogEntry(2, 10.0, "event", "go.request", True, {"state": {}}),
+        LogEntry(3, 10.5, "fault", "", False, {"what": "it broke"}),
+    ]
+    found = sequence_of(LoggedRun(tuple(entries)))
+    assert (found.begin_s, found.end_s) == (0.0, 1.5)
+    assert [(item.time_s, item.text) for item in found.interruptions] == [(0.0, "restart"), (1.5, "fault: it broke")]
+    assert [item.text for item in sequence_of(LoggedRun(tuple(entries)), end_s=1.2).interruptions] == ["restart"]
+
+
 def test_what_says_nothing_new_can_be_left_out() -> None:
     told = [
         ("a", 1, "x"),

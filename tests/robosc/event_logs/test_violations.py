@@ -167,6 +167,80 @@ def test_a_request_while_the_robot_is_to_be_at_rest(tmp_path: Path) -> None:
     assert told(tmp_path, entries) == [(10, "go.request happened while the robot was to be at rest: a fault")]
 
 
+def test_a_stop_of_somebody_else_is_not_ended_by_a_sensor_of_that_name(tmp_path: Path) -> None:
+    entries = log()
+    entries.insert(6, {"time": 1.0, "kind": "stop", "what": "scan on the operator's desk"})
+    entries.insert(7, {"time": 1.0, "kind": "resume", "what": "scan is back"})
+    assert [line for line, _ in told(tmp_path, entries)] == [9]
+
+
+PROVIDING = """
+robot Giver {
+  datatype object Twist { x: double  inner: Inner }
+  datatype object Inner { n: integer }
+  interface twist use Twist from our_msgs
+  component Wheels {
+    outgoing message ready with identifier: "/ready", type: none, max_age: 2.0
+    outgoing message often with identifier: "/often", type: none
+    incoming message go with identifier: "/go", type: Twist links twist
+    behaviour {
+      variable n: integer(0..9) = 0
+      initial marked state on_ground { on request to go  on response from often do n := 1 }
+    }
+  }
+  provide go with { x: 0.1 + 0.2, inner: { n: Wheels.n } }
+}
+"""
+"""Its sensor is awaited, and its data changes."""
+
+
+def given() -> list[Entry]:
+    bench = Bench(InterpretedSystem(supervisor_of(model_of(PROVIDING))), every="event")
+    bench.receive("/often", None)
+    bench.receive("/ready", None)
+    bench.receive("/often", None)
+    return World.of(bench)
+
+
+def told_of_giver(folder: Path, entries: list[Entry]) -> list[tuple[int, str]]:
+    found = check_log(read(folder, entries), supervisor_of(model_of(PROVIDING)))
+    return [(item.line, item.sentence) for item in found.violations]
+
+
+def test_requests_carry_what_the_model_provides(tmp_path: Path) -> None:
+    entries = given()
+    assert names(entries) == ["often.response", "ready.response", "go.request", "often.response", "go.request"]
+    assert entries[4]["data"] == {"x": 0.1 + 0.2, "inner": {"n": 1}}
+    assert told_of_giver(tmp_path, entries) == []
+    # The last place of a double is a matter of who computes it.
+    entries[4]["data"]["x"] = 0.3
+    assert told_of_giver(tmp_path, entries) == []
+    for data in (77, None, {"x": 0.3}, {"x": 0.3, "inner": {"n": 0}}, {"x": 0.31, "inner": {"n": 1}}):
+        entries[4]["data"] = data
+        ((line, sentence),) = told_of_giver(tmp_path, entries)
+        assert line == 5
+        assert sentence.startswith("go.request carries ")
+        assert sentence.endswith('where the model provides {"x": 0.30000000000000004, "inner": {"n": 1}}')
+
+
+def test_nothing_is_requested_before_the_first_message_of_a_sensor_that_may_be_stale(tmp_path: Path) -> None:
+    entries = given()
+    entries.insert(1, entries.pop(2))
+    found = told_of_giver(tmp_path, entries)
+    assert found == [(2, "go.request happened before the first message on /ready")]
+    # It may have come with nothing that could be taken.
+    entries.insert(1, {"time": 1.0, "kind": "unknown", "event": "ready.response", "unknown": ["value"]})
+    assert told_of_giver(tmp_path, entries) == []
+
+
+def test_a_log_without_events_has_not_passed(tmp_path: Path) -> None:
+    for entries in ([], [{"time": 1.0, "kind": "Event", "event": "go.request"}, {"time": 1.0, "kind": "x"}]):
+        found = check_log(read(tmp_path, entries), supervisor())
+        assert (found.violation_count, found.has_passed) == (0, False)
+        assert found.notes[0] == "the log tells of no event: there was nothing to check"
+    assert found.notes[1] == "2 lines are of a kind that no log has, and were not looked at: 'Event', 'x'"
+
+
 def test_a_restart_begins_in_the_initial_state(tmp_path: Path) -> None:
     entries = log()
     entries += [{"time": 1.0, "kind": "fault", "what": "x"}, {"time": 1.0, "kind": "restart", "what": ""}, *log()]

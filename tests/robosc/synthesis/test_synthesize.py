@@ -39,11 +39,11 @@ def _needs_cudd() -> None:
     pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
 
 
-def agree(system: System) -> str:
-    """Compare both engines with the explicit twin in every reachable state; returns the system's kind."""
+def agree(system: System, engines: tuple[str, ...] = ENGINES) -> str:
+    """Compare engines with the explicit twin in every reachable state; returns the system's kind."""
     explicit = synthesize_explicit(system, limit=LIMIT)
     assert explicit is not None
-    results = [synthesize(system, engine=engine) for engine in ENGINES]
+    results = [synthesize(system, engine=engine) for engine in engines]
     first = results[0]
     assert all(result.added == first.added and result.status == first.status for result in results)
     assert all(result.statistics.states == first.statistics.states for result in results)
@@ -99,7 +99,8 @@ def test_random_systems(
     def compare(seed: int) -> None:
         # The seeds are the same in every part, the systems are not.
         system = make(seed * PARTS + part)
-        found = agree(system)
+        # The plain engine is slow: every other time will do.
+        found = agree(system, ENGINES if seed % 2 else ENGINES[:1])
         assert found == kind(system)
         shares[found] += 1
 

@@ -16,7 +16,7 @@ from robosc.expressions import IntegerType
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
 from robosc.synthesis.transitions import Steps, transition_of
-from support.random_systems import random_system
+from support.random_systems import any_system
 from support.systems import automaton, edge, operation, read, system
 
 
@@ -40,7 +40,7 @@ def states_of(encoding: Encoding, states: Iterable[State]) -> Any:
 @given(seed=st.integers(0, 2**32 - 1))
 def test_steps_of_random_systems(engine: str, seed: int) -> None:
     """From single states and into single states, reachable or not."""
-    source = random_system(seed)
+    source = any_system(seed)
     semantics = Semantics(source)
     encoding = Encoding(source, make_manager(engine))
     false = encoding.manager.false
@@ -70,7 +70,7 @@ def test_steps_of_random_systems(engine: str, seed: int) -> None:
 @given(seed=st.integers(0, 2**32 - 1))
 def test_bad_states_of_random_systems(engine: str, seed: int) -> None:
     # Invariants are no event's business.
-    source = replace(random_system(seed), invariants=())
+    source = replace(any_system(seed), invariants=())
     semantics = Semantics(source)
     encoding = Encoding(source, make_manager(engine))
     bad = encoding.any_of(Steps(encoding, transition_of(encoding, event)).bad for event in source.events)

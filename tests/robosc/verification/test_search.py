@@ -21,7 +21,7 @@ from robosc.verification.permissive import Allowed, allowed
 from robosc.verification.search import Effort, Reached, blocking_state, search
 from support.families import FAMILIES
 from support.random_supervisors import random_diagram
-from support.random_systems import systems
+from support.random_systems import any_systems, systems
 from support.systems import automaton, edge, operation, read, received, system
 
 
@@ -135,7 +135,7 @@ def test_what_is_forgotten_is_worked_out_again(monkeypatch: pytest.MonkeyPatch) 
 
 
 @settings(deadline=None, max_examples=10)
-@given(systems())
+@given(any_systems())
 def test_packing_and_back(made: System) -> None:
     packing = Packing(made)
     for dice in map(Random, range(5)):

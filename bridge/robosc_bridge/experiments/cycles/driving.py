@@ -21,6 +21,9 @@ from robosc_bridge.experiments.ros2 import Ros2
 from robosc_bridge.experiments.scenario import ScenarioError
 
 VELOCITIES = "/cmd_vel"
+TOPIC = "/robosc_evaluation/cmd_vel"
+"""Of its own: no robot listens there."""
+
 _HEADER = Path("/usr/include/ros/ros.h")
 _LIBRARIES = ("roscpp", "rosconsole", "roscpp_serialization", "rostime", "xmlrpcpp", "boost_system", "pthread", "m")
 _FLAGS = ("-O2", "-ffp-contract=off")
@@ -69,7 +72,7 @@ def _interpreted(
     unit = write_unit(supervisor, "python", folder / "unit")
     identifier, data, _ = OTHER[experiment]
     comes = json.dumps({"first": [identifier, data], "ranges": free_way()})
-    return (ros.interpreter or sys.executable, str(SCRIPTS / "driving.py"), middleware, str(unit), comes)
+    return (ros.interpreter or sys.executable, str(SCRIPTS / "driving.py"), middleware, TOPIC, str(unit), comes)
 
 
 def _compiled(experiment: str, supervisor: Supervisor, move: Communication, folder: Path) -> Sequence[str]:
@@ -83,6 +86,7 @@ def _compiled(experiment: str, supervisor: Supervisor, move: Communication, fold
         "communication": layout.communications[move.name],
         "fill": fill_name(layout, move),
         "first": OTHER[experiment][2],
+        "topic": TOPIC,
         "ranges": ", ".join(map(repr, free_way())),
     }
     text = (SCRIPTS / "driving.cpp").read_text(encoding="utf-8")
@@ -105,7 +109,7 @@ def _run(ros: Middleware, middleware: str, command: Sequence[str], folder: Path)
     with ros.running(folder) as variables:
         theirs: Mapping[str, str] = ros.of_nodes(variables)
         kind = "rclpy" if middleware == "rclpy" else "rospy"
-        arguments = (str(SCRIPTS / "subscriber.py"), kind)
+        arguments = (str(SCRIPTS / "subscriber.py"), kind, TOPIC)
         with Program("subscriber", arguments, folder, interpreter=ros.interpreter, variables=theirs):
             done = subprocess.run(  # noqa: S603
                 command, env=dict(theirs), capture_output=True, text=True, timeout=LIMIT_S, check=True

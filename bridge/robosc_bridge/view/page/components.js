@@ -2,6 +2,7 @@
 
 import { byId, make, mark, quoted, say, show } from "./dom.js";
 import { count, value } from "./format.js";
+import { afterPainting } from "./frame.js";
 import { Graph } from "./graph.js";
 import { told } from "./told.js";
 
@@ -78,8 +79,10 @@ class Card {
     this.graph.setActive(state);
     const share = this.graph.activeShare;
     if (!this.scrolls || share === null) return;
-    const { scrollWidth, clientWidth } = this.frame;
-    this.frame.scrollLeft = share * scrollWidth - clientWidth / 2;
+    afterPainting(this, () => {
+      const { scrollWidth, clientWidth } = this.frame;
+      this.frame.scrollLeft = share * scrollWidth - clientWidth / 2;
+    });
   }
 
   paintVariables(variables) {

@@ -10,6 +10,19 @@ export function paints(subject, paint) {
   painters.push([subject, paint]);
 }
 
+const last = new Map();
+
+/**
+ * Calls `place` in this frame once everything is painted, for what asks where things stand or scrolls: the document then
+ * lays itself out once a frame, not once a question.
+ *
+ * @param {object} owner Whose it is; its newest one alone is called.
+ * @param {() => void} place What to do.
+ */
+export function afterPainting(owner, place) {
+  last.set(owner, place);
+}
+
 /** Something about these subjects has changed. */
 export function touch(...subjects) {
   for (const subject of subjects) dirty.add(subject);
@@ -23,12 +36,17 @@ function paintAll() {
   isAwaited = false;
   const due = new Set(painters.filter(([subject]) => dirty.has(subject)).map(([, paint]) => paint));
   dirty.clear();
-  for (const paint of due) {
-    try {
-      paint();
-    } catch (error) {
-      // One part that fails must not hold the state of the others.
-      console.error(error);
-    }
+  for (const paint of due) attempt(paint);
+  const places = [...last.values()];
+  last.clear();
+  for (const place of places) attempt(place);
+}
+
+function attempt(paint) {
+  try {
+    paint();
+  } catch (error) {
+    // One part that fails must not hold the state of the others.
+    console.error(error);
   }
 }

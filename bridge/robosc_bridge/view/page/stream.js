@@ -3,7 +3,7 @@
 import { byId, make, mark, quoted, say, show } from "./dom.js";
 import { Entries, groupOf } from "./entries.js";
 import { clock, count, whole } from "./format.js";
-import { touch } from "./frame.js";
+import { afterPainting, touch } from "./frame.js";
 import { isReplay } from "./told.js";
 
 const OVERSCAN = 6;
@@ -33,7 +33,10 @@ export function startStream() {
   measure();
   const scrollTo = (wanted) => {
     top = Math.max(Math.min(wanted, entries.shown.length * rowHeight - boxHeight), 0);
-    if (box.scrollTop !== top) box.scrollTop = top;
+    // The rows of the place are there first, and room for them.
+    afterPainting(box, () => {
+      box.scrollTop = top;
+    });
   };
 
   const change = () => touch("stream");
@@ -65,8 +68,8 @@ export function startStream() {
       class: "row", role: "option", id: `entry-${entry.serial}`, "data-group": SIGNS[group] ? group : "other",
       "data-number": entry.number ?? "", "aria-selected": "false",
     },
-      make("time", {}, clock(entry.time_s)), make("span", { class: "row-sign", "aria-hidden": "true" }, SIGNS[group] ?? "·"),
-      quoted(entry.event || entry.kind, "row-event"), make("span", { class: "unseen" }, ` ${group} `), quoted(entry.text ?? "", "row-text"));
+      make("time", {}, clock(entry.time_s)), make("span", { class: "row-sign", role: "img", "aria-label": group }, SIGNS[group] ?? "·"),
+      quoted(entry.event || entry.kind, "row-event"), quoted(entry.text ?? "", "row-text"));
     row.addEventListener("click", () => select(entry));
     return row;
   };
@@ -101,6 +104,8 @@ export function startStream() {
   });
 
   box.addEventListener("scroll", () => {
+    // What the page has scrolled itself is painted already.
+    if (Math.abs(box.scrollTop - top) < 1) return;
     top = box.scrollTop;
     isFollowing = top + boxHeight >= Number.parseFloat(spacer.style.height) - rowHeight;
     change();

@@ -9,7 +9,7 @@ import rospy
 from sensor_msgs.msg import Image
 from std_msgs.msg import Empty, Float32
 
-from robosc_examples.line_runs import USUAL, RunSettings, find_line
+from robosc_examples.line_runs import USUAL, LineSettings, find_line
 from robosc_examples.motion import clamped
 from robosc_examples.ros1.program import Node, ParameterError, run
 
@@ -20,7 +20,7 @@ class LineDetector(Node):
     def __init__(self) -> None:
         super().__init__()
         usual = USUAL
-        self._settings = RunSettings(
+        self._settings = LineSettings(
             threshold=self.number("threshold", usual.threshold, 0, 255),
             top=self.number("top", usual.top, 0, 1),
             bottom=self.number("bottom", usual.bottom, 0, 1),

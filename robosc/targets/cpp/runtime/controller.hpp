@@ -464,6 +464,8 @@ private:
     {
         std::string text = "{\"current\": ";
         model::put_state(text, robot_.state, true);
+        text += ", \"communications\": ";
+        model::put_communications(text, robot_.state);
         text += ", \"transitions\": [";
         for (std::size_t k = 0; k < transitions_.size(); k++) {
             text += (k > 0 ? ", " : "") + std::to_string(transitions_[k]);

@@ -2,12 +2,15 @@
 
 import json
 import re
+from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from robosc.supervisor import make_supervisor
 from robosc.supervisor.structure import Supervisor
+from robosc.targets.c99.layout import PLANT_LOCATIONS
 from support import rclcpp_nodes
 from support.models import EXAMPLES, bundle_of
 from support.node_logs import comparable, entries_of, replayed
@@ -174,6 +177,38 @@ def test_a_server_that_is_lost_fails_its_calls(courier_node: Path, tmp_path: Pat
     assert events[-2:] == ["wind.error", "wind.reset"]
 
 
+STATES = ["wait publish /state"] * 40
+"""So many that the last of them are of what was told before: those count that came while something else was awaited."""
+
+
+def test_the_state_tells_where_services_and_actions_are(courier: Supervisor, courier_node: Path) -> None:
+    lines = [
+        *SERVERS,
+        *STATES,
+        *("message /order/power", "wait call /power", *STATES, "answer /power 1 fine", *STATES),
+        *("message /allowed 1", "message /order/count", "wait goal /count", "accept /count", *STATES),
+        *("result /count 4 0 1 1 2 3", *STATES, END),
+    ]
+    done = run(courier_node, lines, "period:=0.005", "publish_state:=true")
+    assert done.returncode == 0, done.stderr
+    told = [states_of(data) for _, name, data in sent(done.stdout) if name == "/state"]
+    assert all(list(state) == ["current", "communications", "transitions", "definition"] for state in told)
+    found = [state["communications"] for state in told]
+    called = [item for item in courier.model.communications if item.kind in PLANT_LOCATIONS]
+    assert all(list(places) == [item.name for item in called] for places in found)
+    assert {place for places in found for place in places.values()} == {"idle", "waiting", "executing"}
+    busy = [tuple(name for name, place in places.items() if place != "idle") for places in found]
+    # Each in its turn; the rest of them are always idle.
+    assert [names for names, _ in groupby(busy)] == [(), ("power",), (), ("count",), ()]
+
+
+def states_of(text: str) -> Any:
+    """What a message of `/state` holds, as the stand-in prints it."""
+    inner = re.fullmatch(r'\{data: "(.*)"\}', text)
+    assert inner is not None
+    return json.loads(inner[1].replace('\\"', '"'))
+
+
 DRIVING = [*SERVERS, "message /allowed 1", "message /order/count", "wait goal /count"]
 A_WHILE = ["wait publish /state"] * 60
 WATCHED = ("period:=0.025", "publish_state:=true")
@@ -244,11 +279,10 @@ def test_states_and_prefix(maze_node: Path) -> None:
     texts = [data for _, name, data in found if name == "/robot1/state"]
     taken = []
     for text in texts:
-        inner = re.fullmatch(r'\{data: "(.*)"\}', text)
-        assert inner is not None
-        state = json.loads(inner[1].replace('\\"', '"'))
+        state = states_of(text)
         assert state["definition"]["name"] == "MazeSolver"
         assert state["current"]["LidarSensor"]["variables"].keys() == {"front", "right", "back_right"}
+        assert state["communications"] == {}
         taken += state["transitions"]
     numbers = {
         transition["id"]

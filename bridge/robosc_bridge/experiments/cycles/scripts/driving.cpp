@@ -69,7 +69,7 @@ int main(int argc, char **argv)
         return 2;
     }
     ros::NodeHandle node;
-    publisher = node.advertise<geometry_msgs::Twist>("/cmd_vel", 10);
+    publisher = node.advertise<geometry_msgs::Twist>("@topic@", 10);
     const auto began = now();
     while (publisher.getNumSubscribers() == 0) {
         if (std::chrono::duration<double>(now() - began).count() > LIMIT_S) {

@@ -1,7 +1,7 @@
 """Measures cycles of generated Python that drives and publishes a Twist; a program of its own, for Python 3.8 and on.
 
-Usage: driving.py rclpy|rospy FILE COMES RUNS CYCLES. COMES is JSON: what comes `first`, as its topic and its data, and
-the `ranges` of each scan. Prints a line of JSON: seconds of each `cycle`, and of each `publish` alone.
+Usage: driving.py rclpy|rospy TOPIC FILE COMES RUNS CYCLES. COMES is JSON: what comes `first`, as its topic and its
+data, and the `ranges` of each scan. Prints a line of JSON: seconds of each `cycle`, and of each `publish` alone.
 """
 
 import importlib
@@ -43,7 +43,7 @@ class Publishing:
         """Nothing: the robot goes on."""
 
 
-def connect(kind: str) -> tuple[Any, Any]:
+def connect(kind: str, topic: str) -> tuple[Any, Any]:
     """A publisher of Twist that has a subscriber, and a message."""
     from geometry_msgs.msg import Twist
 
@@ -51,13 +51,13 @@ def connect(kind: str) -> tuple[Any, Any]:
         import rclpy
 
         rclpy.init()
-        publisher = rclpy.create_node("measured").create_publisher(Twist, "/cmd_vel", 10)
+        publisher = rclpy.create_node("measured").create_publisher(Twist, topic, 10)
         count = publisher.get_subscription_count
     else:
         import rospy
 
         rospy.init_node("measured")
-        publisher = rospy.Publisher("/cmd_vel", Twist, queue_size=10)
+        publisher = rospy.Publisher(topic, Twist, queue_size=10)
         count = publisher.get_num_connections
     deadline_s = time.monotonic() + LIMIT_S
     while not count():
@@ -77,11 +77,11 @@ def timed(work: Any) -> float:
 
 def main() -> None:
     """Measure."""
-    kind, file, comes, runs, cycles = sys.argv[1:]
+    kind, topic, file, comes, runs, cycles = sys.argv[1:]
     sys.path.insert(0, str(Path(file).parent))
     module = importlib.import_module(Path(file).stem)
     given = json.loads(comes)
-    publisher, message = connect(kind)
+    publisher, message = connect(kind, topic)
     scan = SimpleNamespace(ranges=given["ranges"])
     found: dict[str, list[float]] = {"cycle": [], "publish": []}
     for _ in range(int(runs)):

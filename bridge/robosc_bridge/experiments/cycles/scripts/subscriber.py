@@ -1,6 +1,6 @@
-"""Takes velocities on /cmd_vel until it is ended; a program of its own, for Python 3.8 and later.
+"""Takes velocities on a topic until it is ended; a program of its own, for Python 3.8 and later.
 
-Usage: subscriber.py rclpy|rospy
+Usage: subscriber.py rclpy|rospy TOPIC
 """
 
 import sys
@@ -8,18 +8,19 @@ from contextlib import suppress
 
 from geometry_msgs.msg import Twist
 
-if sys.argv[1] == "rclpy":
+kind, topic = sys.argv[1:]
+if kind == "rclpy":
     import rclpy
     from rclpy.executors import ExternalShutdownException
 
     rclpy.init()
     node = rclpy.create_node("measured_subscriber")
-    node.create_subscription(Twist, "/cmd_vel", lambda message: None, 10)
+    node.create_subscription(Twist, topic, lambda message: None, 10)
     with suppress(KeyboardInterrupt, ExternalShutdownException):
         rclpy.spin(node)
 else:
     import rospy
 
     rospy.init_node("measured_subscriber")
-    rospy.Subscriber("/cmd_vel", Twist, lambda message: None, queue_size=10)
+    rospy.Subscriber(topic, Twist, lambda message: None, queue_size=10)
     rospy.spin()

@@ -1,0 +1,98 @@
+"""A face that serves from an event loop in a thread of its own: nothing in it can hold up the control loop."""
+
+import asyncio
+import logging
+import threading
+from abc import ABC, abstractmethod
+
+from robosc_bridge.errors import BridgeError
+
+_log = logging.getLogger(__name__)
+
+_START_LIMIT_S, _STOP_LIMIT_S = 20.0, 5.0
+
+
+class ServedFace(ABC):
+    """A `Face` of the daemon; how it serves is its subclass's.
+
+    Args:
+        name: Of the thread, and for the log.
+        label: Stands before why it cannot serve.
+        error: Raised with that.
+        expected: What may come of how it is configured: told in a sentence, without the way through the program.
+
+    Attributes:
+        address: `HOST:PORT` that it listens on; empty: it does not yet.
+    """
+
+    def __init__(
+        self, name: str, label: str, error: type[BridgeError], expected: tuple[type[Exception], ...] = ()
+    ) -> None:
+        self.address = ""
+        self._label = label
+        self._error = error
+        self._expected = (error, *expected)
+        self._failure: Exception | None = None
+        self._is_ready = threading.Event()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._end = asyncio.Event()
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+
+    @property
+    def name(self) -> str:
+        """For the log."""
+        return self._thread.name
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether it serves."""
+        return self._thread.is_alive() and self._failure is None
+
+    def start(self) -> None:
+        """Listen.
+
+        Raises:
+            BridgeError: It cannot; of the kind that it was made with.
+        """
+        self._thread.start()
+        if not self._is_ready.wait(_START_LIMIT_S):
+            raise self._error(f"{self._label}: it has not begun within {_START_LIMIT_S:g} seconds")
+        if self._failure is not None:
+            self._thread.join(_STOP_LIMIT_S)
+            if isinstance(self._failure, self._error):
+                raise self._failure
+            raise self._error(f"{self._label}: {self._failure}") from self._failure
+
+    def stop(self) -> None:
+        """End whatever is under way and give the port back; may be called again."""
+        if self._loop is not None and self._thread.is_alive():
+            try:
+                self._loop.call_soon_threadsafe(self._end.set)
+            except RuntimeError:
+                return  # It has just ended by itself.
+            self._thread.join(_STOP_LIMIT_S)
+            if self._thread.is_alive():
+                _log.error("the %s has not ended within %g seconds", self.name, _STOP_LIMIT_S)
+
+    @abstractmethod
+    async def _serve(self) -> None:
+        """Listen, set `address`, call `_is_listening`, and serve until `_end` is set."""
+
+    def _is_listening(self) -> None:
+        """Whoever waits in `start` may go on."""
+        self._is_ready.set()
+
+    def _run(self) -> None:
+        try:
+            asyncio.run(self._loop_serves())
+        except self._expected as error:
+            self._failure = error
+        except Exception as error:
+            self._failure = error
+            _log.exception("the %s has failed", self.name)
+        finally:
+            self._is_ready.set()
+
+    async def _loop_serves(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        await self._serve()

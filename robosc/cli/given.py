@@ -1,0 +1,40 @@
+"""The supervisor that a command is given as `--model`, itself or as its model: what has happened is held up to it."""
+
+import argparse
+from typing import TYPE_CHECKING
+
+from robosc.cli import synth
+from robosc.cli.arguments import read_bundle
+from robosc.cli.output import diagnostics_json, print_json
+from robosc.cli.sign import read_supervisor
+from robosc.model.structure import Deployment
+
+if TYPE_CHECKING:
+    from robosc.supervisor import Supervisor
+
+
+def given_supervisor(arguments: argparse.Namespace, *, is_json: bool = False) -> "Supervisor | None":
+    """Read or synthesize it; None where there is none, which has been told.
+
+    Args:
+        arguments: With `model`, and with what `arguments.add_given_supervisor_options` has read.
+        is_json: Whether why there is none is told to machines, on standard output.
+
+    Raises:
+        UsageError: A file cannot be read.
+        InvalidSupervisorError: The supervisor's file is malformed.
+    """
+    from robosc.supervisor import decode
+
+    if arguments.model.suffix == ".rsup":
+        return decode(read_supervisor(arguments.model))
+    bundle = read_bundle(arguments)
+    deployment = arguments.deployment or str(Deployment.CONTROLLER)
+    # What it is held up to has happened, however it would have gone on.
+    made = synth.make(argparse.Namespace(**{**vars(arguments), "deployment": deployment}), bundle, allow_livelock=True)
+    if made.supervisor is None:
+        if is_json:
+            print_json({"status": str(made.status), **synth.reasons_json(made), **diagnostics_json(made.diagnostics)})
+        else:
+            synth.report_problems(made, bundle)
+    return made.supervisor

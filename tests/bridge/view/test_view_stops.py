@@ -1,0 +1,185 @@
+"""Stops towards a bridge that answers late or not at all: few are under way, and none is lost."""
+
+import asyncio
+import contextlib
+import threading
+from collections.abc import AsyncIterator, Iterator
+
+import pytest
+
+from robosc_bridge.daemon.states import Command
+from robosc_bridge.remote import RemoteSettings, serve
+from robosc_bridge.view import remote_bridge
+from support.live import LiveRobot, large_model, supervisor_without_synthesis
+from support.pages_open import LIMIT_S, OpenPage, opened
+from support.view_servers import remotely_viewed
+
+MOST_THREADS = 12
+
+
+class Gate:
+    """A way to an address on which nothing gets through while it is shut.
+
+    Args:
+        address: `HOST:PORT`.
+
+    Attributes:
+        address: Where to connect instead.
+        connections: How many did.
+        is_open: Whether anything gets through.
+    """
+
+    def __init__(self, address: str) -> None:
+        self._to = address
+        self.address = ""
+        self.connections = 0
+        self.is_open = asyncio.Event()
+        self._passing: set[asyncio.Task[None]] = set()
+
+    @contextlib.asynccontextmanager
+    async def standing(self) -> AsyncIterator["Gate"]:
+        """While it stands."""
+        server = await asyncio.start_server(self._pass, "127.0.0.1", 0)
+        host, port = server.sockets[0].getsockname()
+        self.address = f"{host}:{port}"
+        try:
+            yield self
+        finally:
+            server.close()
+            for task in self._passing:
+                task.cancel()
+            await asyncio.gather(*self._passing, return_exceptions=True)
+
+    def _pass(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self.connections += 1
+        self._passing.add(asyncio.create_task(self._copy(reader, writer)))
+
+    async def _copy(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        with contextlib.closing(writer):
+            await self.is_open.wait()
+            host, _, port = self._to.partition(":")
+            there, back = await asyncio.open_connection(host, int(port))
+            with contextlib.closing(back):
+                await asyncio.gather(_copied(reader, back), _copied(there, writer), return_exceptions=True)
+
+
+async def _copied(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    try:
+        while data := await reader.read(2**16):
+            writer.write(data)
+            await writer.drain()
+    finally:
+        writer.close()
+
+
+@pytest.fixture
+def robot() -> LiveRobot:
+    return LiveRobot(supervisor_without_synthesis(large_model(3)))
+
+
+@pytest.fixture
+def address(robot: LiveRobot) -> Iterator[str]:
+    face = serve(robot.operations, RemoteSettings("127.0.0.1:0"))
+    try:
+        yield face.address
+    finally:
+        face.stop()
+
+
+def asking() -> int:
+    """Threads in which the view asks a bridge."""
+    return sum(thread.name == "live view asks" for thread in threading.enumerate())
+
+
+async def until_stopped(robot: LiveRobot, count: int) -> None:
+    async with asyncio.timeout(LIMIT_S):
+        while len(robot.orders) < count:
+            await asyncio.sleep(0.005)
+
+
+async def press(page: OpenPage, count: int) -> None:
+    for _ in range(count):
+        await page.send(type="stop")
+    # An answer of the view itself, after which it has taken all of them.
+    await page.send(type="nothing")
+    await page.until(lambda message: message["type"] == "refused" and message["what"] == "request")
+
+
+def test_who_comes_and_goes_and_hammers_on_the_button_starts_few_threads(robot: LiveRobot, address: str) -> None:
+    async def look() -> None:
+        async with Gate(address).standing() as gate, remotely_viewed(gate.address) as server:
+            for _ in range(12):
+                async with opened(server.url) as page:
+                    await press(page, 40)
+                assert asking() <= MOST_THREADS
+            assert robot.orders == []
+            # Of all those who have left at least one is heard, and who stays has an answer.
+            async with opened(server.url) as page:
+                await press(page, 3)
+                gate.is_open.set()
+                await until_stopped(robot, 1)
+                assert (await page.told("done"))["what"] == "stop"
+            assert {order.command for order in robot.orders} == {Command.STOP}
+
+    asyncio.run(look())
+
+
+def test_a_stop_that_is_wanted_while_one_is_under_way_follows_it(
+    robot: LiveRobot, address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(remote_bridge, "FOLLOW_S", LIMIT_S)
+
+    async def look() -> None:
+        async with Gate(address).standing() as gate, remotely_viewed(gate.address) as server:
+            async with opened(server.url) as page:
+                await press(page, 1)
+                async with opened(server.url) as other:
+                    await press(other, 1)
+                await press(page, 30)
+                gate.is_open.set()
+                await until_stopped(robot, 2)
+                for _ in range(31):
+                    assert (await page.told("done"))["what"] == "stop"
+            # One for the first, and one for all who came after it, also for who has left.
+            assert [order.command for order in robot.orders] == [Command.STOP] * 2
+            async with opened(server.url) as page:
+                await page.send(type="stop")
+                await until_stopped(robot, 3)
+
+    asyncio.run(look())
+
+
+def test_a_stop_that_hangs_holds_up_the_next_one_only_shortly(robot: LiveRobot, address: str) -> None:
+    async def look() -> None:
+        async with (
+            Gate(address).standing() as gate,
+            remotely_viewed(gate.address) as server,
+            opened(server.url) as page,
+        ):
+            # What the robot is, and a stop; then one after the other, each on a way of its own.
+            for count in range(2, 5):
+                await press(page, 1)
+                async with asyncio.timeout(LIMIT_S):
+                    while gate.connections < count:
+                        await asyncio.sleep(0.005)
+            await press(page, 1)
+            assert not any(message.get("what") == "stop" for message in page.messages)
+            assert robot.orders == []
+            # In the end who wanted it is told that nobody has heard it.
+            assert (await page.told("refused"))["what"] == "stop"
+
+    asyncio.run(look())
+
+
+def test_who_comes_and_goes_asks_a_bridge_once_what_it_is(robot: LiveRobot, address: str) -> None:
+    async def look() -> None:
+        async with Gate(address).standing() as gate, remotely_viewed(gate.address) as server:
+            for _ in range(30):
+                async with opened(server.url):
+                    pass
+            assert asking() <= 1
+            async with opened(server.url) as page:
+                gate.is_open.set()
+                await page.told("definition")
+
+    asyncio.run(look())

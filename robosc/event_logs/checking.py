@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from robosc.errors import RoboscError
 from robosc.event_logs.data import is_provided
 from robosc.event_logs.replay import Replay
+from robosc.event_logs.stops import is_ended
 from robosc.event_logs.structure import LogEntry, LoggedRun
 from robosc.model.structure import CommunicationKind, Deployment, EventKind
 from robosc.supervisor.structure import Supervisor
@@ -108,11 +109,6 @@ def check_log(run: LoggedRun, supervisor: Supervisor, deployment: Deployment | N
     return checking.result(run)
 
 
-def _is_of(stop: str, sensor: str) -> bool:
-    """Whether a stop is that of a stale sensor: `scan on /scan is stale`; a sentence of somebody else may begin so."""
-    return stop.startswith(f"{sensor} on ") and stop.endswith(" is stale")
-
-
 def _shown(data: object) -> str:
     text = json.dumps(data, default=str)
     return text if len(text) <= _DATA_SHOWN else text[: _DATA_SHOWN - 4] + " ..."
@@ -183,9 +179,7 @@ class _Checking:
             case "stop":
                 self._stops.add(entry.text("what"))
             case "resume":
-                # `scan is back` ends `scan on /scan is stale`.
-                name = entry.text("what").removesuffix(" is back")
-                self._stops = {item for item in self._stops if not _is_of(item, name)}
+                self._stops = {item for item in self._stops if not is_ended(item, entry.text("what"))}
 
     def _event(self, entry: LogEntry) -> None:
         replay, event = self._replay, entry.event

@@ -95,6 +95,8 @@ class Status:
         enabled: Names of the communications that may be requested, as the executor says; None: nobody says so.
         drive: What the drive base told; None: nothing.
         age_s: How old this was when it came.
+        last: Number of the transition that each component took last; of one that is not named none is known. None:
+            the entries tell it.
     """
 
     time_s: float
@@ -109,6 +111,7 @@ class Status:
     enabled: Sequence[str] | None = None
     drive: Drive | None = None
     age_s: float = 0.0
+    last: Mapping[str, int] | None = None
 
 
 @dataclass(frozen=True, slots=True)

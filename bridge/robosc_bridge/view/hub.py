@@ -42,6 +42,7 @@ class Viewer:
     def __init__(self) -> None:
         self._news = asyncio.Event()
         self._definition: str | None = None
+        self._gone: str | None = None
         self._update: str | None = None
         self._scan: str | None = None
         self._position: str | None = None
@@ -55,9 +56,20 @@ class Viewer:
         self._lost += len(self._events)
         self._events.clear()
         self._bytes = 0
-        self._update = self._scan = self._position = None
+        self._gone = self._update = self._scan = self._position = None
         self._definition = text
         self._news.set()
+
+    def lose(self, text: str) -> None:
+        """The source is lost, until there is a robot again."""
+        self._gone = text
+        self._news.set()
+
+    def jump(self) -> None:
+        """The replay is elsewhere: what waits was told of another place."""
+        self._events.clear()
+        self._bytes = self._lost = 0
+        self._update = self._scan = None
 
     def show(self, text: str) -> None:
         """The latest update."""
@@ -75,7 +87,7 @@ class Viewer:
         self._news.set()
 
     def answer(self, text: str) -> None:
-        """Something that is told this one alone, or that must not be missed."""
+        """Something that is told this one alone."""
         self._answers.append(text)
         self._news.set()
 
@@ -97,13 +109,15 @@ class Viewer:
         found: list[str] = []
         if self._definition is not None:
             found.append(self._definition)
+        if self._gone is not None:
+            found.append(self._gone)
         found.extend(self._answers)
         if self._position is not None:
             found.append(self._position)
         if self._events or self._lost:
             found.append(events_text(list(self._events), self._lost))
         found += [text for text in (self._update, self._scan) if text is not None]
-        self._definition = self._update = self._scan = self._position = None
+        self._definition = self._gone = self._update = self._scan = self._position = None
         self._answers.clear()
         self._events.clear()
         self._bytes = self._lost = 0
@@ -167,7 +181,7 @@ class Hub:
                 if text is not None:
                     put(text)
         elif self._gone is not None:
-            viewer.answer(self._gone)
+            viewer.lose(self._gone)
         self._viewers.add(viewer)
         if not self._tasks:
             self._tasks = [asyncio.create_task(self._keep()), asyncio.create_task(self._refresh())]
@@ -219,7 +233,7 @@ class Hub:
             _log.warning("the live view has lost its source: %s", why)
         self._gone = text
         for viewer in self._viewers:
-            viewer.answer(text)
+            viewer.lose(text)
 
     async def define(self, robot: Robot) -> None:
         """There is a robot."""
@@ -254,6 +268,11 @@ class Hub:
         for viewer in self._viewers:
             viewer.scanned(text)
 
+    def jumped(self) -> None:
+        """The replay is elsewhere: all of the place follows."""
+        for viewer in self._viewers:
+            viewer.jump()
+
     def moved(self, time_s: float, speed: float, *, is_playing: bool) -> None:
         """Where the replay is."""
         self._position = position_text(time_s, speed, is_playing=is_playing)
@@ -277,7 +296,7 @@ class Hub:
         if self._teller is None or self._status is None:
             if self._gone is not None:
                 for viewer in self._viewers:
-                    viewer.answer(self._gone)
+                    viewer.lose(self._gone)
             return
         self._number += 1
         age_s = self._status.age_s + asyncio.get_running_loop().time() - self._told_s

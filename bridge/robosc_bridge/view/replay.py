@@ -6,22 +6,28 @@ each leads to one location of its protocol, wherever it comes from.
 
 import asyncio
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 from typing import Any
 
 from robosc.automata.plants import communication_plant
 from robosc.event_logs import LoggedRun
+from robosc.event_logs.stops import is_ended
+from robosc.execution.event_log import Entry
 from robosc.model.structure import CommunicationKind, Model
 from robosc.supervisor import Supervisor
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.view.definition import robot_of
 from robosc_bridge.view.facts import Happenings, LogSpan, SourceKind, Status
 from robosc_bridge.view.sources import Pause, Play, RefusedError, Seek, Sink, ViewError, Wish
+from robosc_bridge.view.telling import Lights
 
 HISTORY = 200
 """Entries before the place that is gone to which are told again."""
+
+MAXIMUM_STOPS = 50
+"""Stops that hold at the same time; of more the oldest are forgotten. A robot has as many as it has sensors."""
 
 MOST_AT_ONCE = 2000
 """Entries that are told in one step of a replay; those before them count as lost."""
@@ -40,7 +46,7 @@ class Frame:
         components: State and variables of each component.
         communications: Location of each service and action.
         problem: The fault that was told last, until a restart.
-        stops: Why nothing was requested, until that ended.
+        stops: Why nothing was requested, each until it ended.
     """
 
     components: Mapping[str, Any]
@@ -70,6 +76,7 @@ class Recording:
         self._frames = _frames(run, supervisor.model)
         span = LogSpan(self.begin_s, self.end_s, len(self.documents))
         self.robot = robot_of(supervisor, SourceKind.LOG, version="", can_command=False, log=span, scene=scene)
+        self._last = LastTaken(Lights(self.robot), self.documents)
 
     @property
     def begin_s(self) -> float:
@@ -88,6 +95,42 @@ class Recording:
     def frame(self, number: int) -> Frame:
         """The state after so many entries."""
         return self._frames[number]
+
+    def last(self, number: int) -> Mapping[str, int]:
+        """The last transition of each component that has taken one, after so many entries."""
+        return self._last.after(number)
+
+
+class LastTaken:
+    """Which transition each component took last, after any number of entries, since the model began.
+
+    Args:
+        lights: Tells which transitions an entry takes; in the initial state.
+        documents: The entries.
+    """
+
+    def __init__(self, lights: Lights, documents: Iterable[Entry]) -> None:
+        # How many entries there are after which a component has taken something, and what.
+        self._taken: dict[str, tuple[list[int], list[int]]] = {}
+        self._begins = [0]
+        lights.begin({})
+        for count, document in enumerate(documents, 1):
+            if document.get("kind") == "restart":
+                self._begins.append(count)
+            for component, transition in lights.of(document):
+                counts, transitions = self._taken.setdefault(component, ([], []))
+                counts.append(count)
+                transitions.append(transition)
+
+    def after(self, count: int) -> dict[str, int]:
+        """Numbers of the transitions by component, after so many entries."""
+        begin = self._begins[bisect_right(self._begins, count) - 1]
+        found = {}
+        for component, (counts, transitions) in self._taken.items():
+            place = bisect_right(counts, count) - 1
+            if place >= 0 and counts[place] > begin:
+                found[component] = transitions[place]
+        return found
 
 
 def _frames(run: LoggedRun, model: Model) -> list[Frame]:
@@ -118,9 +161,12 @@ def _frames(run: LoggedRun, model: Model) -> list[Frame]:
             case "fault":
                 frame = Frame(frame.components, frame.communications, entry.text("what"), frame.stops)
             case "stop":
-                frame = Frame(frame.components, frame.communications, frame.problem, (entry.text("what"),))
+                what = entry.text("what")
+                stops = (*(item for item in frame.stops if item != what), what)[-MAXIMUM_STOPS:]
+                frame = Frame(frame.components, frame.communications, frame.problem, stops)
             case "resume":
-                frame = Frame(frame.components, frame.communications, frame.problem)
+                stops = tuple(item for item in frame.stops if not is_ended(item, entry.text("what")))
+                frame = Frame(frame.components, frame.communications, frame.problem, stops)
         frames.append(frame)
     return frames
 
@@ -232,6 +278,7 @@ class Replay:
         """Tell a place anew, with what came before it; returns how many entries were told."""
         count = self._recording.count(self._player.time_s)
         first = max(count - HISTORY, 0)
+        sink.jumped()
         self._tell_position(sink)
         sink.begin(self._recording.frame(first).components)
         entries: Sequence[Any] = self._recording.documents[first:count]
@@ -263,4 +310,5 @@ class Replay:
             stops=frame.stops,
             components=frame.components,
             communications=frame.communications,
+            last=self._recording.last(count),
         )

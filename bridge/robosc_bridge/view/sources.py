@@ -44,6 +44,9 @@ class Sink(Protocol):
     def scanned(self, scan: LaserScan) -> None:
         """A turn of the LiDAR; the latest alone counts."""
 
+    def jumped(self) -> None:
+        """The replay of a log is elsewhere; all there is to tell of the place follows."""
+
     def moved(self, time_s: float, speed: float, *, is_playing: bool) -> None:
         """Where the replay of a log is."""
 

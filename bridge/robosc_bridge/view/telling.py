@@ -19,6 +19,9 @@ MAXIMUM_NAME = 600
 NOT_EXECUTED = "nothing is executed now"
 NOT_KNOWN = "the executor does not allow it; why is not known here"
 
+_MAXIMUM_DEPTH = 20
+"""Of what stands in an entry; what lies deeper is not told."""
+
 _SHOWN_APART = ("time", "kind", "event", "controllable", "state", "decision_us", "transitions")
 
 
@@ -89,6 +92,7 @@ class Teller:
                 "is_torque_on": drive.is_torque_on,
             },
             "age_s": round(age_s, 3),
+            "last": None if status.last is None else dict(status.last),
         }
         return _text(message)
 
@@ -201,9 +205,10 @@ class Lights:
         """Components and numbers of the transitions of an entry."""
         kind = entry.get("kind")
         if "transitions" in entry:
-            # Told with the entry; only the bridge's own sources do that.
-            for number in entry["transitions"]:
-                if number in self._component:
+            # Told with the entry: only the bridge's own sources do that; in a log anything may stand.
+            told = entry["transitions"]
+            for number in told if isinstance(told, list | tuple) else ():
+                if isinstance(number, int) and number in self._component:
                     yield self._component[number], number
         elif kind == "restart":
             self._before = dict(self._initial)
@@ -247,15 +252,18 @@ def entry_text(entry: Entry) -> str:
     return text if len(text) <= MAXIMUM_TEXT else f"{text[: MAXIMUM_TEXT - 4]} ..."
 
 
-def _word(value: Any) -> str:
+def _word(value: Any, depth: int = 0) -> str:
+    if depth > _MAXIMUM_DEPTH:
+        return "..."
     if isinstance(value, str):
         return value[: MAXIMUM_TEXT + 1]
     if isinstance(value, float):
         return f"{value:g}"
     if isinstance(value, dict):
-        return ", ".join(f"{str(name)[:MAXIMUM_TEXT]} = {_word(item)}" for name, item in list(value.items())[:20])
+        items = list(value.items())[:20]
+        return ", ".join(f"{str(name)[:MAXIMUM_TEXT]} = {_word(item, depth + 1)}" for name, item in items)
     if isinstance(value, Sequence):
-        return ", ".join(map(_word, value[:20])) + (", ..." if len(value) > 20 else "")
+        return ", ".join(_word(item, depth + 1) for item in value[:20]) + (", ..." if len(value) > 20 else "")
     return str(plain(value))
 
 

@@ -169,7 +169,7 @@ def test_a_screen_reader_hears_what_matters_and_no_flood(server: StandIn, seen: 
         ".observe(polite, {childList: true, characterData: true, subtree: true}); }"
     )
     live = seen.page.locator("[aria-live], [role=status], [role=alert], [role=log]")
-    assert sorted(live.evaluate_all("(all) => all.map((it) => it.id)")) == ["polite", "stale-what"]
+    assert sorted(live.evaluate_all("(all) => all.map((it) => it.id)")) == ["large-stale-what", "polite", "stale-what"]
     for number in range(1, 101):
         server.send(events([entry(number)]), update(number=number, state="stopping" if number % 2 else "running"))
     server.send(update(state="fault", problem="a motor is lost"))

@@ -79,6 +79,131 @@ def test_a_source_that_is_gone_says_why_until_it_is_back(server: StandIn, seen: 
     seen.wait(FRESHNESS_IS, "live")
 
 
+def test_a_source_that_stays_gone_is_noted_once(server: StandIn, seen: Visit) -> None:
+    for why in ("the bridge has ended", "the bridge has ended", "it does not answer", "it does not answer"):
+        server.send({"type": "gone", "why": why})
+    server.send(definition(), update())
+    seen.wait("() => document.querySelectorAll('.row').length >= 3")
+    seen.wait(FRESHNESS_IS, "live")
+    assert seen.page.locator(".row-text").all_inner_texts() == [
+        "The source is lost: the bridge has ended",
+        "The source is lost: it does not answer",
+        "The connection is back. What happened meanwhile is not here.",
+    ]
+
+
+def test_a_request_of_which_nothing_was_told_is_not_known(server: StandIn, seen: Visit) -> None:
+    server.send(update(enabled=["grip.request"], disabled=[{"event": "go.request", "why": ["No."]}]))
+    seen.wait("() => document.querySelector('#requests-count').textContent === '1 of 4 enabled, 2 not known'")
+    told = {
+        line.get_attribute("data-request"): (
+            line.get_attribute("data-enabled"),
+            line.locator(".request-word").inner_text(),
+        )
+        for line in seen.page.locator(".request").all()
+    }
+    unknown = ("unknown", "? not known")
+    assert told == {
+        "grip.request": ("true", "✓ enabled"),
+        "move.request": unknown,
+        "go.request": ("false", "✕ not now"),
+        "dock.request": unknown,
+    }
+    seen.page.locator("[data-request='dock.request'] summary").click()
+    assert seen.text("[data-request='dock.request'] .whys") == "Whether it is enabled was not told."
+    server.send(update())
+    seen.wait("() => document.querySelector('#requests-count').textContent === '2 of 4 enabled'")
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        ("bridge", "✓ Nothing keeps the robot from moving."),
+        ("ros2", "? Whether anything keeps the robot from moving is not told here."),
+        ("log", ""),
+    ],
+)
+def test_only_who_knows_says_that_nothing_keeps_the_robot(
+    server: StandIn, seen: Visit, source: str, words: str
+) -> None:
+    server.send(definition(robot="Another", source=source), update(number=7))
+    seen.wait("() => document.querySelector('#robot').textContent === 'Another' && document.querySelector('.chip')")
+    assert seen.text("#causes") == words
+
+
+def test_what_comes_after_a_definition_is_shown_even_if_it_is_as_before(server: StandIn, seen: Visit) -> None:
+    server.send(definition(robot="Another"))
+    seen.wait("() => document.querySelector('#robot').textContent === 'Another' && !document.querySelector('.chip')")
+    server.send(update())
+    seen.wait("() => document.querySelectorAll('.chip').length === 2")
+
+
+LAST = """() => Object.fromEntries([...document.querySelectorAll('.card')].map((card) =>
+  [card.dataset.component, card.querySelector('.edge.is-last')?.dataset.id]))"""
+LAST_IS = f"""([gripper, base]) => {{
+  const last = ({LAST})();
+  return last.Gripper == gripper && last.Base == base;
+}}"""
+BOTH = [taken("Gripper", 1), taken("Base", 10)]
+
+
+def test_the_last_transition_is_that_of_the_place_in_a_recorded_run(server: StandIn, seen: Visit) -> None:
+    server.send(definition(source="log", can_command=False), update(last={}))
+    seen.wait("() => document.querySelector('#link-word').textContent === 'recorded'")
+    server.send(events([entry(1, transitions=BOTH)]), update(last={"Gripper": 1, "Base": 10}))
+    seen.wait(LAST_IS, [1, 10])
+    words = "() => document.querySelector('[data-component=Gripper] desc').textContent.includes('Last transition')"
+    assert seen.page.evaluate(words)
+    # Elsewhere, with entries that were not told.
+    server.send(update(last={"Gripper": 2}))
+    seen.wait(LAST_IS, [2, None])
+    server.send(update(last={}))
+    seen.wait(LAST_IS, [None, None])
+    assert not seen.page.evaluate(words)
+
+
+def test_a_transition_is_the_last_one_as_long_as_that_is_sure(server: StandIn, seen: Visit) -> None:
+    server.send(events([entry(1, transitions=BOTH)]))
+    seen.wait(LAST_IS, [1, 10])
+    server.send(update())
+    server.send(events([entry(9, transitions=[taken("Base", 11)])], lost=7))
+    seen.wait(LAST_IS, [None, 11])
+    server.send(events([entry(10, transitions=BOTH), entry(11, kind="restart", event="")]))
+    seen.wait(LAST_IS, [None, None])
+    server.send(events([entry(12, transitions=BOTH)]))
+    seen.wait(LAST_IS, [1, 10])
+    # The same robot again after an interruption.
+    server.send(definition(), update())
+    seen.wait(LAST_IS, [None, None])
+
+
+OWN_OF_OBJECTS = ["toString", "constructor", "__proto__", "valueOf", "hasOwnProperty"]
+
+
+def test_names_that_objects_have_by_themselves_are_names(browser: Browser) -> None:
+    parts = [component(name, [], graph(["still"], [])) for name in OWN_OF_OBJECTS]
+    services = [
+        {"name": name, "component": name, "kind": "service", "identifier": "", "channel": ""} for name in OWN_OF_OBJECTS
+    ]
+    known = {"communications": {"__proto__": "waiting"}, "components": {"__proto__": {"state": "still"}}}
+    greeting = [
+        definition(source="constructor", components=parts, communications=services, requests=[]),
+        update(enabled=[], disabled=[], last={}, **known),
+        events([entry(i, kind=name, event=name) for i, name in enumerate(OWN_OF_OBJECTS)]),
+    ]
+    with StandIn(greeting) as server, visit(browser, server.address) as seen:
+        server.wait_for_pages(1)
+        seen.wait("(count) => document.querySelectorAll('.row').length === count", len(OWN_OF_OBJECTS))
+        places = ["waiting" if name == "__proto__" else "not known" for name in OWN_OF_OBJECTS]
+        states = ["still" if name == "__proto__" else "not known" for name in OWN_OF_OBJECTS]
+        assert seen.page.locator(".place").all_text_contents() == places
+        assert seen.page.locator(".card-state").all_text_contents() == states
+        assert seen.text("#about") == "controller · constructor · 0.1.0"
+        assert {row.get_attribute("data-group") for row in seen.page.locator(".row").all()} == {"other"}
+        assert set(seen.page.locator(".row-sign").all_text_contents()) == {"·"}
+        assert seen.errors == []
+
+
 def test_what_is_no_message_changes_nothing(server: StandIn, seen: Visit) -> None:
     for text in ("{", "7", "null", "[]", '{"type":"constructor"}', '{"type":"__proto__"}', '{"type":"nothing"}'):
         server.send_text(text)

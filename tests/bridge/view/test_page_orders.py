@@ -52,6 +52,56 @@ def test_escape_stops_wherever_the_keyboard_is(server: StandIn, seen: Visit, foc
     seen.wait(ANSWER_IS, "STOP was heard.")
 
 
+@pytest.mark.parametrize("size", [(1400, 900), (360, 700)])
+def test_a_graph_in_full_size_leaves_the_stop_and_the_age_in_reach(
+    browser: Browser, server: StandIn, size: tuple[int, int]
+) -> None:
+    with visit(browser, server.address, size) as seen:
+        server.wait_for_pages(1)
+        seen.page.get_by_role("button", name="Enlarge the graph of Base").click()
+        dialog = seen.page.get_by_role("dialog", name="Base")
+        # Clicked as a person does: what covers it would be hit instead.
+        dialog.get_by_role("button", name="STOP").click()
+        assert server.wait_for_messages(1) == [{"type": "stop"}]
+        server.send({"type": "done", "what": "stop"})
+        seen.wait("() => document.querySelector('#large-answer').textContent === 'STOP was heard.'")
+        # A screen reader is told, too: what the dialog covers it does not read.
+        seen.wait("() => document.querySelector('dialog #polite').textContent.includes('STOP was heard.')")
+        server.away()
+        seen.wait("() => document.documentElement.dataset.freshness === 'lost'")
+        assert dialog.get_by_role("alert").inner_text() == "Connection lost: nothing shown here is live."
+        assert "old" in seen.text("#large-stale-age")
+        colours = "() => getComputedStyle(document.querySelector('#large-body')).filter"
+        assert seen.page.evaluate(colours) == "grayscale(1)"
+        seen.picture(f"large-lost-{size[0]}")
+        dialog.get_by_role("button", name="STOP").click()
+        seen.wait("() => document.querySelector('#large-answer').textContent.startsWith('STOP was NOT sent')")
+        server.back()
+        assert server.wait_for_messages(2)[1] == {"type": "stop"}
+        seen.wait("() => document.documentElement.dataset.freshness === 'live'")
+        assert seen.page.evaluate(colours) == "none"
+        assert not dialog.get_by_role("alert").is_visible()
+        dialog.get_by_role("button", name="Close").click()
+        seen.wait("() => document.querySelector('#polite').parentNode === document.body")
+        assert seen.page.get_by_role("button", name="STOP").is_visible()
+        # While nobody listened the browser noted that, and nothing else went wrong.
+        assert all("ERR_CONNECTION_REFUSED" in error for error in seen.errors)
+
+
+def test_another_robot_closes_the_graph_in_full_size(server: StandIn, seen: Visit) -> None:
+    seen.page.get_by_role("button", name="Enlarge the graph of Base").click()
+    dialog = seen.page.get_by_role("dialog", name="Base")
+    assert dialog.is_visible()
+    server.send(definition(robot="Another"), update())
+    seen.wait("() => document.querySelector('#robot').textContent === 'Another'")
+    seen.wait("() => !document.querySelector('dialog').open")
+    # Of the new one it is the graph that lives.
+    seen.page.get_by_role("button", name="Enlarge the graph of Base").click()
+    server.send(update(components={"Base": {"state": "driving", "variables": {}}}))
+    seen.wait("() => document.querySelector('dialog .state.is-active')?.dataset.state === 'driving'")
+    assert seen.errors == []
+
+
 def test_a_stop_that_nobody_confirms_is_told(server: StandIn, seen: Visit) -> None:
     seen.page.get_by_role("button", name="STOP").click()
     server.wait_for_messages(1)

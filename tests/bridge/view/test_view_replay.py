@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import tempfile
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -13,8 +14,10 @@ from hypothesis import given, settings
 from robosc.event_logs import LoggedRun, read_log
 from robosc.execution.event_log import json_line, plain
 from robosc_bridge.view import ViewError
-from robosc_bridge.view.replay import HISTORY, Player, Recording, Replay
+from robosc_bridge.view.hub import Viewer
+from robosc_bridge.view.replay import HISTORY, MAXIMUM_STOPS, Player, Recording, Replay
 from robosc_bridge.view.sources import Pause, Play, Seek
+from robosc_bridge.view.telling import events_text
 from support.live import LiveRobot, large_model, supervisor_without_synthesis
 from support.pages_open import opened
 from support.view_servers import served
@@ -50,6 +53,26 @@ class Written:
         return Recording(read_log(self.path), SUPERVISOR)
 
 
+def slowly_last(recording: Recording, number: int) -> dict[str, int]:
+    """Of each component the transition taken last, by going through all entries from the beginning."""
+    robot = recording.robot
+    initial = {
+        component.name: next(state.name for state in component.behaviour.states if state.initial)
+        for component in robot.shape.components
+        if component.behaviour
+    }
+    states, last = dict(initial), dict[str, int]()
+    for document in recording.documents[:number]:
+        if document["kind"] == "restart":
+            states, last = dict(initial), {}
+        elif document["kind"] == "event":
+            for component, numbers in robot.table.get(document["event"], {}).items():
+                if states[component] in numbers:
+                    last[component] = numbers[states[component]]
+            states = {name: part["state"] for name, part in document["state"].items()}
+    return last
+
+
 def shown(message: dict[str, Any]) -> list[Any]:
     return [message["components"], message["communications"], message["enabled"]]
 
@@ -80,6 +103,7 @@ def test_every_place_shows_the_state_after_the_last_entry_before_it(tmp_path: Pa
                 await page.send(type="seek", time_s=time_s)
                 told = await page.until(_is_update_of(time_s))
                 assert shown(told) == written.states[number]
+                assert told["last"] == slowly_last(recording, number)
                 (position,) = [message for message in page.messages if message["type"] == "position"]
                 assert position == {"type": "position", "time_s": time_s, "is_playing": False, "speed": 1.0}
                 entries = page.entries()
@@ -183,18 +207,113 @@ def test_faults_stops_and_restarts_are_told(tmp_path: Path) -> None:
     run = _run(
         tmp_path / "log.jsonl",
         {"kind": "event", "event": "go1.request", "controllable": True, "data": 1, "state": state},
-        {"kind": "stop", "what": "'/seen0' is stale"},
+        {"kind": "stop", "what": "seen0 on /seen0 is stale"},
         {"kind": "fault", "what": "it broke"},
-        {"kind": "resume", "what": "again"},
+        {"kind": "resume", "what": "seen0 is back"},
         {"kind": "restart", "what": "again"},
         {"kind": "event", "event": "hold2.request", "controllable": True, "data": None, "state": _state()},
     )
     recording = Recording(run, SUPERVISOR)
     frames = [recording.frame(number) for number in range(7)]
     assert [frame.problem for frame in frames] == ["", "", "", "it broke", "it broke", "", ""]
-    assert [frame.stops for frame in frames] == [(), (), *[("'/seen0' is stale",)] * 2, (), (), ()]
+    assert [frame.stops for frame in frames] == [(), (), *[("seen0 on /seen0 is stale",)] * 2, (), (), ()]
     assert [frame.components["Motor1"]["state"] for frame in frames] == ["still", *["moving"] * 4, "still", "still"]
     assert [frame.communications["hold2"] for frame in frames] == [*["idle"] * 6, "waiting"]
+
+
+def test_what_is_back_ends_its_own_stop_alone(tmp_path: Path) -> None:
+    near, far = "scan on /scan is stale", "odom on /odom is stale"
+    run = _run(
+        tmp_path / "log.jsonl",
+        {"kind": "stop", "what": near},
+        {"kind": "stop", "what": far},
+        {"kind": "stop", "what": near},
+        {"kind": "resume", "what": "sca is back"},
+        {"kind": "resume", "what": "scan is back"},
+        {"kind": "stop", "what": "stopped by hand"},
+        {"kind": "resume", "what": "odom is back"},
+        {"kind": "restart"},
+        *({"kind": "stop", "what": str(number)} for number in range(2 * MAXIMUM_STOPS)),
+    )
+    recording = Recording(run, SUPERVISOR)
+    assert [set(recording.frame(number).stops) for number in range(9)] == [
+        set(),
+        {near},
+        {near, far},
+        {near, far},
+        {near, far},
+        {far},
+        {far, "stopped by hand"},
+        {"stopped by hand"},
+        set(),
+    ]
+    assert recording.frame(len(recording.documents)).stops == tuple(
+        str(number) for number in range(MAXIMUM_STOPS, 2 * MAXIMUM_STOPS)
+    )
+
+
+@given(st.integers(0, 1000), st.lists(st.sampled_from([True, True, True, True, False]), min_size=1, max_size=60))
+@settings(max_examples=40, deadline=None)
+def test_the_last_transitions_are_those_of_a_run_from_the_beginning(seed: int, happens: list[bool]) -> None:
+    robot = LiveRobot(SUPERVISOR, seed)
+    subscription = robot.feed.subscribe(lambda: None, len(happens))
+    for is_event in happens:
+        if is_event:
+            robot.step()
+        else:
+            robot.system.restart()
+            robot.feed.tell({"time": BEGIN_S, "kind": "restart"})
+    documents = [{**entry, "time": BEGIN_S + number} for number, entry in enumerate(subscription.take().entries)]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "log.jsonl"
+        path.write_text("".join(map(json_line, documents)))
+        recording = Recording(read_log(path), SUPERVISOR)
+    for number in range(len(documents) + 1):
+        assert recording.last(number) == slowly_last(recording, number)
+
+
+def test_what_waits_of_another_place_is_not_told_after_a_jump() -> None:
+    async def look() -> list[str]:
+        viewer = Viewer()
+        viewer.happened(["of before"], 3)
+        viewer.show("update of before")
+        viewer.scanned("scan of before")
+        viewer.jump()
+        viewer.moved("position")
+        viewer.happened(["{}"], 0)
+        viewer.show("update")
+        return await viewer.take()
+
+    assert asyncio.run(look()) == ["position", events_text(["{}"], 0), "update"]
+
+
+DEEP = 900
+
+
+@pytest.mark.parametrize("deep", [f"{'[' * DEEP}7{']' * DEEP}", f"{'{"a":' * DEEP}7{'}' * DEEP}"])
+@pytest.mark.parametrize("place", ["data", "state", "what", "transitions", "more"])
+def test_what_is_nested_deeply_in_a_log_ends_nothing(tmp_path: Path, deep: str, place: str) -> None:
+    state = json.dumps(_state())
+    if place == "state":
+        state = state.replace('"level": 0', f'"level": {deep}', 1)
+        assert deep in state
+    more = "" if place == "state" else f',"{place}":{deep}'
+    path = tmp_path / "log.jsonl"
+    begin = f'{{"time":{BEGIN_S},"kind":"event","event":"seen0.response","controllable":false,"state":{state}'
+    path.write_text(f"{begin}{more}}}\n" + entries({"kind": "stop", "what": "x"}))
+    recording = Recording(read_log(path), SUPERVISOR)
+
+    async def look() -> None:
+        async with (
+            served(lambda: Replay(recording), is_shared=False, robot=recording.robot) as server,
+            opened(server.url) as page,
+        ):
+            assert (await page.next())["type"] == "definition"
+            told = await page.until(lambda message: message["type"] in ("gone", "update"))
+            assert told["type"] == "update"
+            assert [entry["kind"] for entry in page.entries()] == ["event", "stop"]
+
+    asyncio.run(look())
 
 
 def test_a_clock_that_was_set_back_hides_nothing(tmp_path: Path) -> None:
@@ -220,8 +339,6 @@ def test_a_log_of_another_model_or_without_entries_is_refused(tmp_path: Path) ->
 def _recording() -> Recording:
     state = _state()
     event = {"kind": "event", "event": "seen0.response", "controllable": False, "data": 1, "state": state}
-    import tempfile
-
     with tempfile.TemporaryDirectory() as folder:
         return Recording(_run(Path(folder) / "log.jsonl", *[event] * 50), SUPERVISOR)
 

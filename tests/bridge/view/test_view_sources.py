@@ -58,6 +58,23 @@ def test_a_bridge_that_ends_is_told_and_found_again(robot: LiveRobot, monkeypatc
     asyncio.run(look())
 
 
+def test_a_robot_that_is_there_again_is_not_told_as_lost() -> None:
+    async def look() -> None:
+        viewer = hub_module.Viewer()
+        # Who has not read for a while is told what is so now, and every answer.
+        viewer.answer("refused")
+        for _ in range(2 * hub_module.MAXIMUM_ANSWERS):
+            viewer.lose("gone")
+        viewer.define("definition")
+        viewer.show("update")
+        assert await viewer.take() == ["definition", "refused", "update"]
+        viewer.define("definition")
+        viewer.lose("gone")
+        assert await viewer.take() == ["definition", "gone"]
+
+    asyncio.run(look())
+
+
 def test_a_bridge_elsewhere_is_commanded(robot: LiveRobot) -> None:
     face = serve(robot.operations, RemoteSettings("127.0.0.1:0"))
 

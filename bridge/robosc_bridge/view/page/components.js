@@ -4,14 +4,14 @@ import { byId, make, mark, quoted, say, show } from "./dom.js";
 import { count, value } from "./format.js";
 import { afterPainting } from "./frame.js";
 import { Graph } from "./graph.js";
-import { told } from "./told.js";
+import { told, under } from "./told.js";
 
 const SERVED = new Set(["service", "action"]);
 const WIDE_PX = 430;
 const LEAST_SCALE = 0.75;
 const NO_BEHAVIOUR = "No behaviour of its own.";
 const TOO_LARGE = "Its graph is too large to be drawn.";
-const KINDS = { controllable: "controllable", uncontrollable: "uncontrollable", silent: "silent" };
+const KINDS = { __proto__: null, controllable: "controllable", uncontrollable: "uncontrollable", silent: "silent" };
 
 class Card {
   constructor(component, communications, index, enlarge) {
@@ -69,7 +69,7 @@ class Card {
     if (this.note) say(this.note, state === null ? NO_BEHAVIOUR : TOO_LARGE);
     this.paintVariables(shown?.variables ?? {});
     for (const [name, place] of this.places) {
-      const location = places[name] ?? "not known";
+      const location = under(places, name) ?? "not known";
       say(place, location);
       mark(place, "data-place", location);
     }
@@ -112,7 +112,9 @@ function transitionsTable(graph) {
 export function startComponents() {
   let cards = new Map();
   let taken = new Map();
-  const enlarge = startLarge();
+  /** Whether the transitions that were marked as the last ones are so no more, before those in `taken`. */
+  let isLastForgotten = false;
+  const { enlarge, close } = startLarge();
   const filter = byId("components-filter");
 
   const narrow = () => {
@@ -128,8 +130,15 @@ export function startComponents() {
   };
   filter.addEventListener("input", narrow);
 
+  /** What was taken so far is not what was taken last, and what was is not known. */
+  const forget = () => {
+    taken = new Map();
+    isLastForgotten = true;
+  };
+
   return {
     build() {
+      close();
       const { components = [], communications = [] } = told.definition;
       const byComponent = Map.groupBy(communications, (item) => item.component);
       cards = new Map(components.map((item, i) => [item.name, new Card(item, byComponent.get(item.name) ?? [], i, enlarge)]));
@@ -139,18 +148,23 @@ export function startComponents() {
     paint() {
       const components = told.update?.components ?? {};
       const places = told.update?.communications ?? {};
+      const last = told.update?.last ?? null;
       for (const [name, card] of cards) {
-        card.paint(components[name], places);
+        card.paint(under(components, name), places);
+        if (isLastForgotten) card.graph?.setLast();
         if (taken.has(name)) card.graph?.take(taken.get(name));
+        // A recorded run may be anywhere after a jump, with entries that are not told.
+        if (last !== null) card.graph?.setLast(under(last, name));
       }
       taken = new Map();
+      isLastForgotten = false;
     },
-    /** What was taken so far was so on another robot. */
-    forget() {
-      taken = new Map();
-    },
-    take(entries) {
+    forget,
+    /** Entries, before which others were lost. */
+    take(entries, lost) {
+      if (lost > 0) forget();
       for (const entry of entries) {
+        if (entry.kind === "restart") forget();
         for (const { component, id } of entry.transitions ?? []) {
           const ids = taken.get(component) ?? [];
           // Of what happens between two frames nobody sees more than this.
@@ -163,20 +177,36 @@ export function startComponents() {
   };
 }
 
-/** A graph in full size. The drawing itself moves there and back, so that it goes on living. */
+/** A graph in full size. The drawing itself moves there and back, so that it goes on living; so does what is said. */
 function startLarge() {
   const dialog = byId("large");
   let origin = null;
-  byId("large-close").addEventListener("click", () => dialog.close());
-  dialog.addEventListener("close", () => {
-    origin.card.frame.append(origin.card.graph.element);
-    origin.button.focus();
+  const said = byId("polite");
+  const home = said.parentNode;
+  const putBack = () => {
+    if (origin === null) return;
+    const { card, button } = origin;
     origin = null;
-  });
-  return (card, button) => {
-    origin = { card, button };
-    say(byId("large-title"), card.component.name);
-    byId("large-body").replaceChildren(card.graph.element);
-    dialog.showModal();
+    home.append(said);
+    card.frame.append(card.graph.element);
+    button.focus();
+  };
+  const close = () => {
+    dialog.close();
+    // The event comes later.
+    putBack();
+  };
+  byId("large-close").addEventListener("click", close);
+  dialog.addEventListener("close", putBack);
+  return {
+    enlarge(card, button) {
+      origin = { card, button };
+      say(byId("large-title"), card.component.name);
+      byId("large-body").replaceChildren(card.graph.element);
+      // A screen reader reads nothing of what the dialog covers.
+      dialog.append(said);
+      dialog.showModal();
+    },
+    close,
   };
 }

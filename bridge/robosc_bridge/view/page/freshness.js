@@ -8,6 +8,9 @@ import { ageS, told } from "./told.js";
 
 const OLD_S = 2;
 
+/** On the page, and before a graph in full size, which covers it. */
+const PLACES = ["stale", "large-stale"];
+
 const SENTENCES = {
   connecting: () => "Connecting to the server.",
   lost: () => "Connection lost: nothing shown here is live.",
@@ -38,9 +41,13 @@ export function startFreshness(connection) {
     const now = freshness(connection());
     mark(document.documentElement, "data-freshness", now);
     const isStale = now in SENTENCES;
-    show(byId("stale"), isStale);
-    say(byId("stale-what"), isStale ? SENTENCES[now]() : "");
-    say(byId("stale-age"), isStale && told.update !== null ? `The state below is ${ago(ageS())} old.` : "");
+    const what = isStale ? SENTENCES[now]() : "";
+    const age = isStale && told.update !== null ? `The state below is ${ago(ageS())} old.` : "";
+    for (const place of PLACES) {
+      show(byId(place), isStale);
+      say(byId(`${place}-what`), what);
+      say(byId(`${place}-age`), age);
+    }
     say(byId("link-word"), now === "live" ? liveWord() : WORDS[now]);
     if (now === "live" && last !== "live") announce("link", "Connected.");
     last = now;

@@ -4,7 +4,7 @@ import { draw, say } from "./dom.js";
 import { head, rounded, route } from "./geometry.js";
 import { light } from "./glow.js";
 
-const SIGNS = { controllable: "◆ ", uncontrollable: "○ ", silent: "" };
+const SIGNS = { __proto__: null, controllable: "◆ ", uncontrollable: "○ ", silent: "" };
 
 export class Graph {
   /** @param {string} name Of the component. @param {object} graph Its layout. @param {string} id Prefix of ids. */
@@ -89,10 +89,18 @@ export class Graph {
     say(this.words, this.describe());
   }
 
+  /** Marks the transition that was taken last, whatever was marked before; undefined: none is known. */
+  setLast(id) {
+    const found = this.edges.get(id) ?? null;
+    if (found === this.last) return;
+    this.markLast(found);
+    say(this.words, this.describe());
+  }
+
   markLast(found) {
     if (found === this.last) return;
     for (const part of [this.last?.line, this.last?.label]) part?.classList.remove("is-last");
-    for (const part of [found.line, found.label]) part.classList.add("is-last");
+    for (const part of [found?.line, found?.label]) part?.classList.add("is-last");
     this.last = found;
   }
 

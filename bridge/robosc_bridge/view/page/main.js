@@ -34,10 +34,10 @@ const receive = {
     const now = JSON.stringify(message);
     if (wasLost) stream.note("The connection is back. What happened meanwhile is not here.");
     wasLost = false;
+    components.forget();
     // After an interruption it is mostly the same robot: what a reader has opened and chosen stays.
     if (now !== known) {
       known = now;
-      components.forget();
       map.clear();
       touch("definition");
     }
@@ -52,7 +52,7 @@ const receive = {
   },
   events({ entries, lost }) {
     stream.add(entries ?? [], lost ?? 0);
-    components.take(entries ?? []);
+    components.take(entries ?? [], lost ?? 0);
     touch("taken");
   },
   scan(message) {
@@ -70,9 +70,11 @@ const receive = {
   refused: (message) => orders.answered(message),
   done: (message) => orders.answered(message),
   gone({ why }) {
-    told.gone = String(why ?? "");
+    const now = String(why ?? "");
+    // It is told again and again, as a sign of life.
+    if (now !== told.gone) stream.note(`The source is lost: ${now}`);
+    told.gone = now;
     wasLost = true;
-    stream.note(`The source is lost: ${told.gone}`);
   },
 };
 

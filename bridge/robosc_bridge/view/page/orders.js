@@ -4,6 +4,10 @@ import { announce } from "./announce.js";
 import { byId, make, mark, say, show } from "./dom.js";
 import { isReplay, told } from "./told.js";
 
+/** On the page, and before a graph in full size, which covers it. */
+const STOPS = ["stop", "large-stop"];
+const ANSWERS = ["stop-answer", "large-answer"];
+
 const HEARD_WITHIN_MS = 2000;
 const SWITCH = "Use the switch on the robot.";
 
@@ -19,10 +23,11 @@ export function startOrders(connection, token) {
   let isOwed = false;
 
   const answer = (kind, sentence) => {
-    const place = byId("stop-answer");
-    mark(place, "data-kind", kind);
-    // A new element, so that the same sentence told twice is seen and read twice.
-    place.replaceChildren(make("span", {}, sentence));
+    for (const place of ANSWERS.map(byId)) {
+      mark(place, "data-kind", kind);
+      // A new element, so that the same sentence told twice is seen and read twice.
+      place.replaceChildren(make("span", {}, sentence));
+    }
     announce("answer", sentence);
   };
 
@@ -54,7 +59,7 @@ export function startOrders(connection, token) {
     answer("bad", `STOP was NOT sent: there is no connection. ${SWITCH} It is sent as soon as the connection is back.`);
   };
 
-  byId("stop").addEventListener("click", stop);
+  for (const button of STOPS.map(byId)) button.addEventListener("click", stop);
   window.addEventListener(
     "keydown",
     (event) => {
@@ -78,7 +83,7 @@ export function startOrders(connection, token) {
     paint() {
       const { definition } = told;
       const canCommand = definition?.can_command === true;
-      show(byId("stop"), canCommand);
+      for (const button of STOPS.map(byId)) show(button, canCommand);
       show(byId("commands"), canCommand && token !== "");
       say(byId("commands-why"), whyNoCommands(definition, canCommand, token));
       show(byId("commands-why"), byId("commands-why").textContent !== "");
@@ -104,9 +109,10 @@ export function startOrders(connection, token) {
 }
 
 function flash() {
-  const button = byId("stop");
-  button.classList.add("is-pressed");
-  setTimeout(() => button.classList.remove("is-pressed"), 200);
+  for (const button of STOPS.map(byId)) {
+    button.classList.add("is-pressed");
+    setTimeout(() => button.classList.remove("is-pressed"), 200);
+  }
 }
 
 function whyNoCommands(definition, canCommand, token) {

@@ -3,6 +3,12 @@
 import { byId, make, mark, quoted, say, show } from "./dom.js";
 import { told } from "./told.js";
 
+const NO_REASON = new Map([
+  [true, "Nothing holds it back."],
+  [false, "No reason was told."],
+  [null, "Whether it is enabled was not told."],
+]);
+
 class Request {
   constructor(event) {
     this.event = event;
@@ -24,7 +30,7 @@ class Request {
     say(this.why, why.join(" "));
     // The line stays when the reason goes: nothing jumps when a request becomes enabled and stops being so.
     if (why.length > 0) this.element.classList.add("has-why");
-    const lines = why.length > 0 ? why : [isEnabled ? "Nothing holds it back." : "No reason was told."];
+    const lines = why.length > 0 ? why : [NO_REASON.get(isEnabled)];
     this.all.replaceChildren(...lines.map((line) => make("li", {}, quoted(line))));
   }
 }
@@ -50,11 +56,15 @@ export function startRequests() {
       const { update } = told;
       const enabled = new Set(update?.enabled ?? []);
       const disabled = new Map((update?.disabled ?? []).map((item) => [item.event, item.why ?? []]));
+      let unknown = 0;
       for (const request of requests) {
-        const isEnabled = update === null ? null : enabled.has(request.event);
-        request.paint(isEnabled, isEnabled ? [] : (disabled.get(request.event) ?? []));
+        const { event } = request;
+        const isEnabled = enabled.has(event) ? true : disabled.has(event) ? false : null;
+        unknown += isEnabled === null;
+        request.paint(isEnabled, isEnabled ? [] : (disabled.get(event) ?? []));
       }
-      say(byId("requests-count"), update === null ? "" : `${enabled.size} of ${requests.length} enabled`);
+      const words = `${enabled.size} of ${requests.length} enabled${unknown > 0 ? `, ${unknown} not known` : ""}`;
+      say(byId("requests-count"), update === null ? "" : words);
     },
   };
 }

@@ -4,7 +4,7 @@ import { announce } from "./announce.js";
 import { byId, make, mark, quoted, say } from "./dom.js";
 import { isReplay, told } from "./told.js";
 
-const SOURCES = { bridge: "bridge", ros2: "ROS 2", log: "recorded run" };
+const SOURCES = { __proto__: null, bridge: "bridge", ros2: "ROS 2", log: "recorded run" };
 
 /** The definition is new. */
 export function paintRobot() {
@@ -28,6 +28,7 @@ export function paintStatus() {
   mark(byId("state"), "data-state", update?.state || "unknown");
   if (update === null) {
     lastState = lastCauses = null;
+    lastDevices = "";
     byId("causes").replaceChildren();
     byId("devices").replaceChildren();
     return;
@@ -44,6 +45,12 @@ export function paintStatus() {
   paintDevices(update.devices ?? {});
 }
 
+/** A bridge tells all that keeps its robot from moving; of another source nothing is known of that. */
+const NO_CAUSE = {
+  bridge: { kind: "fine", lead: "", told: "Nothing keeps the robot from moving." },
+  other: { kind: "unknown", lead: "", told: "Whether anything keeps the robot from moving is not told here." },
+};
+
 function causesOf(update) {
   const causes = [];
   if (update.problem) causes.push({ kind: "fault", lead: "Fault:", told: update.problem });
@@ -52,12 +59,12 @@ function causesOf(update) {
     causes.push({ kind: "reason", lead: "Nothing moves:", told: reason.text + until });
   }
   for (const stop of update.stops ?? []) causes.push({ kind: "stop", lead: "Nothing is requested:", told: stop });
-  if (causes.length === 0 && !isReplay()) causes.push({ kind: "fine", lead: "", told: "Nothing keeps the robot from moving." });
+  if (causes.length === 0 && !isReplay()) causes.push(NO_CAUSE[told.definition?.source === "bridge" ? "bridge" : "other"]);
   for (const warning of update.warnings ?? []) causes.push({ kind: "warning", lead: "Warning:", told: warning.text ?? warning });
   return causes;
 }
 
-const SIGNS = { fault: "✕", reason: "■", stop: "■", warning: "▲", fine: "✓" };
+const SIGNS = { fault: "✕", reason: "■", stop: "■", warning: "▲", fine: "✓", unknown: "?" };
 
 function causeLine({ kind, lead, told: said }) {
   const sign = make("span", { class: "sign", "aria-hidden": "true" }, SIGNS[kind]);

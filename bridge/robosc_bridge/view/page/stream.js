@@ -8,7 +8,7 @@ import { isReplay } from "./told.js";
 
 const OVERSCAN = 6;
 const FIRST_KINDS = ["controllable", "uncontrollable"];
-const SIGNS = { controllable: "◆", uncontrollable: "○", fault: "✕", blocked: "■", stop: "■", lost: "▲", connection: "▲" };
+const SIGNS = { __proto__: null, controllable: "◆", uncontrollable: "○", fault: "✕", blocked: "■", stop: "■", lost: "▲", connection: "▲" };
 
 /** @returns {object} What main.js calls. */
 export function startStream() {

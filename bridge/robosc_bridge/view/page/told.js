@@ -21,6 +21,9 @@ export function forget() {
   Object.assign(told, { update: null, updateMs: 0, scan: null, position: null, gone: null });
 }
 
+/** What an object that was told has under a name; undefined: nothing, whatever objects have by themselves. */
+export const under = (object, name) => (Object.hasOwn(object, name) ? object[name] : undefined);
+
 /** Whether a recorded run is shown. */
 export const isReplay = () => told.definition?.source === "log";
 

@@ -51,12 +51,18 @@ class Lidar(ABC):
     Attributes:
         is_covered: Whether something covers it: it measures nothing.
         is_stalled: Whether it has fallen silent.
+        baud: Of its line; None: any.
+        nominal_hz: Turns a second.
+        nearest_m: That it measures.
+        farthest_m: That it measures.
+        beams: Of a turn at the nominal speed.
     """
 
     baud: int | None
     nominal_hz: float
     nearest_m: float
     farthest_m: float
+    beams: int
 
     def __init__(self, world: World, *, seed: int = 0, noise_m: float = 0.0, starts_mid_frame: bool = True) -> None:
         self.is_covered = False
@@ -176,6 +182,7 @@ class Lds01(Lidar):
     nominal_hz = 5.0
     nearest_m = 0.12
     farthest_m = 3.5
+    beams = 360
 
     def receive(self, data: bytes, baud: int) -> Iterable[Sending]:
         """Obey the last command in it."""
@@ -213,6 +220,7 @@ class Lds02(Lidar):
 
     _POINTS = 12
     _SAMPLES_PER_S = 2300.0
+    beams = round(_SAMPLES_PER_S / nominal_hz)
     # Corrected point of a distance d (mm) at angle 0: (d + 5.9, 0.11923 d - 20.14).
     _CENTRE_M = (0.0059, -0.02014)
     _DIRECTION = (1.0, 0.11923)
@@ -263,6 +271,7 @@ class Lds03(Lidar):
     farthest_m = 12.0
 
     _SAMPLES_PER_S = 4000.0
+    beams = round(_SAMPLES_PER_S / nominal_hz)
     _FULL = 25
     _START, _STOP, _SLOW, _FAST, _VERSION = (
         bytes((0xAA, 0x55, code, 0xFF - code)) for code in (0xF0, 0xF5, 0xF1, 0xF2, 0xFC)

@@ -109,6 +109,8 @@ class Rover:
         self._due_s = dict.fromkeys(self._first_s, self._began_s)
         for wheel in (world.left, world.right):
             wheel.acceleration_rad_s2 = 40.0
+            # It has motors of its own, and cruises at half of their throttle (ArduPilot's CRUISE_THROTTLE).
+            wheel.fastest_rad_s = 2 * cruise_m_s / world.body.wheel_radius_m
 
     # What a person or the world does to it.
 

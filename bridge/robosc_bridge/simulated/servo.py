@@ -313,7 +313,7 @@ class Servo:
             wheel.acceleration_rad_s2 = max(abs(goal_rad_s - wheel.speed_rad_s), RAW_RAD_S) / (profile / 1000)
         else:
             wheel.acceleration_rad_s2 = profile * _ACCELERATION_RAD_S2
-        wheel.goal_rad_s = goal_rad_s
+        wheel.fastest_rad_s, wheel.goal_rad_s = fastest_rad_s, goal_rad_s
 
     def _release(self) -> None:
         self.table["torque enable"] = 0

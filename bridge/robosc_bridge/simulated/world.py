@@ -11,6 +11,7 @@ from typing import Literal
 
 import numpy as np
 
+from robosc_bridge.simulated.control_table import MODELS
 from robosc_bridge.simulated.drift import Drift
 from robosc_bridge.simulated.robots import Body
 from robosc_bridge.simulated.rounds import Rounds
@@ -32,7 +33,8 @@ class Wheel:
     """A wheel and the motor in it; forward is positive.
 
     Attributes:
-        goal_rad_s: Where the motor drives its speed to.
+        fastest_rad_s: What the motor turns without a load.
+        goal_rad_s: Where the motor drives its speed to, if it can.
         acceleration_rad_s2: How fast at most.
         is_driven: Whether the motor has torque; else the wheel runs out.
         is_blocked: Whether something holds it.
@@ -40,6 +42,7 @@ class Wheel:
         angle_rad: Turned so far, as its encoder counts.
     """
 
+    fastest_rad_s: float
     goal_rad_s: float = 0.0
     acceleration_rad_s2: float = _STRONGEST_RAD_S2
     is_driven: bool = False
@@ -56,7 +59,7 @@ class Wheel:
         if self.is_blocked:
             self.speed_rad_s = 0.0
             return 0.0
-        goal_rad_s = self.goal_rad_s if self.is_driven else 0.0
+        goal_rad_s = max(-self.fastest_rad_s, min(self.fastest_rad_s, self.goal_rad_s)) if self.is_driven else 0.0
         strongest = min(self.acceleration_rad_s2, _STRONGEST_RAD_S2) if self.is_driven else _FRICTION_RAD_S2
         change = goal_rad_s - self.speed_rad_s
         before = self.speed_rad_s
@@ -135,8 +138,8 @@ class World:
         self._sweep = Sweep(self.walls)
         self.time = time
         self.x_m, self.y_m, self.heading_rad = self.scene.start if pose is None else pose
-        self.left = Wheel()
-        self.right = Wheel()
+        fastest_rad_s = MODELS[body.servo_model].no_load_rpm * math.tau / 60
+        self.left, self.right = Wheel(fastest_rad_s), Wheel(fastest_rad_s)
         self.floor_speed_m_s = 0.0
         self.floor_turn_rad_s = 0.0
         self.collisions = 0

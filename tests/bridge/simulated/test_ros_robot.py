@@ -11,7 +11,7 @@ from robosc.execution.clock import ManualClock
 from robosc_bridge.simulated import BODIES, Timebase, Walls, World, oval, room
 from robosc_bridge.simulated.commands import UnknownCommandError
 from robosc_bridge.simulated.ros.commands import HELP, obey
-from robosc_bridge.simulated.ros.readings import BEAMS, Battery, Clock, Odometry, Picture, Reading, Scan
+from robosc_bridge.simulated.ros.readings import Battery, Clock, Odometry, Picture, Reading, Scan
 from robosc_bridge.simulated.ros.robot import RosRobot
 from robosc_bridge.simulated.ros.serving import LONGEST_S, PacedClock, Pacer, make_robot, parser
 from robosc_bridge.simulated.scene import Noise, Obstacle, Scene, SceneError
@@ -71,20 +71,35 @@ def test_what_was_missed_is_not_made_up_for() -> None:
     assert robot.due_s > 3.0
 
 
-def test_a_scan_has_a_beam_for_each_degree_and_says_what_is_too_far_or_too_near() -> None:
+def test_a_scan_goes_around_and_says_what_is_too_far_or_too_near() -> None:
     walls = Walls(((1.0, -2.0, 1.0, 2.0), (-2.0, 0.2, 2.0, 0.2), (-2.0, -5.0, 2.0, -5.0)))
     robot = robot_in(Scene("walls", walls), lidar="lds02")
     ranges_m = last(Scan, lived(robot, 0.2)).ranges_m
-    assert ranges_m.shape == (BEAMS,)
+    assert ranges_m.shape == (385,)
     # The scanner is behind the middle of the robot.
     assert ranges_m[0] == pytest.approx(1.0 + 0.032, abs=1e-6)
-    assert ranges_m[90] == pytest.approx(0.2, abs=1e-6)
-    assert ranges_m[270] == pytest.approx(5.0, abs=1e-6)
-    assert ranges_m[180] == math.inf
+    # The beams next to the left and the right; none is exactly there.
+    assert ranges_m[96] == pytest.approx(0.2, rel=1e-3)
+    assert ranges_m[289] == pytest.approx(5.0, rel=1e-3)
+    assert ranges_m[192] == math.inf
     near = robot_in(Scene("walls", Walls(((-2.0, 0.1, 2.0, 0.1), (-2.0, -5.0, 2.0, -5.0)))), lidar="lds01")
     ranges_m = last(Scan, lived(near, 0.2)).ranges_m
     assert ranges_m[90] == -math.inf
     assert ranges_m[270] == math.inf
+
+
+@pytest.mark.parametrize(("lidar", "beams"), [("lds01", 360), ("lds02", 385), ("lds03", 400)])
+def test_a_scan_has_as_many_beams_as_the_sensor(lidar: str, beams: int) -> None:
+    robot = robot_in(Scene("room", room(3.0, 2.0), noise=Noise(lidar_m=0.001)), lidar=lidar)
+    ranges_m = last(Scan, lived(robot, 0.2)).ranges_m
+    assert ranges_m.shape == (beams,)
+    angles = math.tau * np.arange(beams) / beams
+    cosines, sines = np.cos(angles), np.sin(angles)
+    # The scanner is behind the middle of the robot, and of the room.
+    ahead_m = np.where(cosines > 0.0, 1.532, 1.468) / np.maximum(np.abs(cosines), 1e-9)
+    assert ranges_m == pytest.approx(np.minimum(ahead_m, 1.0 / np.maximum(np.abs(sines), 1e-9)), abs=0.01)
+    robot.is_scanner_covered = True
+    assert last(Scan, lived(robot, 0.3)).ranges_m.shape == (beams,)
 
 
 def test_a_covered_scanner_sees_something_too_near_everywhere() -> None:

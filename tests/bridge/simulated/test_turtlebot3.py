@@ -7,6 +7,7 @@ from typing import NamedTuple
 import pytest
 from dynamixel_sdk import GroupSyncWrite, PacketHandler
 
+from robosc.execution.clock import ManualClock
 from robosc_bridge.simulated import BASES, BODIES, LIDARS, SimulatedTurtleBot3, Walls
 from support.wire import Host, sdk_port, wait_until
 
@@ -47,23 +48,39 @@ def here(robot: SimulatedTurtleBot3, later_s: float = 0.0) -> Look:
     return Look(time.monotonic(), robot.world.pose[0], time.monotonic())
 
 
+def drive_off(robot: SimulatedTurtleBot3) -> float:
+    """Let both servos turn forward; how fast that is, in m/s of the world."""
+    port, handler = sdk_port(robot.base_path), PacketHandler(2.0)
+    for device_id in (1, 2):
+        assert handler.write1ByteTxRx(port, device_id, 64, 1) == (0, 0)
+    goals = GroupSyncWrite(port, handler, 104, 4)
+    for device_id in (1, 2):
+        goals.addParam(device_id, [100, 0, 0, 0])
+    goals.txPacket()
+    port.closePort()
+    return 100 * 7.913672e-4
+
+
+@pytest.mark.parametrize("factor", [1.0, 5.0])
+def test_it_drives_as_far_as_its_time_passes(factor: float) -> None:
+    with SimulatedTurtleBot3(base="dynamixel", walls=Walls(()), factor=factor, clock=ManualClock()) as robot:
+        speed_m_s = drive_off(robot)
+        # What was written is heard in the first step, and the wheels have their speed soon.
+        robot.advance(0.2)
+        x_m = robot.world.pose[0]
+        robot.advance(0.5)
+        assert robot.world.pose[0] - x_m == pytest.approx(speed_m_s * 0.5 * factor, rel=1e-6)
+
+
 @pytest.mark.parametrize("factor", [1.0, 5.0])
 def test_it_drives_by_the_computers_clock(factor: float) -> None:
     with SimulatedTurtleBot3(base="dynamixel", walls=Walls(()), factor=factor) as robot:
-        port, handler = sdk_port(robot.base_path), PacketHandler(2.0)
-        for device_id in (1, 2):
-            assert handler.write1ByteTxRx(port, device_id, 64, 1) == (0, 0)
-        goals = GroupSyncWrite(port, handler, 104, 4)
-        for device_id in (1, 2):
-            goals.addParam(device_id, [100, 0, 0, 0])
-        goals.txPacket()
+        speed_m_s = drive_off(robot) * factor
         wait_until(lambda: robot.world.pose[0] > 0.0)
         first, second = here(robot), here(robot, 0.5)
-        speed_m_s = 100 * 7.913672e-4 * factor
         passed_m = second.x_m - first.x_m
         assert passed_m > 0.95 * speed_m_s * (second.before_s - first.after_s)
         assert passed_m < 1.05 * speed_m_s * (second.after_s - first.before_s)
-        port.closePort()
 
 
 def test_a_watchdog_trips_by_the_computers_clock_however_fast_the_world_is() -> None:

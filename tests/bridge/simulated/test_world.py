@@ -162,6 +162,15 @@ def test_a_wheel_without_torque_runs_out_and_a_blocked_one_stands() -> None:
     assert (world.left.speed_rad_s, world.right.speed_rad_s) == (0.0, 0.0)
 
 
+@pytest.mark.parametrize(("body", "rpm"), [("burger", 61.0), ("waffle", 77.0)])
+def test_a_wheel_turns_no_faster_than_its_motor_without_a_load(body: str, rpm: float) -> None:
+    world = world_of(Walls(()), body=body)
+    drive(world, 1000.0, -1000.0, 5.0)
+    assert world.left.speed_rad_s == pytest.approx(rpm * math.tau / 60)
+    assert world.right.speed_rad_s == pytest.approx(-rpm * math.tau / 60)
+    assert abs(world.left.angle_rad) < 5.0 * rpm * math.tau / 60
+
+
 def test_the_world_passes_faster_by_its_factor() -> None:
     slow, fast = world_of(Walls(())), world_of(Walls(()), factor=10.0)
     drive(slow, 4.0, 4.0, 10.0)

@@ -5,9 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-BEAMS = 360
-"""Of a scan, one for each degree, counter-clockwise from straight ahead."""
-
 
 @dataclass(frozen=True)
 class Clock:
@@ -26,8 +23,8 @@ class Scan:
 
     Attributes:
         stamp_s: World time.
-        ranges_m: Shape (360,); infinity where nothing is near enough, minus infinity where something is too near
-            (REP 117, ros.org/reps/rep-0117.html).
+        ranges_m: Evenly over a turn, counter-clockwise from straight ahead; infinity where nothing is near enough,
+            minus infinity where something is too near (REP 117, ros.org/reps/rep-0117.html).
         nearest_m: That can be measured.
         farthest_m: That can be measured.
         turn_s: Of the world, from scan to scan.

@@ -15,7 +15,6 @@ from robosc_bridge.simulated.eye import DARKNESS, Eye, Mount
 from robosc_bridge.simulated.lidar import LIDARS
 from robosc_bridge.simulated.ros.readings import (
     BASE,
-    BEAMS,
     CAMERA,
     FOOTPRINT,
     SCANNER,
@@ -27,6 +26,7 @@ from robosc_bridge.simulated.ros.readings import (
     Reading,
     Scan,
 )
+from robosc_bridge.simulated.sweep import BEAMS as SCAN_BEAMS
 from robosc_bridge.simulated.world import World
 
 COMMAND_TIMEOUT_S = 0.5
@@ -48,7 +48,7 @@ class RosRobot:
     Args:
         world: In which it is; where its scene has a line, there is a camera.
         mount: The camera and where it sits; None: the usual one.
-        lidar: Key of `LIDARS`: how far it sees and how often; all have 360 beams here.
+        lidar: Key of `LIDARS`: how far it sees, how often, and how many beams it has.
         encoding: Of pictures, one of `ENCODINGS`.
         command_timeout_s: How long a velocity holds on the computer's clock; 0: for ever.
         patience_s: How many seconds the robot may go in the world after a velocity; then the world stands still until
@@ -95,6 +95,8 @@ class RosRobot:
         self._eye = None if scene.line is None else Eye(mount, scene, seed)
         self._nearest_m: float = LIDARS[lidar].nearest_m  # type: ignore[attr-defined]
         self._farthest_m: float = LIDARS[lidar].farthest_m  # type: ignore[attr-defined]
+        self._beams: int = LIDARS[lidar].beams  # type: ignore[attr-defined]
+        self._angles_rad = [math.tau * beam / self._beams for beam in range(self._beams)]
         self._turn_s: float = 1.0 / LIDARS[lidar].nominal_hz  # type: ignore[attr-defined]
         self._encoding = encoding
         self._timeout_s = command_timeout_s
@@ -212,11 +214,13 @@ class RosRobot:
     def _scan(self, stamp_s: float) -> Scan:
         if self.is_scanner_covered:
             # Something is too near: who reads it stops.
-            ranges_m = np.full(BEAMS, -np.inf)
+            ranges_m = np.full(self._beams, -np.inf)
         else:
-            ranges_m = self.world.scan()
+            # The one of a beam for each degree is quicker.
+            is_whole = self._beams == SCAN_BEAMS
+            ranges_m = self.world.scan() if is_whole else np.array(self.world.ranges(self._angles_rad))
             if self._noise_m:
-                ranges_m += [self._chance.gauss(0.0, self._noise_m) for _ in range(BEAMS)]
+                ranges_m += [self._chance.gauss(0.0, self._noise_m) for _ in range(self._beams)]
         ranges_m[ranges_m > self._farthest_m] = np.inf
         ranges_m[ranges_m < self._nearest_m] = -np.inf
         return Scan(stamp_s, ranges_m.astype(np.float32), self._nearest_m, self._farthest_m, self._turn_s)

@@ -213,7 +213,7 @@ def parser(prog: str, description: str) -> argparse.ArgumentParser:
         "--lidar",
         choices=sorted(LIDARS),
         default="lds01",
-        help="how far it sees, and how often it turns; 360 beams in any case; default: %(default)s",
+        help="how far it sees, how often it turns, how many beams it has; default: %(default)s",
     )
     found.add_argument(
         "--encoding", choices=ENCODINGS, default="mono8", help="of the camera's pictures; default: %(default)s"

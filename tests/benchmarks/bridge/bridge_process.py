@@ -1,15 +1,17 @@
 """A bridge as `robosc-bridge run` makes it, which measures itself: in standby first, then running.
 
-Usage: bridge_process.py MODEL CONFIGURATION STANDBY_S RUNNING_S [WATCHERS]
+Usage: bridge_process.py MODEL CONFIGURATION STANDBY_S RUNNING_S [WATCHERS [PAGES]]
 
 Watchers take everything that the bridge shows, as soon as there is something new, and put the measurements of each
-snapshot into JSON as a remote face would.
+snapshot into JSON as a remote face would. Pages of the live view are open in processes of their own; what a browser
+does with what it is told is no part of them. Without any there is no live view.
 
 Prints one JSON document: by how much each decision was late, overruns, and how much of a processor the process took.
 """
 
 import json
 import logging
+import subprocess
 import sys
 import threading
 import time
@@ -23,6 +25,7 @@ from robosc_bridge.daemon.assembly import Machine, assemble
 from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.daemon.supervisors import Source, obtain
+from robosc_bridge.view import ViewFace, ViewSettings
 
 LIMIT_S = 60.0
 SETTLE_S = 1.0
@@ -73,6 +76,27 @@ class _Watcher:
         self._thread.join()
 
 
+class _Pages:
+    """The live view of a bridge, with so many pages open; without any, there is none."""
+
+    def __init__(self, machine: Machine, count: int) -> None:
+        self.messages: list[int] = []
+        self._face = ViewFace(machine.operations, ViewSettings("127.0.0.1:0")) if count else None
+        self._open: list[subprocess.Popen[str]] = []
+        if self._face is not None:
+            self._face.start()
+            line = [sys.executable, str(Path(__file__).with_name("open_page.py")), self._face.url]
+            for _ in range(count):
+                self._open.append(subprocess.Popen(line, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True))
+
+    def close(self) -> None:
+        """End them; each tells how many messages it got."""
+        for page in self._open:
+            self.messages.append(int(page.communicate(timeout=LIMIT_S)[0]))
+        if self._face is not None:
+            self._face.stop()
+
+
 def _await(machine: Machine, state: State) -> None:
     end_s = time.monotonic() + LIMIT_S
     while machine.daemon.state is not state:
@@ -94,7 +118,7 @@ def main() -> int:
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
     model, configuration_file = map(Path, sys.argv[1:3])
     standby_s, running_s = map(float, sys.argv[3:5])
-    watchers = int(sys.argv[5]) if len(sys.argv) > 5 else 0
+    watchers, count = (int(sys.argv[place]) if len(sys.argv) > place else 0 for place in (5, 6))
     loaded = load(configuration_file)
     supervisor = obtain(Source(model, Deployment.CONTROLLER, None, None), lambda text: None)
     ties = tie(supervisor.model, loaded.configuration, loaded.document)
@@ -105,6 +129,7 @@ def main() -> int:
     loop = threading.Thread(target=machine.run)
     loop.start()
     faces = [_Watcher(machine.operations.feed) for _ in range(watchers)]
+    pages = _Pages(machine, count)
     try:
         _await(machine, State.STANDBY)
         in_standby = _share(standby_s)
@@ -116,6 +141,7 @@ def main() -> int:
         late_s = list(noted_s)
         overruns = machine.daemon.overruns - overruns
     finally:
+        pages.close()
         machine.quit()
         loop.join()
         for face in faces:
@@ -126,6 +152,7 @@ def main() -> int:
         "standby": in_standby,
         "running": running,
         "snapshots": [face.snapshots for face in faces],
+        "messages": pages.messages,
         "problem": machine.daemon.problem,
     }
     sys.stdout.write(json.dumps(found) + "\n")

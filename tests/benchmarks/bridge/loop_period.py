@@ -1,8 +1,9 @@
 """How punctually the bridge decides, and how much of a processor it takes in standby and driving.
 
 A robot wanders through a simulated room. It is a process of its own at the far end of real pseudo-terminals, the bridge
-another one; they go before other programs where that is permitted. *Watchers* take all that the bridge shows. *Late*: a
-decision, against the schedule. *CPU*: user and system time of the whole bridge process over the time that passed.
+another one; they go before other programs where that is permitted. *Watchers* take all that the bridge shows; *pages*
+of its live view are open in processes of their own, which take what they are told and draw nothing. *Late*: a decision,
+against the schedule. *CPU*: user and system time of the whole bridge process over the time that passed.
 
 Usage: loop_period.py [SECONDS]
 """
@@ -35,18 +36,21 @@ from support.real_time import preferred  # noqa: E402  # rig adds its folder to 
 SECONDS = 30.0
 STANDBY_S = 5.0
 CASES = (
-    ("dynamixel", 0.010, 0),
-    ("dynamixel", 0.010, 1),
-    ("dynamixel", 0.020, 0),
-    ("opencr", 0.020, 0),
-    ("opencr", 0.020, 1),
+    ("dynamixel", 0.010, 0, 0),
+    ("dynamixel", 0.010, 1, 0),
+    ("dynamixel", 0.010, 0, 1),
+    ("dynamixel", 0.020, 0, 0),
+    ("opencr", 0.020, 0, 0),
+    ("opencr", 0.020, 1, 0),
+    ("opencr", 0.020, 0, 1),
 )
-"""Base, period, and how many watch."""
+"""Base, period, how many watch, and how many pages of the live view are open."""
 
 LIDAR = "lds02"
 
 HEADER = [
-    "base, period, watchers", "decisions", "late p50, ms", "p99, ms", "max, ms", "overruns", "CPU standby", "running",
+    "base, period, watchers, pages", "decisions", "late p50, ms", "p99, ms", "max, ms", "overruns", "CPU standby",
+    "running",
 ]  # fmt: skip
 
 
@@ -59,22 +63,26 @@ class Measured:
         overruns: Decisions that were left out.
         standby: Share of a processor.
         running: The same, driving.
+        messages: How many each page got.
     """
 
     late_s: tuple[float, ...]
     overruns: int
     standby: float
     running: float
+    messages: tuple[int, ...]
 
 
-def measured(base: str, period_s: float, watchers: int, seconds: float, standby_s: float = STANDBY_S) -> Measured:
+def measured(
+    base: str, period_s: float, watchers: int, pages: int, seconds: float, standby_s: float = STANDBY_S
+) -> Measured:
     """Measure one base at one period."""
     with preferred(), simulated("--base", base, "--lidar", LIDAR) as robot, tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "bridge.yaml"
         file.write_text(configuration(robot, base, LIDAR, period_s, WANDERER_CHANNELS))
         command = [
             sys.executable, str(Path(__file__).with_name("bridge_process.py")), str(WANDERER), str(file),
-            str(standby_s), str(seconds), str(watchers),
+            str(standby_s), str(seconds), str(watchers), str(pages),
         ]  # fmt: skip
         done = subprocess.run(
             command, stdout=subprocess.PIPE, text=True, check=True, env=environment(), timeout=seconds + 3 * LIMIT_S
@@ -82,12 +90,16 @@ def measured(base: str, period_s: float, watchers: int, seconds: float, standby_
     found = json.loads(done.stdout)
     if found["problem"]:
         raise RuntimeError(f"the robot was stopped: {found['problem']}")
-    return Measured(tuple(found["late_s"]), found["overruns"], found["standby"], found["running"])
+    if any(count < seconds for count in found["messages"]):
+        raise RuntimeError(f"a page was told next to nothing: {found['messages']} messages")
+    return Measured(
+        tuple(found["late_s"]), found["overruns"], found["standby"], found["running"], tuple(found["messages"])
+    )
 
 
-def _row(base: str, period_s: float, watchers: int, seconds: float) -> list[str]:
-    found = measured(base, period_s, watchers, seconds)
-    label = f"{base}, {period_s * 1e3:.0f} ms, {watchers}"
+def _row(base: str, period_s: float, watchers: int, pages: int, seconds: float) -> list[str]:
+    found = measured(base, period_s, watchers, pages, seconds)
+    label = f"{base}, {period_s * 1e3:.0f} ms, {watchers}, {pages}"
     shares = [f"{found.standby:.1%}", f"{found.running:.1%}"]
     return [label, str(len(found.late_s)), *spread(found.late_s), str(found.overruns), *shares]
 

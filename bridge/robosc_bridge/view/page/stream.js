@@ -14,7 +14,8 @@ const SIGNS = { __proto__: null, controllable: "◆", uncontrollable: "○", fau
 export function startStream() {
   const entries = new Entries();
   const box = byId("stream");
-  const spacer = byId("stream-rows");
+  const place = byId("stream-rows");
+  const spacer = byId("stream-space");
   const rows = new Map();
   const kinds = new Map();
   let isFollowing = true;
@@ -167,7 +168,7 @@ export function startStream() {
       const row = rows.get(entry.serial) ?? makeRow(entry);
       if (!row.isConnected) {
         rows.set(entry.serial, row);
-        spacer.append(row);
+        place.append(row);
       }
       row.style.top = `${i * rowHeight}px`;
       mark(row, "aria-posinset", i + 1);

@@ -14,7 +14,6 @@ from typing import Any
 from robosc.automata.plants import communication_plant
 from robosc.event_logs import LoggedRun
 from robosc.event_logs.stops import is_ended
-from robosc.execution.event_log import Entry
 from robosc.model.structure import CommunicationKind, Model
 from robosc.supervisor import Supervisor
 from robosc_bridge.daemon.states import Command
@@ -109,7 +108,7 @@ class LastTaken:
         documents: The entries.
     """
 
-    def __init__(self, lights: Lights, documents: Iterable[Entry]) -> None:
+    def __init__(self, lights: Lights, documents: Iterable[Mapping[str, Any]]) -> None:
         # How many entries there are after which a component has taken something, and what.
         self._taken: dict[str, tuple[list[int], list[int]]] = {}
         self._begins = [0]

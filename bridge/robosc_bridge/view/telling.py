@@ -201,7 +201,7 @@ class Lights:
         """The state is this one; an empty one is the initial state."""
         self._before = _states(components) or dict(self._initial)
 
-    def of(self, entry: Entry) -> Iterator[tuple[str, int]]:
+    def of(self, entry: Mapping[str, Any]) -> Iterator[tuple[str, int]]:
         """Components and numbers of the transitions of an entry."""
         kind = entry.get("kind")
         if "transitions" in entry:

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from support.browser import Visit, visit
-from support.live_view import PAGE, StandIn
+from support.live_view import PAGE, Message, StandIn
 from support.view_messages import component, definition, entry, events, graph, taken, update
 
 FRESHNESS_IS = "(word) => document.documentElement.dataset.freshness === word"
@@ -186,7 +186,7 @@ def test_names_that_objects_have_by_themselves_are_names(browser: Browser) -> No
         {"name": name, "component": name, "kind": "service", "identifier": "", "channel": ""} for name in OWN_OF_OBJECTS
     ]
     known = {"communications": {"__proto__": "waiting"}, "components": {"__proto__": {"state": "still"}}}
-    greeting = [
+    greeting: list[Message] = [
         definition(source="constructor", components=parts, communications=services, requests=[]),
         update(enabled=[], disabled=[], last={}, **known),
         events([entry(i, kind=name, event=name) for i, name in enumerate(OWN_OF_OBJECTS)]),

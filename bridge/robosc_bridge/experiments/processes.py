@@ -84,6 +84,16 @@ def environment() -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": paths, "PYTHONUNBUFFERED": "1", "PYTHONDONTWRITEBYTECODE": "1"}
 
 
+def _prefer(number: int) -> None:
+    """Let a process that has just begun a session go before others, where that is permitted."""
+    # Now it has one thread, whose priority the others will inherit.
+    with suppress(PermissionError, ProcessLookupError):
+        os.setpriority(os.PRIO_PROCESS, number, _PREFERRED)
+    # That counts within its session; where Linux shares processors out among sessions first, so does this, sched(7).
+    with suppress(OSError):
+        Path(f"/proc/{number}/autogroup").write_text(str(_PREFERRED), encoding="ascii")
+
+
 class Program:
     """A Python program that runs as long as the `with` block, and no longer than the thread that has entered it.
 
@@ -131,9 +141,7 @@ class Program:
         try:
             process = self._started(pipe)
             if self._is_preferred:
-                # Now it has one thread, whose priority the others will inherit.
-                with suppress(PermissionError, ProcessLookupError):
-                    os.setpriority(os.PRIO_PROCESS, process.pid, _PREFERRED)
+                _prefer(process.pid)
             if self._is_asked:
                 threading.Thread(target=self._listen, args=(process,), name=self.name, daemon=True).start()
         except BaseException:

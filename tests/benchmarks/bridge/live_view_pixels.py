@@ -119,9 +119,10 @@ def _states(robot: LiveRobot) -> dict[str, str]:
 
 
 def _until_states(changes: list[tuple[float, int, str]], seen: list[tuple[int, str, float]]) -> Iterator[float]:
-    """What was undone soon is left out: maybe no frame came before that, and the same state is seen much later."""
+    """What was undone soon, or undid, is left out: maybe no frame came between, and nothing was seen of either."""
     for number, (at_s, i, state) in enumerate(changes):
-        if any(j == i and then_s - at_s < KEPT_S for then_s, j, _ in changes[number + 1 :]):
+        others = (*changes[:number], *changes[number + 1 :])
+        if any(j == i and abs(then_s - at_s) < KEPT_S for then_s, j, _ in others):
             continue
         later = [ms for j, told, ms in seen if (j, told) == (i, state) and ms >= 1000 * at_s]
         yield later[0] - 1000 * at_s if later else math.inf

@@ -16,6 +16,8 @@ from dataclasses import replace
 from pathlib import Path
 from types import FrameType
 
+from robosc_bridge.configuration.document import MAXIMUM_BYTES, read_file
+from robosc_bridge.configuration.problems import ConfigurationError
 from robosc_bridge.simulated.commands import UnknownCommandError, obey
 from robosc_bridge.simulated.floor import Track, oval, parse_track
 from robosc_bridge.simulated.lidar import LIDARS
@@ -133,14 +135,27 @@ def _scene(options: argparse.Namespace) -> Scene:
         columns, rows = options.maze
         return replace(maze_scene(columns, rows, seed=options.seed), line=line)
     if options.walls is not None:
-        return Scene("walls", parse_walls(options.walls.read_text(encoding="utf-8")), line=line)
+        return Scene("walls", parse_walls(_text(options.walls)), line=line)
     return Scene("room", room(*options.room), line=line)
+
+
+def _text(path: Path) -> str:
+    try:
+        data = read_file(path)
+    except ConfigurationError as error:
+        raise ValueError(str(error)) from error
+    if len(data) > MAXIMUM_BYTES:
+        raise ValueError(f"{path}: is larger than {MAXIMUM_BYTES} bytes")
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        raise ValueError(f"{path}: is no text in UTF-8") from None
 
 
 def _track(name: str | None) -> Track | None:
     if name is None:
         return None
-    return oval() if name == OVAL else parse_track(Path(name).read_text(encoding="utf-8"))
+    return oval() if name == OVAL else parse_track(_text(Path(name)))
 
 
 def _side(text: str) -> float:

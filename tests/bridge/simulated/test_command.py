@@ -135,6 +135,8 @@ def test_it_goes_on_when_its_input_ends() -> None:
         (["--speed", "1000"], "the speed factor must be a positive number up to 100, and is 1000"),
         (["--walls", "/nowhere"], "No such file"),
         (["--line", "/nowhere"], "No such file"),
+        (["--line", "/dev/zero"], "/dev/zero: is not a regular file"),
+        (["--walls", "/proc/self/fd"], "is not a regular file"),
         (["--scene", "nowhere"], "there is no scene and no file 'nowhere'"),
         (["--scene", "/dev/null"], "is not a regular file"),
         (["--scene", "room", "--line", "oval"], "--line does not go with --scene"),

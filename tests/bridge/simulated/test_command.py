@@ -141,7 +141,7 @@ def test_it_goes_on_when_its_input_ends() -> None:
         (["--scene", "/dev/null"], "is not a regular file"),
         (["--scene", "room", "--line", "oval"], "--line does not go with --scene"),
         (["--motion", "/nowhere/motion"], "No such file"),
-        (["--line", "/dev/null"], "at least two points"),
+        (["--line", __file__], "line 1 of the track is not `x y`"),
         (["--camera-link", "/dev/null"], "something at /dev/null already"),
     ],
 )
@@ -154,6 +154,17 @@ def test_what_cannot_be_simulated_is_told(
     assert found.out == ""
     assert text in found.err
     assert found.err.count("\n") == 1
+
+
+def test_a_line_needs_two_points_and_files_are_bounded(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(signal, "signal", lambda number, handler: None)
+    file = tmp_path / "file"
+    for data, text in ((b"", "at least two points"), (b"#" * 300_000, "larger than"), (b"\xff", "no text in UTF-8")):
+        file.write_bytes(data)
+        assert main(["--line", str(file)]) == 1
+        assert text in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,11 @@
 """Domains of ROS 2 that nobody else on this machine takes: what is tried must not reach a robot."""
 
-import fcntl
 import itertools
 import os
-import tempfile
+import socket
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 LAST_DOMAIN = 101
 """Above it, ROS 2 would use ports that the system hands out."""
@@ -19,15 +18,13 @@ _used = itertools.count()
 
 @contextmanager
 def own_domain() -> Iterator[int]:
-    """A domain id that no other process of this user has from here, for as long as the block lasts.
+    """A domain id that no other process of this machine has from here, for as long as the block lasts.
 
     Never that of the environment, nor the one of TurtleBot3's handbook: robots may listen there.
 
     Raises:
         RuntimeError: Every domain is in use.
     """
-    folder = Path(tempfile.gettempdir()) / f"robosc-ros-domains-{os.getuid()}"
-    folder.mkdir(exist_ok=True)
     # Processes start looking at different places, so that they rarely meet. The next one of a process gets the next
     # domain: what the last one left behind may take a while to go.
     start = os.getpid() + 7 * next(_used)
@@ -35,9 +32,11 @@ def own_domain() -> Iterator[int]:
         domain = 1 + (start + offset) % LAST_DOMAIN
         if domain == _TURTLEBOT3 or str(domain) == os.environ.get("ROS_DOMAIN_ID"):
             continue
-        with (folder / str(domain)).open("w") as lock:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as taken:
             try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                # A name in no folder, unix(7): it is given back however the process ends.
+                if sys.platform == "linux":
+                    taken.bind(f"\0robosc-ros-domain-{domain}")
             except OSError:
                 continue
             yield domain

@@ -1,8 +1,10 @@
 """What is tried over ROS 2 stays away from robots."""
 
+import itertools
 import os
 import subprocess
 import sys
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -12,11 +14,21 @@ from robosc_bridge.experiments.domains import own_domain
 from robosc_bridge.experiments.ros2 import Ros2
 
 
-def test_two_have_two_domains_and_a_third_process_another(tmp_path: Path) -> None:
+def test_two_have_two_domains_and_another_process_a_third(monkeypatch: pytest.MonkeyPatch) -> None:
+    # All look for one from the same place on.
+    monkeypatch.setattr(domains, "_used", itertools.repeat(0))
+    monkeypatch.setattr(os, "getpid", lambda: 40)
+    code = """
+        import itertools, os
+        from robosc_bridge.experiments import domains
+        domains._used, os.getpid = itertools.repeat(0), lambda: 40
+        with domains.own_domain() as found:
+            print(found)
+    """
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     with own_domain() as first, own_domain() as second:
-        code = "from robosc_bridge.experiments.domains import own_domain\nwith own_domain() as found: print(found)"
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-        third = int(subprocess.check_output([sys.executable, "-c", code], env=environment, text=True))
+        command = [sys.executable, "-c", textwrap.dedent(code)]
+        third = int(subprocess.check_output(command, env=environment, text=True))
     assert len({first, second, third}) == 3
 
 

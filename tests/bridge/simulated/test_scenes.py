@@ -105,6 +105,14 @@ def test_a_maze_by_chance_is_another_one_for_each_seed() -> None:
     assert parsed(fixed, 1).walls.segments == parsed(fixed, 2).walls.segments
 
 
+def test_who_turns_round_the_mouth_of_the_spiral_is_at_its_goal() -> None:
+    goal = load_scene("maze-spiral").goal
+    assert goal is not None
+    assert goal.is_reached(1.8, 2.7)
+    assert goal.is_reached(2.2, 2.7)
+    assert not goal.is_reached(2.0, 2.5)
+
+
 @settings(deadline=None, max_examples=25)
 @given(st.integers(1, 6), st.integers(1, 6), st.integers(0, 1000))
 def test_a_maze_has_one_exit_and_its_goal_is_outside(columns: int, rows: int, seed: int) -> None:
@@ -115,6 +123,8 @@ def test_a_maze_has_one_exit_and_its_goal_is_outside(columns: int, rows: int, se
     # As long as all walls of a tree's maze less the gap.
     assert closed == pytest.approx(columns * (rows + 1) + rows * (columns + 1) - (columns * rows - 1) - 1)
     assert goal.y_m - goal.radius_m > rows - 0.5
+    # Who is 0.3 m from the corner of the way out, and turns around it.
+    assert all(goal.is_reached(goal.x_m + aside_m, rows - 0.5 + 0.2) for aside_m in (-0.2, 0.2))
     inside = scene.walls.cast(np.array([(goal.x_m, goal.y_m)]), np.array([(0.0, -1.0)]))
     assert inside[0] > 0.9
 

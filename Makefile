@@ -74,7 +74,8 @@ bindings: $(READY) ## regenerate the gRPC bindings
 lock: $(READY) ## choose new versions and write the locks
 	$(BIN)/pip-compile --quiet --upgrade --strip-extras --allow-unsafe --generate-hashes --all-build-deps \
 	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host \
-	  --extra server --extra client --extra ros2 --extra examples --extra bridge --extra plot --extra simulation --extra view --extra dev \
+	  --extra server --extra postgresql --extra dask --extra tracing --extra client --extra ros2 --extra examples \
+	  --extra bridge --extra plot --extra simulation --extra view --extra dev \
 	  --output-file requirements.lock pyproject.toml
 	$(BIN)/pip-compile --quiet --upgrade --strip-extras --allow-unsafe --generate-hashes \
 	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host \

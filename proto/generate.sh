@@ -5,4 +5,4 @@ set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 out=${1:-$here}
 exec "${PYTHON:-python3}" -m grpc_tools.protoc "-I$here" "--python_out=$out" "--pyi_out=$out" "--grpc_python_out=$out" \
-    robosc_api/v1/bridge.proto robosc_api/v1/synthesis.proto
+    robosc_api/v1/bridge.proto robosc_api/v1/jobs.proto robosc_api/v1/synthesis.proto

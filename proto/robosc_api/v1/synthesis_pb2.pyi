@@ -27,6 +27,16 @@ class SynthesisStatus(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     SYNTHESIS_STATUS_EMPTY: _ClassVar[SynthesisStatus]
     SYNTHESIS_STATUS_MODEL_ERRORS: _ClassVar[SynthesisStatus]
     SYNTHESIS_STATUS_UNSUPPORTED_MODEL: _ClassVar[SynthesisStatus]
+
+class VerificationStatus(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    VERIFICATION_STATUS_UNSPECIFIED: _ClassVar[VerificationStatus]
+    VERIFICATION_STATUS_PASSED: _ClassVar[VerificationStatus]
+    VERIFICATION_STATUS_FAILED: _ClassVar[VerificationStatus]
+    VERIFICATION_STATUS_NOT_CHECKED: _ClassVar[VerificationStatus]
+    VERIFICATION_STATUS_PROPERTY_ERRORS: _ClassVar[VerificationStatus]
+    VERIFICATION_STATUS_NO_SUPERVISOR: _ClassVar[VerificationStatus]
+    VERIFICATION_STATUS_UNSUPPORTED_MODEL: _ClassVar[VerificationStatus]
 SEVERITY_UNSPECIFIED: Severity
 SEVERITY_ERROR: Severity
 SEVERITY_WARNING: Severity
@@ -39,6 +49,13 @@ SYNTHESIS_STATUS_SUPERVISOR: SynthesisStatus
 SYNTHESIS_STATUS_EMPTY: SynthesisStatus
 SYNTHESIS_STATUS_MODEL_ERRORS: SynthesisStatus
 SYNTHESIS_STATUS_UNSUPPORTED_MODEL: SynthesisStatus
+VERIFICATION_STATUS_UNSPECIFIED: VerificationStatus
+VERIFICATION_STATUS_PASSED: VerificationStatus
+VERIFICATION_STATUS_FAILED: VerificationStatus
+VERIFICATION_STATUS_NOT_CHECKED: VerificationStatus
+VERIFICATION_STATUS_PROPERTY_ERRORS: VerificationStatus
+VERIFICATION_STATUS_NO_SUPERVISOR: VerificationStatus
+VERIFICATION_STATUS_UNSUPPORTED_MODEL: VerificationStatus
 
 class SourceFile(_message.Message):
     __slots__ = ("name", "text")
@@ -97,14 +114,18 @@ class Diagnostic(_message.Message):
     def __init__(self, severity: _Optional[_Union[Severity, str]] = ..., code: _Optional[str] = ..., message: _Optional[str] = ..., location: _Optional[_Union[Location, _Mapping]] = ..., mend: _Optional[str] = ..., related: _Optional[_Iterable[_Union[RelatedPlace, _Mapping]]] = ...) -> None: ...
 
 class SynthesisOptions(_message.Message):
-    __slots__ = ("deployment", "engine", "allow_livelock")
+    __slots__ = ("deployment", "engine", "allow_livelock", "allow_reordering", "maximum_nodes")
     DEPLOYMENT_FIELD_NUMBER: _ClassVar[int]
     ENGINE_FIELD_NUMBER: _ClassVar[int]
     ALLOW_LIVELOCK_FIELD_NUMBER: _ClassVar[int]
+    ALLOW_REORDERING_FIELD_NUMBER: _ClassVar[int]
+    MAXIMUM_NODES_FIELD_NUMBER: _ClassVar[int]
     deployment: Deployment
     engine: str
     allow_livelock: bool
-    def __init__(self, deployment: _Optional[_Union[Deployment, str]] = ..., engine: _Optional[str] = ..., allow_livelock: _Optional[bool] = ...) -> None: ...
+    allow_reordering: bool
+    maximum_nodes: int
+    def __init__(self, deployment: _Optional[_Union[Deployment, str]] = ..., engine: _Optional[str] = ..., allow_livelock: _Optional[bool] = ..., allow_reordering: _Optional[bool] = ..., maximum_nodes: _Optional[int] = ...) -> None: ...
 
 class CheckRequest(_message.Message):
     __slots__ = ("bundle",)
@@ -143,7 +164,7 @@ class Progress(_message.Message):
     def __init__(self, stage: _Optional[str] = ..., message: _Optional[str] = ...) -> None: ...
 
 class SynthesisResult(_message.Message):
-    __slots__ = ("status", "diagnostics", "supervisor", "reason", "summary", "statistics", "explanation")
+    __slots__ = ("status", "diagnostics", "supervisor", "reason", "summary", "statistics", "explanation", "supervisor_digest", "signature")
     STATUS_FIELD_NUMBER: _ClassVar[int]
     DIAGNOSTICS_FIELD_NUMBER: _ClassVar[int]
     SUPERVISOR_FIELD_NUMBER: _ClassVar[int]
@@ -151,6 +172,8 @@ class SynthesisResult(_message.Message):
     SUMMARY_FIELD_NUMBER: _ClassVar[int]
     STATISTICS_FIELD_NUMBER: _ClassVar[int]
     EXPLANATION_FIELD_NUMBER: _ClassVar[int]
+    SUPERVISOR_DIGEST_FIELD_NUMBER: _ClassVar[int]
+    SIGNATURE_FIELD_NUMBER: _ClassVar[int]
     status: SynthesisStatus
     diagnostics: _containers.RepeatedCompositeFieldContainer[Diagnostic]
     supervisor: bytes
@@ -158,7 +181,9 @@ class SynthesisResult(_message.Message):
     summary: Summary
     statistics: Statistics
     explanation: str
-    def __init__(self, status: _Optional[_Union[SynthesisStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., supervisor: _Optional[bytes] = ..., reason: _Optional[str] = ..., summary: _Optional[_Union[Summary, _Mapping]] = ..., statistics: _Optional[_Union[Statistics, _Mapping]] = ..., explanation: _Optional[str] = ...) -> None: ...
+    supervisor_digest: bytes
+    signature: bytes
+    def __init__(self, status: _Optional[_Union[SynthesisStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., supervisor: _Optional[bytes] = ..., reason: _Optional[str] = ..., summary: _Optional[_Union[Summary, _Mapping]] = ..., statistics: _Optional[_Union[Statistics, _Mapping]] = ..., explanation: _Optional[str] = ..., supervisor_digest: _Optional[bytes] = ..., signature: _Optional[bytes] = ...) -> None: ...
 
 class Statistics(_message.Message):
     __slots__ = ("engine", "state_bits", "iterations", "peak_nodes")
@@ -231,25 +256,197 @@ class SupervisedController(_message.Message):
     def __init__(self, package: _Optional[str] = ..., executable: _Optional[str] = ..., launch_file: _Optional[str] = ...) -> None: ...
 
 class GenerateResponse(_message.Message):
-    __slots__ = ("status", "diagnostics", "reason", "files", "explanation")
+    __slots__ = ("progress", "result", "chunk")
+    PROGRESS_FIELD_NUMBER: _ClassVar[int]
+    RESULT_FIELD_NUMBER: _ClassVar[int]
+    CHUNK_FIELD_NUMBER: _ClassVar[int]
+    progress: Progress
+    result: GenerationResult
+    chunk: FileChunk
+    def __init__(self, progress: _Optional[_Union[Progress, _Mapping]] = ..., result: _Optional[_Union[GenerationResult, _Mapping]] = ..., chunk: _Optional[_Union[FileChunk, _Mapping]] = ...) -> None: ...
+
+class GenerationResult(_message.Message):
+    __slots__ = ("status", "diagnostics", "reason", "files", "explanation", "digest")
     STATUS_FIELD_NUMBER: _ClassVar[int]
     DIAGNOSTICS_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
     FILES_FIELD_NUMBER: _ClassVar[int]
     EXPLANATION_FIELD_NUMBER: _ClassVar[int]
+    DIGEST_FIELD_NUMBER: _ClassVar[int]
     status: SynthesisStatus
     diagnostics: _containers.RepeatedCompositeFieldContainer[Diagnostic]
     reason: str
     files: _containers.RepeatedCompositeFieldContainer[GeneratedFile]
     explanation: str
-    def __init__(self, status: _Optional[_Union[SynthesisStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., reason: _Optional[str] = ..., files: _Optional[_Iterable[_Union[GeneratedFile, _Mapping]]] = ..., explanation: _Optional[str] = ...) -> None: ...
+    digest: bytes
+    def __init__(self, status: _Optional[_Union[SynthesisStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., reason: _Optional[str] = ..., files: _Optional[_Iterable[_Union[GeneratedFile, _Mapping]]] = ..., explanation: _Optional[str] = ..., digest: _Optional[bytes] = ...) -> None: ...
 
 class GeneratedFile(_message.Message):
-    __slots__ = ("path", "content", "executable")
+    __slots__ = ("path", "size", "digest", "executable")
     PATH_FIELD_NUMBER: _ClassVar[int]
-    CONTENT_FIELD_NUMBER: _ClassVar[int]
+    SIZE_FIELD_NUMBER: _ClassVar[int]
+    DIGEST_FIELD_NUMBER: _ClassVar[int]
     EXECUTABLE_FIELD_NUMBER: _ClassVar[int]
     path: str
-    content: str
+    size: int
+    digest: bytes
     executable: bool
-    def __init__(self, path: _Optional[str] = ..., content: _Optional[str] = ..., executable: _Optional[bool] = ...) -> None: ...
+    def __init__(self, path: _Optional[str] = ..., size: _Optional[int] = ..., digest: _Optional[bytes] = ..., executable: _Optional[bool] = ...) -> None: ...
+
+class FileChunk(_message.Message):
+    __slots__ = ("file", "offset", "data")
+    FILE_FIELD_NUMBER: _ClassVar[int]
+    OFFSET_FIELD_NUMBER: _ClassVar[int]
+    DATA_FIELD_NUMBER: _ClassVar[int]
+    file: int
+    offset: int
+    data: bytes
+    def __init__(self, file: _Optional[int] = ..., offset: _Optional[int] = ..., data: _Optional[bytes] = ...) -> None: ...
+
+class ExploreRequest(_message.Message):
+    __slots__ = ("bundle", "options", "maximum_states")
+    BUNDLE_FIELD_NUMBER: _ClassVar[int]
+    OPTIONS_FIELD_NUMBER: _ClassVar[int]
+    MAXIMUM_STATES_FIELD_NUMBER: _ClassVar[int]
+    bundle: Bundle
+    options: SynthesisOptions
+    maximum_states: int
+    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., maximum_states: _Optional[int] = ...) -> None: ...
+
+class ExploreResponse(_message.Message):
+    __slots__ = ("progress", "result", "chunk")
+    PROGRESS_FIELD_NUMBER: _ClassVar[int]
+    RESULT_FIELD_NUMBER: _ClassVar[int]
+    CHUNK_FIELD_NUMBER: _ClassVar[int]
+    progress: Progress
+    result: ExplorationResult
+    chunk: bytes
+    def __init__(self, progress: _Optional[_Union[Progress, _Mapping]] = ..., result: _Optional[_Union[ExplorationResult, _Mapping]] = ..., chunk: _Optional[bytes] = ...) -> None: ...
+
+class ExplorationResult(_message.Message):
+    __slots__ = ("status", "diagnostics", "reason", "explanation", "states", "transitions", "size", "digest")
+    STATUS_FIELD_NUMBER: _ClassVar[int]
+    DIAGNOSTICS_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    EXPLANATION_FIELD_NUMBER: _ClassVar[int]
+    STATES_FIELD_NUMBER: _ClassVar[int]
+    TRANSITIONS_FIELD_NUMBER: _ClassVar[int]
+    SIZE_FIELD_NUMBER: _ClassVar[int]
+    DIGEST_FIELD_NUMBER: _ClassVar[int]
+    status: SynthesisStatus
+    diagnostics: _containers.RepeatedCompositeFieldContainer[Diagnostic]
+    reason: str
+    explanation: str
+    states: int
+    transitions: int
+    size: int
+    digest: bytes
+    def __init__(self, status: _Optional[_Union[SynthesisStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., reason: _Optional[str] = ..., explanation: _Optional[str] = ..., states: _Optional[int] = ..., transitions: _Optional[int] = ..., size: _Optional[int] = ..., digest: _Optional[bytes] = ...) -> None: ...
+
+class VerifyRequest(_message.Message):
+    __slots__ = ("bundle", "options", "supervisor", "properties", "property_files", "maximum_states", "strict")
+    BUNDLE_FIELD_NUMBER: _ClassVar[int]
+    OPTIONS_FIELD_NUMBER: _ClassVar[int]
+    SUPERVISOR_FIELD_NUMBER: _ClassVar[int]
+    PROPERTIES_FIELD_NUMBER: _ClassVar[int]
+    PROPERTY_FILES_FIELD_NUMBER: _ClassVar[int]
+    MAXIMUM_STATES_FIELD_NUMBER: _ClassVar[int]
+    STRICT_FIELD_NUMBER: _ClassVar[int]
+    bundle: Bundle
+    options: SynthesisOptions
+    supervisor: bytes
+    properties: _containers.RepeatedScalarFieldContainer[str]
+    property_files: _containers.RepeatedCompositeFieldContainer[SourceFile]
+    maximum_states: int
+    strict: bool
+    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., supervisor: _Optional[bytes] = ..., properties: _Optional[_Iterable[str]] = ..., property_files: _Optional[_Iterable[_Union[SourceFile, _Mapping]]] = ..., maximum_states: _Optional[int] = ..., strict: _Optional[bool] = ...) -> None: ...
+
+class VerifyResponse(_message.Message):
+    __slots__ = ("progress", "result")
+    PROGRESS_FIELD_NUMBER: _ClassVar[int]
+    RESULT_FIELD_NUMBER: _ClassVar[int]
+    progress: Progress
+    result: VerificationResult
+    def __init__(self, progress: _Optional[_Union[Progress, _Mapping]] = ..., result: _Optional[_Union[VerificationResult, _Mapping]] = ...) -> None: ...
+
+class VerificationResult(_message.Message):
+    __slots__ = ("status", "diagnostics", "reason", "report")
+    STATUS_FIELD_NUMBER: _ClassVar[int]
+    DIAGNOSTICS_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    REPORT_FIELD_NUMBER: _ClassVar[int]
+    status: VerificationStatus
+    diagnostics: _containers.RepeatedCompositeFieldContainer[Diagnostic]
+    reason: str
+    report: str
+    def __init__(self, status: _Optional[_Union[VerificationStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., reason: _Optional[str] = ..., report: _Optional[str] = ...) -> None: ...
+
+class FormatRequest(_message.Message):
+    __slots__ = ("file",)
+    FILE_FIELD_NUMBER: _ClassVar[int]
+    file: SourceFile
+    def __init__(self, file: _Optional[_Union[SourceFile, _Mapping]] = ...) -> None: ...
+
+class FormatResponse(_message.Message):
+    __slots__ = ("text", "diagnostics")
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    DIAGNOSTICS_FIELD_NUMBER: _ClassVar[int]
+    text: str
+    diagnostics: _containers.RepeatedCompositeFieldContainer[Diagnostic]
+    def __init__(self, text: _Optional[str] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ...) -> None: ...
+
+class ListTargetsRequest(_message.Message):
+    __slots__ = ()
+    def __init__(self) -> None: ...
+
+class ListTargetsResponse(_message.Message):
+    __slots__ = ("targets",)
+    TARGETS_FIELD_NUMBER: _ClassVar[int]
+    targets: _containers.RepeatedCompositeFieldContainer[Target]
+    def __init__(self, targets: _Optional[_Iterable[_Union[Target, _Mapping]]] = ...) -> None: ...
+
+class Target(_message.Message):
+    __slots__ = ("name", "description")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    DESCRIPTION_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    description: str
+    def __init__(self, name: _Optional[str] = ..., description: _Optional[str] = ...) -> None: ...
+
+class GetVersionRequest(_message.Message):
+    __slots__ = ()
+    def __init__(self) -> None: ...
+
+class GetVersionResponse(_message.Message):
+    __slots__ = ("version", "engines", "limits")
+    VERSION_FIELD_NUMBER: _ClassVar[int]
+    ENGINES_FIELD_NUMBER: _ClassVar[int]
+    LIMITS_FIELD_NUMBER: _ClassVar[int]
+    version: str
+    engines: _containers.RepeatedScalarFieldContainer[str]
+    limits: ServerLimits
+    def __init__(self, version: _Optional[str] = ..., engines: _Optional[_Iterable[str]] = ..., limits: _Optional[_Union[ServerLimits, _Mapping]] = ...) -> None: ...
+
+class ServerLimits(_message.Message):
+    __slots__ = ("bundle_bytes", "bundle_files", "task_seconds", "task_cpu_seconds", "task_memory_bytes", "task_nodes", "result_bytes", "waiting_tasks", "waiting_tasks_per_caller", "retention_seconds")
+    BUNDLE_BYTES_FIELD_NUMBER: _ClassVar[int]
+    BUNDLE_FILES_FIELD_NUMBER: _ClassVar[int]
+    TASK_SECONDS_FIELD_NUMBER: _ClassVar[int]
+    TASK_CPU_SECONDS_FIELD_NUMBER: _ClassVar[int]
+    TASK_MEMORY_BYTES_FIELD_NUMBER: _ClassVar[int]
+    TASK_NODES_FIELD_NUMBER: _ClassVar[int]
+    RESULT_BYTES_FIELD_NUMBER: _ClassVar[int]
+    WAITING_TASKS_FIELD_NUMBER: _ClassVar[int]
+    WAITING_TASKS_PER_CALLER_FIELD_NUMBER: _ClassVar[int]
+    RETENTION_SECONDS_FIELD_NUMBER: _ClassVar[int]
+    bundle_bytes: int
+    bundle_files: int
+    task_seconds: float
+    task_cpu_seconds: float
+    task_memory_bytes: int
+    task_nodes: int
+    result_bytes: int
+    waiting_tasks: int
+    waiting_tasks_per_caller: int
+    retention_seconds: float
+    def __init__(self, bundle_bytes: _Optional[int] = ..., bundle_files: _Optional[int] = ..., task_seconds: _Optional[float] = ..., task_cpu_seconds: _Optional[float] = ..., task_memory_bytes: _Optional[int] = ..., task_nodes: _Optional[int] = ..., result_bytes: _Optional[int] = ..., waiting_tasks: _Optional[int] = ..., waiting_tasks_per_caller: _Optional[int] = ..., retention_seconds: _Optional[float] = ...) -> None: ...

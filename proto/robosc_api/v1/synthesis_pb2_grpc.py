@@ -26,7 +26,7 @@ if _version_not_supported:
 
 
 class SynthesisServiceStub:
-    """Supervisory controllers for robots, from RoboSC models.
+    """Supervisory controllers for robots, from RoboSC models. Each call needs the scope `synthesize`.
     """
 
     def __init__(self, channel):
@@ -45,15 +45,40 @@ class SynthesisServiceStub:
                 request_serializer=robosc__api_dot_v1_dot_synthesis__pb2.SynthesizeRequest.SerializeToString,
                 response_deserializer=robosc__api_dot_v1_dot_synthesis__pb2.SynthesizeResponse.FromString,
                 _registered_method=True)
-        self.Generate = channel.unary_unary(
+        self.Generate = channel.unary_stream(
                 '/robosc_api.v1.SynthesisService/Generate',
                 request_serializer=robosc__api_dot_v1_dot_synthesis__pb2.GenerateRequest.SerializeToString,
                 response_deserializer=robosc__api_dot_v1_dot_synthesis__pb2.GenerateResponse.FromString,
                 _registered_method=True)
+        self.Explore = channel.unary_stream(
+                '/robosc_api.v1.SynthesisService/Explore',
+                request_serializer=robosc__api_dot_v1_dot_synthesis__pb2.ExploreRequest.SerializeToString,
+                response_deserializer=robosc__api_dot_v1_dot_synthesis__pb2.ExploreResponse.FromString,
+                _registered_method=True)
+        self.Verify = channel.unary_stream(
+                '/robosc_api.v1.SynthesisService/Verify',
+                request_serializer=robosc__api_dot_v1_dot_synthesis__pb2.VerifyRequest.SerializeToString,
+                response_deserializer=robosc__api_dot_v1_dot_synthesis__pb2.VerifyResponse.FromString,
+                _registered_method=True)
+        self.Format = channel.unary_unary(
+                '/robosc_api.v1.SynthesisService/Format',
+                request_serializer=robosc__api_dot_v1_dot_synthesis__pb2.FormatRequest.SerializeToString,
+                response_deserializer=robosc__api_dot_v1_dot_synthesis__pb2.FormatResponse.FromString,
+                _registered_method=True)
+        self.ListTargets = channel.unary_unary(
+                '/robosc_api.v1.SynthesisService/ListTargets',
+                request_serializer=robosc__api_dot_v1_dot_synthesis__pb2.ListTargetsRequest.SerializeToString,
+                response_deserializer=robosc__api_dot_v1_dot_synthesis__pb2.ListTargetsResponse.FromString,
+                _registered_method=True)
+        self.GetVersion = channel.unary_unary(
+                '/robosc_api.v1.SynthesisService/GetVersion',
+                request_serializer=robosc__api_dot_v1_dot_synthesis__pb2.GetVersionRequest.SerializeToString,
+                response_deserializer=robosc__api_dot_v1_dot_synthesis__pb2.GetVersionResponse.FromString,
+                _registered_method=True)
 
 
 class SynthesisServiceServicer:
-    """Supervisory controllers for robots, from RoboSC models.
+    """Supervisory controllers for robots, from RoboSC models. Each call needs the scope `synthesize`.
     """
 
     def Check(self, request, context):
@@ -71,7 +96,45 @@ class SynthesisServiceServicer:
         raise NotImplementedError('Method not implemented!')
 
     def Generate(self, request, context):
-        """Synthesizes a supervisor and generates the files of a target around it.
+        """Synthesizes a supervisor and generates the files of a target around it: any number of progress reports, one result
+        that lists the files, then their content in chunks.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def Explore(self, request, context):
+        """Synthesizes a supervisor and explores everything that the robot may do under it: any number of progress reports,
+        one result, then the graph in chunks.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def Verify(self, request, context):
+        """Checks a supervisor against its model, or verifies properties of the robot under its supervisor: any number of
+        progress reports, then exactly one result.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def Format(self, request, context):
+        """Puts a text into its canonical layout.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def ListTargets(self, request, context):
+        """Lists what can be generated.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def GetVersion(self, request, context):
+        """Tells what this server is, and its limits.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -90,10 +153,35 @@ def add_SynthesisServiceServicer_to_server(servicer, server):
                     request_deserializer=robosc__api_dot_v1_dot_synthesis__pb2.SynthesizeRequest.FromString,
                     response_serializer=robosc__api_dot_v1_dot_synthesis__pb2.SynthesizeResponse.SerializeToString,
             ),
-            'Generate': grpc.unary_unary_rpc_method_handler(
+            'Generate': grpc.unary_stream_rpc_method_handler(
                     servicer.Generate,
                     request_deserializer=robosc__api_dot_v1_dot_synthesis__pb2.GenerateRequest.FromString,
                     response_serializer=robosc__api_dot_v1_dot_synthesis__pb2.GenerateResponse.SerializeToString,
+            ),
+            'Explore': grpc.unary_stream_rpc_method_handler(
+                    servicer.Explore,
+                    request_deserializer=robosc__api_dot_v1_dot_synthesis__pb2.ExploreRequest.FromString,
+                    response_serializer=robosc__api_dot_v1_dot_synthesis__pb2.ExploreResponse.SerializeToString,
+            ),
+            'Verify': grpc.unary_stream_rpc_method_handler(
+                    servicer.Verify,
+                    request_deserializer=robosc__api_dot_v1_dot_synthesis__pb2.VerifyRequest.FromString,
+                    response_serializer=robosc__api_dot_v1_dot_synthesis__pb2.VerifyResponse.SerializeToString,
+            ),
+            'Format': grpc.unary_unary_rpc_method_handler(
+                    servicer.Format,
+                    request_deserializer=robosc__api_dot_v1_dot_synthesis__pb2.FormatRequest.FromString,
+                    response_serializer=robosc__api_dot_v1_dot_synthesis__pb2.FormatResponse.SerializeToString,
+            ),
+            'ListTargets': grpc.unary_unary_rpc_method_handler(
+                    servicer.ListTargets,
+                    request_deserializer=robosc__api_dot_v1_dot_synthesis__pb2.ListTargetsRequest.FromString,
+                    response_serializer=robosc__api_dot_v1_dot_synthesis__pb2.ListTargetsResponse.SerializeToString,
+            ),
+            'GetVersion': grpc.unary_unary_rpc_method_handler(
+                    servicer.GetVersion,
+                    request_deserializer=robosc__api_dot_v1_dot_synthesis__pb2.GetVersionRequest.FromString,
+                    response_serializer=robosc__api_dot_v1_dot_synthesis__pb2.GetVersionResponse.SerializeToString,
             ),
     }
     generic_handler = grpc.method_handlers_generic_handler(
@@ -104,7 +192,7 @@ def add_SynthesisServiceServicer_to_server(servicer, server):
 
  # This class is part of an EXPERIMENTAL API.
 class SynthesisService:
-    """Supervisory controllers for robots, from RoboSC models.
+    """Supervisory controllers for robots, from RoboSC models. Each call needs the scope `synthesize`.
     """
 
     @staticmethod
@@ -172,12 +260,147 @@ class SynthesisService:
             wait_for_ready=None,
             timeout=None,
             metadata=None):
-        return grpc.experimental.unary_unary(
+        return grpc.experimental.unary_stream(
             request,
             target,
             '/robosc_api.v1.SynthesisService/Generate',
             robosc__api_dot_v1_dot_synthesis__pb2.GenerateRequest.SerializeToString,
             robosc__api_dot_v1_dot_synthesis__pb2.GenerateResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def Explore(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_stream(
+            request,
+            target,
+            '/robosc_api.v1.SynthesisService/Explore',
+            robosc__api_dot_v1_dot_synthesis__pb2.ExploreRequest.SerializeToString,
+            robosc__api_dot_v1_dot_synthesis__pb2.ExploreResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def Verify(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_stream(
+            request,
+            target,
+            '/robosc_api.v1.SynthesisService/Verify',
+            robosc__api_dot_v1_dot_synthesis__pb2.VerifyRequest.SerializeToString,
+            robosc__api_dot_v1_dot_synthesis__pb2.VerifyResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def Format(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/robosc_api.v1.SynthesisService/Format',
+            robosc__api_dot_v1_dot_synthesis__pb2.FormatRequest.SerializeToString,
+            robosc__api_dot_v1_dot_synthesis__pb2.FormatResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def ListTargets(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/robosc_api.v1.SynthesisService/ListTargets',
+            robosc__api_dot_v1_dot_synthesis__pb2.ListTargetsRequest.SerializeToString,
+            robosc__api_dot_v1_dot_synthesis__pb2.ListTargetsResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def GetVersion(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/robosc_api.v1.SynthesisService/GetVersion',
+            robosc__api_dot_v1_dot_synthesis__pb2.GetVersionRequest.SerializeToString,
+            robosc__api_dot_v1_dot_synthesis__pb2.GetVersionResponse.FromString,
             options,
             channel_credentials,
             insecure,

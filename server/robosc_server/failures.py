@@ -1,0 +1,79 @@
+"""How failures are told over gRPC: a status code, and details in the form of google.rpc (AIP-193)."""
+
+from typing import Any, NoReturn
+
+import grpc
+from google.protobuf import any_pb2, duration_pb2
+from google.rpc import error_details_pb2, status_pb2
+from grpc_status import rpc_status
+
+from robosc_server.tasks.task import Reason
+
+DOMAIN = "robosc"
+
+_CODES = {
+    Reason.MALFORMED_REQUEST: grpc.StatusCode.INVALID_ARGUMENT,
+    Reason.REQUEST_TOO_LARGE: grpc.StatusCode.RESOURCE_EXHAUSTED,
+    Reason.SERVER_BUSY: grpc.StatusCode.RESOURCE_EXHAUSTED,
+    Reason.QUOTA_EXCEEDED: grpc.StatusCode.RESOURCE_EXHAUSTED,
+    Reason.CPU_LIMIT: grpc.StatusCode.RESOURCE_EXHAUSTED,
+    Reason.MEMORY_LIMIT: grpc.StatusCode.RESOURCE_EXHAUSTED,
+    Reason.NODE_LIMIT: grpc.StatusCode.RESOURCE_EXHAUSTED,
+    Reason.RESULT_TOO_LARGE: grpc.StatusCode.RESOURCE_EXHAUSTED,
+    Reason.TIME_LIMIT: grpc.StatusCode.DEADLINE_EXCEEDED,
+    Reason.WORKER_DIED: grpc.StatusCode.INTERNAL,
+    Reason.INTERNAL_FAULT: grpc.StatusCode.INTERNAL,
+    Reason.SERVER_DIED: grpc.StatusCode.ABORTED,
+    Reason.SHUTTING_DOWN: grpc.StatusCode.UNAVAILABLE,
+    Reason.STORE_UNAVAILABLE: grpc.StatusCode.UNAVAILABLE,
+    Reason.WORKERS_UNAVAILABLE: grpc.StatusCode.UNAVAILABLE,
+    Reason.NO_SUCH_JOB: grpc.StatusCode.NOT_FOUND,
+    Reason.JOB_NOT_ENDED: grpc.StatusCode.FAILED_PRECONDITION,
+    Reason.JOB_HAS_FAILED: grpc.StatusCode.FAILED_PRECONDITION,
+    Reason.JOB_CANCELLED: grpc.StatusCode.FAILED_PRECONDITION,
+    Reason.IDEMPOTENCY_KEY_REUSED: grpc.StatusCode.ALREADY_EXISTS,
+    Reason.UNAUTHENTICATED: grpc.StatusCode.UNAUTHENTICATED,
+    Reason.PERMISSION_DENIED: grpc.StatusCode.PERMISSION_DENIED,
+}
+
+
+class RefusedError(Exception):
+    """A call that ends without an answer.
+
+    Attributes:
+        reason: Why.
+        message: One sentence for the caller.
+        retry_after_s: Seconds after which it may be worth another try; None: it is not.
+    """
+
+    def __init__(self, reason: Reason, message: str, retry_after_s: float | None = None) -> None:
+        super().__init__(message)
+        self.reason = reason
+        self.message = message
+        self.retry_after_s = retry_after_s
+
+
+def code_of(reason: Reason) -> grpc.StatusCode:
+    """The status code that tells a reason."""
+    return _CODES[reason]
+
+
+async def abort(context: Any, error: RefusedError) -> NoReturn:
+    """End a call (of grpc.aio) with what is to be told."""
+    code = code_of(error.reason)
+    details = [_packed(error_details_pb2.ErrorInfo(reason=error.reason, domain=DOMAIN))]
+    trailing: tuple[tuple[str, str], ...] = ()
+    if error.retry_after_s is not None:
+        delay = duration_pb2.Duration()
+        delay.FromNanoseconds(round(error.retry_after_s * 1e9))
+        details.append(_packed(error_details_pb2.RetryInfo(retry_delay=delay)))
+        trailing = (("retry-after", f"{error.retry_after_s:.3f}"),)
+    status = rpc_status.to_status(status_pb2.Status(code=code.value[0], message=error.message, details=details))
+    await context.abort(code, error.message, (*trailing, *status.trailing_metadata))
+    raise AssertionError("unreachable: abort raises")
+
+
+def _packed(message: Any) -> any_pb2.Any:
+    packed = any_pb2.Any()
+    packed.Pack(message)
+    return packed

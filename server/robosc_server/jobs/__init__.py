@@ -1,0 +1,1 @@
+"""Jobs: tasks that go on without their caller."""

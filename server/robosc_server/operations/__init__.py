@@ -1,0 +1,1 @@
+"""What operators need: settings, health, metrics, logs, traces."""

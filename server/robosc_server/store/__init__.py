@@ -1,0 +1,1 @@
+"""What is kept: jobs and results, in a database."""

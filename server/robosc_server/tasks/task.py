@@ -1,0 +1,112 @@
+"""Tasks as values: they travel between the server, its database and its workers, and need neither network nor core."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class TaskKind(StrEnum):
+    """What a task is; each has a message of the API for its request, and one for its responses."""
+
+    CHECK = "check"
+    SYNTHESIZE = "synthesize"
+    GENERATE = "generate"
+    EXPLORE = "explore"
+    VERIFY = "verify"
+    FORMAT = "format"
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A request that was looked at and accepted.
+
+    Attributes:
+        kind: What it is.
+        request: The request's message, serialized.
+        key: SHA-256 (64 hexadecimal digits) of all that decides the result: the kind, every file by name and content,
+            the options and the version of RoboSC.
+        main_file: Name of the main file, for lists.
+    """
+
+    kind: TaskKind
+    request: bytes
+    key: str
+    main_file: str
+
+
+@dataclass(frozen=True, slots=True)
+class TaskLimits:
+    """What one task may take.
+
+    Attributes:
+        seconds: By the clock, while a worker is at it.
+        cpu_seconds: Of a processor's time.
+        memory_bytes: Of address space, the worker's own included.
+        nodes: Of decision diagrams, all together.
+        result_bytes: Of all messages of the result.
+    """
+
+    seconds: float = 600.0
+    cpu_seconds: float = 600.0
+    memory_bytes: int = 2 * 2**30
+    nodes: int = 20_000_000
+    result_bytes: int = 64 * 2**20
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """Where the work is: a stage, and one short line."""
+
+    stage: str
+    message: str
+
+
+class Reason(StrEnum):
+    """Why something ended without a result: the reason of google.rpc.ErrorInfo."""
+
+    MALFORMED_REQUEST = "MALFORMED_REQUEST"
+    REQUEST_TOO_LARGE = "REQUEST_TOO_LARGE"
+    SERVER_BUSY = "SERVER_BUSY"
+    QUOTA_EXCEEDED = "QUOTA_EXCEEDED"
+    CPU_LIMIT = "CPU_LIMIT"
+    MEMORY_LIMIT = "MEMORY_LIMIT"
+    NODE_LIMIT = "NODE_LIMIT"
+    RESULT_TOO_LARGE = "RESULT_TOO_LARGE"
+    TIME_LIMIT = "TIME_LIMIT"
+    WORKER_DIED = "WORKER_DIED"
+    INTERNAL_FAULT = "INTERNAL_FAULT"
+    SERVER_DIED = "SERVER_DIED"
+    SHUTTING_DOWN = "SHUTTING_DOWN"
+    STORE_UNAVAILABLE = "STORE_UNAVAILABLE"
+    WORKERS_UNAVAILABLE = "WORKERS_UNAVAILABLE"
+    NO_SUCH_JOB = "NO_SUCH_JOB"
+    JOB_NOT_ENDED = "JOB_NOT_ENDED"
+    JOB_HAS_FAILED = "JOB_HAS_FAILED"
+    JOB_CANCELLED = "JOB_CANCELLED"
+    IDEMPOTENCY_KEY_REUSED = "IDEMPOTENCY_KEY_REUSED"
+    UNAUTHENTICATED = "UNAUTHENTICATED"
+    PERMISSION_DENIED = "PERMISSION_DENIED"
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """The responses that the task's method sends, without progress, each serialized; the same for the same key."""
+
+    messages: tuple[bytes, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A task that ended without a result.
+
+    Attributes:
+        reason: Why.
+        message: One sentence for the caller; nothing of the model in it.
+        details: For the log of the server alone, such as a traceback.
+    """
+
+    reason: Reason
+    message: str
+    details: str = ""
+
+
+type Outcome = Result | Failure

@@ -1,0 +1,30 @@
+"""Those who do tasks: processes of this machine, or of a cluster; each task in a process of its own, with limits."""
+
+from collections.abc import Awaitable, Callable
+from typing import Protocol
+
+from robosc_server.tasks.task import Outcome, Report, Task, TaskLimits
+
+type OnReport = Callable[[Report], Awaitable[None]]
+
+
+class WorkersError(Exception):
+    """No worker can be had; one sentence for the operator."""
+
+
+class Workers(Protocol):
+    """Some workers; an asynchronous context that starts and ends them."""
+
+    @property
+    def capacity(self) -> int:
+        """How many tasks they can be at, at once; may change."""
+
+    async def run(self, task: Task, limits: TaskLimits, on_report: OnReport) -> Outcome:
+        """The outcome of a task, begun at once: the caller sees to it that no more than `capacity` are under way.
+
+        Cancelling this kills the process that is at it, within 200 ms. A process that dies, or reaches a limit, is a
+        Failure, and harms no other task.
+
+        Raises:
+            WorkersError: No worker can be had (the cluster is away); the task has not begun, or was lost on the way.
+        """

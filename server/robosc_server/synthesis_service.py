@@ -19,7 +19,9 @@ from robosc_server.failures import RefusedError, abort, abort_with_fault
 from robosc_server.tasks.requests import RequestLimits, accepted
 from robosc_server.tasks.task import Reason, Report, Result, Task, TaskKind
 
-SERVICE_NAME = pb.DESCRIPTOR.services_by_name["SynthesisService"].full_name
+_SERVICE = pb.DESCRIPTOR.services_by_name["SynthesisService"]
+SERVICE_NAME = _SERVICE.full_name
+METHODS = tuple(method.name for method in _SERVICE.methods)
 
 SEND_TIMEOUT_S = 60.0
 """How long a caller may leave one message of a result unread."""

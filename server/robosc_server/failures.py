@@ -1,5 +1,7 @@
 """How failures are told over gRPC: a status code, and details in the form of google.rpc (AIP-193)."""
 
+import logging
+import secrets
 from typing import Any, NoReturn
 
 import grpc
@@ -7,7 +9,9 @@ from google.protobuf import any_pb2, duration_pb2
 from google.rpc import error_details_pb2, status_pb2
 from grpc_status import rpc_status
 
-from robosc_server.tasks.task import Reason
+from robosc_server.tasks.task import Failure, Reason
+
+_LOG = logging.getLogger(__name__)
 
 DOMAIN = "robosc"
 
@@ -71,6 +75,28 @@ async def abort(context: Any, error: RefusedError) -> NoReturn:
     status = rpc_status.to_status(status_pb2.Status(code=code.value[0], message=error.message, details=details))
     await context.abort(code, error.message, (*trailing, *status.trailing_metadata))
     raise AssertionError("unreachable: abort raises")
+
+
+async def abort_with_fault(context: Any, error: Exception) -> NoReturn:
+    """Log a fault of ours under an id, and tell the caller the id alone."""
+    fault = secrets.token_hex(4)
+    _LOG.error("fault %s", fault, exc_info=error)
+    await abort(context, RefusedError(Reason.INTERNAL_FAULT, fault_message(fault)))
+    raise AssertionError("unreachable: abort raises")
+
+
+def refused(failure: Failure) -> RefusedError:
+    """How a task that ended without a result is told to its caller; what only the log should know goes there."""
+    if not failure.details:
+        return RefusedError(failure.reason, failure.message)
+    fault = secrets.token_hex(4)
+    _LOG.error("fault %s: %s: %s", fault, failure.message, failure.details)
+    return RefusedError(failure.reason, f"{failure.message}; {fault_message(fault)}")
+
+
+def fault_message(fault: str) -> str:
+    """What a caller is told of a fault that is in the log under an id."""
+    return f"internal error {fault}, please report it with the server's log"
 
 
 def _packed(message: Any) -> any_pb2.Any:

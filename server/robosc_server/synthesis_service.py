@@ -11,11 +11,12 @@ from typing import Any, Protocol, Self
 
 import grpc
 import grpc.aio
+from google.protobuf.message import DecodeError
 
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_server.callers import caller_of
+from robosc_api.security import caller_of
 from robosc_server.failures import RefusedError
-from robosc_server.tasks.requests import RequestLimits, accepted
+from robosc_server.tasks.requests import NOT_A_MESSAGE, RequestLimits, accepted
 from robosc_server.tasks.task import Reason, Report, Result, Task, TaskKind
 
 _SERVICE = pb.DESCRIPTOR.services_by_name["SynthesisService"]
@@ -104,8 +105,8 @@ def _answering(request_type: Any, answer: bytes) -> Any:
     async def fixed(request: bytes, context: Context) -> bytes:
         try:
             request_type.FromString(request)
-        except ValueError as error:
-            raise RefusedError(Reason.MALFORMED_REQUEST, "the request is no message of this service") from error
+        except DecodeError as error:
+            raise RefusedError(Reason.MALFORMED_REQUEST, NOT_A_MESSAGE) from error
         return answer
 
     return fixed

@@ -14,7 +14,7 @@ from robosc_api.security.arguments import (
     server_security_of,
     written_token,
 )
-from robosc_api.security.callers import CALLER, ENTRY, caller_of, is_admin
+from robosc_api.security.callers import CALLER, ENTRY, is_admin
 from robosc_api.security.client import Credentials, check_credentials, open_channel
 from robosc_api.security.errors import SecurityError
 from robosc_api.security.guard import Guard, Rule
@@ -37,7 +37,6 @@ __all__ = [
     "add_port",
     "add_server_arguments",
     "add_token_arguments",
-    "caller_of",
     "check_credentials",
     "check_files",
     "check_listening",

@@ -63,21 +63,15 @@ async def abort(context: Any, error: RefusedError) -> NoReturn:
     raise AssertionError("unreachable: abort raises")
 
 
-async def abort_with_fault(context: Any, error: Exception) -> NoReturn:
-    """Log a fault of ours under an id, and tell the caller the id alone."""
-    await abort(context, RefusedError(Reason.INTERNAL_FAULT, fault_message(tell_fault(error))))
-    raise AssertionError("unreachable: abort raises")
-
-
 def refused(failure: Failure) -> RefusedError:
     """How a task that ended without a result is told to its caller; what only the log should know goes there."""
     if not failure.details:
         return RefusedError(failure.reason, failure.message)
     # How a worker died is the kernel's to tell; an exception in it may quote the model.
     fault = tell_fault(failure.details, failure.reason, is_ours=failure.reason is Reason.WORKER_DIED)
-    return RefusedError(failure.reason, f"{failure.message}; {fault_message(fault)}")
+    return RefusedError(failure.reason, f"{failure.message}; {fault_words(fault)}")
 
 
-def fault_message(fault: str) -> str:
-    """What a caller is told of a fault that is in the log under an id."""
-    return f"internal error {fault}, please report it with the server's log"
+def fault_words(identity: str) -> str:
+    """What a caller is told of a fault that the log has under an id."""
+    return f"internal error {identity}, please report it with the server's log"

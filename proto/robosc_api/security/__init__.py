@@ -14,8 +14,8 @@ from robosc_api.security.arguments import (
     server_security_of,
     written_token,
 )
-from robosc_api.security.callers import CALLER, ENTRY, is_admin
-from robosc_api.security.client import Credentials, check_credentials, open_channel
+from robosc_api.security.callers import CALLER, ENTRY, caller_of, is_admin
+from robosc_api.security.client import Credentials, check_credentials, open_async_channel, open_channel
 from robosc_api.security.errors import SecurityError
 from robosc_api.security.guard import Guard, Rule
 from robosc_api.security.listening import ServerSecurity, add_port, check_files, check_listening
@@ -37,6 +37,7 @@ __all__ = [
     "add_port",
     "add_server_arguments",
     "add_token_arguments",
+    "caller_of",
     "check_credentials",
     "check_files",
     "check_listening",
@@ -46,6 +47,7 @@ __all__ = [
     "is_loopback_peer",
     "joined",
     "make_token",
+    "open_async_channel",
     "open_channel",
     "server_security_of",
     "written_token",

@@ -15,7 +15,8 @@ import structlog
 from robosc_api.failures import reason_of
 from robosc_api.security import CALLER
 from robosc_api.streams import write_responses
-from robosc_server.failures import RefusedError, abort, abort_with_fault, code_of
+from robosc_server.failures import RefusedError, abort, code_of, fault_words
+from robosc_server.operations.logs import tell_fault
 from robosc_server.operations.metrics import MethodMetrics, Metrics
 from robosc_server.operations.request_ids import HEADER, REQUEST_ID, request_id_of
 from robosc_server.operations.tracing import NO_TRACING, Tracing
@@ -115,7 +116,7 @@ class CallInterceptor(grpc.aio.ServerInterceptor):
                 raise
             except Exception as error:
                 code = grpc.StatusCode.INTERNAL
-                await abort_with_fault(context, error)
+                await abort(context, fault_of(error))
             finally:
                 metrics.under_way -= 1
                 self._ended(method, metrics, context, code, time.perf_counter() - begun_s)
@@ -172,3 +173,12 @@ def _code_of(context: Any) -> grpc.StatusCode:
 def _refuse(method: str) -> None:
     if not method.startswith(_HEALTH):
         raise RefusedError(Reason.SHUTTING_DOWN, "the server ends; another one may answer", _REFUSED_RETRY_S)
+
+
+def fault_of(fault: BaseException | str) -> RefusedError:
+    """What a caller is told of a fault of ours, which the log has from now on.
+
+    Args:
+        fault: It, or a traceback of it from another process.
+    """
+    return RefusedError(Reason.INTERNAL_FAULT, fault_words(tell_fault(fault)))

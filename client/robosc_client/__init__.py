@@ -1,4 +1,4 @@
-"""A typed client of the RoboSC service.
+"""A typed client of the RoboSC service, for threads (`Client`) and for asyncio (`AsyncClient`).
 
 The names are imported on use: the command must be able to answer Ctrl-C before gRPC is loaded.
 """
@@ -7,47 +7,123 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from robosc_client.aio import AsyncClient
     from robosc_client.client import Client
     from robosc_client.errors import (
         ClientError,
         CredentialsError,
         DeadlineError,
+        JobError,
         RequestRefusedError,
+        ServerBusyError,
         ServerUnavailableError,
         ServiceError,
     )
-    from robosc_client.results import Generation, Progress, Statistics, Summary, Synthesis, SynthesisStatus
+    from robosc_client.jobs import Job, JobFailure, JobState, Submission, TaskKind
+    from robosc_client.results import (
+        Exploration,
+        Formatted,
+        Generation,
+        Progress,
+        ServerInfo,
+        ServerLimits,
+        StateGraph,
+        StateValues,
+        Statistics,
+        Summary,
+        Synthesis,
+        SynthesisStatus,
+        TaskResult,
+        Verification,
+        VerificationStatus,
+    )
+    from robosc_client.retry import NO_RETRIES, RetryPolicy
+    from robosc_client.tasks import Check, Explore, Format, Generate, SynthesisOptions, Synthesize, Task, Verify
 
 _HOMES = {
+    "AsyncClient": "aio",
+    "Check": "tasks",
     "Client": "client",
     "ClientError": "errors",
     "CredentialsError": "errors",
     "DeadlineError": "errors",
+    "Exploration": "results",
+    "Explore": "tasks",
+    "Format": "tasks",
+    "Formatted": "results",
+    "Generate": "tasks",
     "Generation": "results",
+    "Job": "jobs",
+    "JobError": "errors",
+    "JobFailure": "jobs",
+    "JobState": "jobs",
+    "NO_RETRIES": "retry",
     "Progress": "results",
     "RequestRefusedError": "errors",
+    "RetryPolicy": "retry",
+    "ServerBusyError": "errors",
+    "ServerInfo": "results",
+    "ServerLimits": "results",
     "ServerUnavailableError": "errors",
     "ServiceError": "errors",
+    "StateGraph": "results",
+    "StateValues": "results",
     "Statistics": "results",
+    "Submission": "jobs",
     "Summary": "results",
     "Synthesis": "results",
+    "SynthesisOptions": "tasks",
     "SynthesisStatus": "results",
+    "Synthesize": "tasks",
+    "Task": "tasks",
+    "TaskKind": "jobs",
+    "TaskResult": "results",
+    "Verification": "results",
+    "VerificationStatus": "results",
+    "Verify": "tasks",
 }
 
 __all__ = [
+    "NO_RETRIES",
+    "AsyncClient",
+    "Check",
     "Client",
     "ClientError",
     "CredentialsError",
     "DeadlineError",
+    "Exploration",
+    "Explore",
+    "Format",
+    "Formatted",
+    "Generate",
     "Generation",
+    "Job",
+    "JobError",
+    "JobFailure",
+    "JobState",
     "Progress",
     "RequestRefusedError",
+    "RetryPolicy",
+    "ServerBusyError",
+    "ServerInfo",
+    "ServerLimits",
     "ServerUnavailableError",
     "ServiceError",
+    "StateGraph",
+    "StateValues",
     "Statistics",
+    "Submission",
     "Summary",
     "Synthesis",
+    "SynthesisOptions",
     "SynthesisStatus",
+    "Synthesize",
+    "Task",
+    "TaskKind",
+    "TaskResult",
+    "Verification",
+    "VerificationStatus",
+    "Verify",
 ]
 
 

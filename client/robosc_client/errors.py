@@ -4,17 +4,28 @@ ClientError
 |-- ServerUnavailableError   nobody answers at the address     (also a ConnectionError)
 |-- CredentialsError         a certificate, key or token cannot be used
 |-- DeadlineError            no result in time                 (also a TimeoutError)
-|-- RequestRefusedError      the server refuses the request: malformed, too large, too busy, not allowed
+|-- RequestRefusedError      the server refuses the request: malformed, too large, not allowed, beyond its limits
+|   `-- ServerBusyError      it may take it later
+|-- JobError                 a job is not there, has no result, or cannot be made
 `-- ServiceError             the server failed, or answered what no RoboSC server answers
 """
 
 
 class ClientError(Exception):
-    """Root of every error of the client; its text is one sentence for people."""
+    """Root of every error of the client; its text is one sentence for people.
+
+    Attributes:
+        reason: Why, in the server's words: a word such as `SERVER_BUSY`, documented in the API; empty where the server
+            has told none.
+    """
+
+    def __init__(self, message: str, reason: str = "") -> None:
+        super().__init__(message)
+        self.reason = reason
 
 
 class ServerUnavailableError(ClientError, ConnectionError):
-    """Nobody answers at the address, or the connection was lost."""
+    """Nobody answers at the address, the connection was lost, or the server is about to end."""
 
 
 class CredentialsError(ClientError):
@@ -26,8 +37,29 @@ class DeadlineError(ClientError, TimeoutError):
 
 
 class RequestRefusedError(ClientError):
-    """The server refuses the request."""
+    """The server refuses the request, or gave it up for what it takes."""
+
+
+class ServerBusyError(RequestRefusedError):
+    """The server has too much to do, or this caller asks for too much; later may be better.
+
+    Attributes:
+        retry_after_s: When the server would be asked again; None: it has not told.
+    """
+
+    def __init__(self, message: str, reason: str = "", retry_after_s: float | None = None) -> None:
+        super().__init__(message, reason)
+        self.retry_after_s = retry_after_s
+
+
+class JobError(ClientError):
+    """A job is not there, has no result, or its idempotency key was used for another task; `reason` says which."""
 
 
 class ServiceError(ClientError):
     """The server failed, or answered what no RoboSC server answers."""
+
+
+def malformed(what: str) -> ServiceError:
+    """The error for an answer that no RoboSC server gives."""
+    return ServiceError(f"the server's answer is malformed: {what}")

@@ -28,7 +28,7 @@ from robosc.model.structure import Deployment
 from robosc.source import Bundle
 from robosc.supervisor import Made, MadeStatus, decode
 from robosc_api.security import add_client_arguments, credentials_of
-from robosc_client import Client, ClientError, Generation, ServiceError, Synthesis, SynthesisStatus
+from robosc_client import Client, ClientError, Generation, ServiceError, Synthesis, SynthesisOptions, SynthesisStatus
 
 _EPILOG = """\
 exit status:
@@ -139,9 +139,7 @@ def _synth(arguments: argparse.Namespace, client: Client) -> int:
     try:
         synthesis = client.synthesize(
             bundle,
-            deployment=Deployment(arguments.deployment),
-            engine=arguments.engine,
-            allow_livelock=arguments.allow_livelock,
+            _options(arguments),
             deadline_s=arguments.deadline,
             on_progress=lambda progress: line.show(f"{progress.stage}: {progress.message}"),
         )
@@ -154,17 +152,17 @@ def _synth(arguments: argparse.Namespace, client: Client) -> int:
 def _generate(arguments: argparse.Namespace, client: Client) -> int:
     options = generate_options(arguments)
     bundle: Bundle = read_bundle(arguments)
-    generation = client.generate(
-        bundle,
-        target=arguments.target,
-        options=options,
+    generation = client.generate(bundle, arguments.target, options, _options(arguments), deadline_s=arguments.deadline)
+    made = _made(generation, b"")
+    return report_generated(arguments, made, generation.files, bundle)
+
+
+def _options(arguments: argparse.Namespace) -> SynthesisOptions:
+    return SynthesisOptions(
         deployment=Deployment(arguments.deployment),
         engine=arguments.engine,
         allow_livelock=arguments.allow_livelock,
-        deadline_s=arguments.deadline,
     )
-    made = _made(generation, b"")
-    return report_generated(arguments, made, generation.files, bundle)
 
 
 def _made(result: Synthesis | Generation, content: bytes) -> Made:

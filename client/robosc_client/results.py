@@ -1,10 +1,15 @@
 """What the service answers, as values."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any
+
+import msgspec
 
 from robosc.errors import Diagnostic
 from robosc.explanation import EmptyExplanation
+from robosc.expressions import Value
 from robosc.targets import GeneratedFiles
 
 
@@ -23,7 +28,7 @@ class Progress:
     """Where long work is.
 
     Attributes:
-        stage: `check`, `synthesis` or `verification`.
+        stage: `check`, `synthesis`, `verification` or `controller`.
         message: One short line.
     """
 
@@ -77,11 +82,13 @@ class Synthesis:
         status: How it ended.
         diagnostics: Every finding about the model, sorted by place.
         reason: Why there is no supervisor, in one sentence; empty where there is one.
-        supervisor: The supervisor's file (`.rsup`); empty where there is none. Untrusted: decode it with
-            `robosc.supervisor.decode`, which validates it.
+        supervisor: The supervisor's file (`.rsup`), as the server meant it: its digest was checked; empty where there
+            is none. Untrusted: decode it with `robosc.supervisor.decode`, which validates it.
         summary: The supervisor in figures and words, or None where there is none.
         statistics: Figures of the work, or None where there was no synthesis.
         explanation: What is to blame that no supervisor exists, or None where there is nothing to explain.
+        signature: Content of the file's signature (`.rsup.sig`), as the server made it; empty where it signs nothing.
+            Untrusted: `robosc.signatures.signer` tells whose it is.
     """
 
     status: SynthesisStatus
@@ -91,6 +98,7 @@ class Synthesis:
     summary: Summary | None
     statistics: Statistics | None
     explanation: EmptyExplanation | None = None
+    signature: bytes = b""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +109,8 @@ class Generation:
         status: How the synthesis ended.
         diagnostics: Every finding about the model, sorted by place.
         reason: Why there are no files, in one sentence; empty where there are.
-        files: The files, or None where there are none; `robosc.targets.write_files` writes them.
+        files: The files, or None where there are none; `robosc.targets.write_files` writes them. Their digests and
+            names were checked.
         explanation: What is to blame that no supervisor exists, or None where there is nothing to explain.
     """
 
@@ -110,3 +119,144 @@ class Generation:
     reason: str
     files: GeneratedFiles | None
     explanation: EmptyExplanation | None = None
+
+
+class StateValues(msgspec.Struct, frozen=True, gc=False):
+    """One state of the robot under its supervisor.
+
+    Attributes:
+        components: State of every component with a behaviour, by its name.
+        variables: Value of every synthesis variable, by `Component.variable`.
+        communications: Where every service and action is, by its name.
+        enabled: Events that can happen here, sorted by name.
+    """
+
+    components: dict[str, str]
+    variables: dict[str, Value]
+    communications: dict[str, str]
+    enabled: tuple[str, ...]
+
+
+class StateGraph(msgspec.Struct, frozen=True):
+    """Everything that the robot may do under its supervisor.
+
+    Attributes:
+        initial: Number of the initial state.
+        states: The states; a state's number is its place.
+        transitions: State, event, state.
+    """
+
+    initial: int
+    states: tuple[StateValues, ...]
+    transitions: tuple[tuple[int, str, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Exploration:
+    """How an exploration ended.
+
+    Attributes:
+        status: How the synthesis ended.
+        diagnostics: Every finding about the model, sorted by place.
+        reason: Why there is no graph, in one sentence; empty where there is one.
+        graph: The graph, or None.
+        explanation: What is to blame that no supervisor exists, or None where there is nothing to explain.
+    """
+
+    status: SynthesisStatus
+    diagnostics: tuple[Diagnostic, ...]
+    reason: str
+    graph: StateGraph | None
+    explanation: EmptyExplanation | None = None
+
+
+class VerificationStatus(StrEnum):
+    """What a verification found."""
+
+    PASSED = "passed"
+    FAILED = "failed"
+    NOT_CHECKED = "not checked"
+    """Nothing is wrong as far as was looked, and not everything could be."""
+    PROPERTY_ERRORS = "property errors"
+    """A property cannot be understood: the diagnostics tell."""
+    NO_SUPERVISOR = "no supervisor"
+    """The model has errors, or no supervisor exists."""
+    UNSUPPORTED_MODEL = "unsupported model"
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """How a verification ended.
+
+    Attributes:
+        status: What was found.
+        diagnostics: Every finding about the model or the properties, sorted by place.
+        reason: Why there is no verdict, in one sentence; empty where there is one.
+        report: What `robosc verify --json` prints, as values.
+    """
+
+    status: VerificationStatus
+    diagnostics: tuple[Diagnostic, ...]
+    reason: str
+    report: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Formatted:
+    """A text in its canonical layout.
+
+    Attributes:
+        text: The text, which differs from the one given in its layout alone; None where that has syntax errors.
+        diagnostics: The syntax errors.
+    """
+
+    text: str | None
+    diagnostics: tuple[Diagnostic, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ServerLimits:
+    """What a server takes and gives.
+
+    Attributes:
+        bundle_bytes: Of all names and texts of a bundle.
+        bundle_files: Files of a bundle.
+        task_seconds: By the clock, of one task.
+        task_cpu_seconds: Of a processor's time, of one task.
+        task_memory_bytes: Of memory, of one task.
+        task_nodes: Of decision diagrams, of one task.
+        result_bytes: Of one result.
+        waiting_tasks: That may wait, of all callers together.
+        waiting_tasks_per_caller: That may wait, of one caller.
+        retention_seconds: That a job and its result are kept after its end.
+    """
+
+    bundle_bytes: int
+    bundle_files: int
+    task_seconds: float
+    task_cpu_seconds: float
+    task_memory_bytes: int
+    task_nodes: int
+    result_bytes: int
+    waiting_tasks: int
+    waiting_tasks_per_caller: int
+    retention_seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class ServerInfo:
+    """What a server is.
+
+    Attributes:
+        version: Of RoboSC.
+        engines: For decision diagrams, the fastest first.
+        limits: What it takes and gives.
+    """
+
+    version: str
+    engines: tuple[str, ...]
+    limits: ServerLimits
+
+
+type TaskResult = tuple[Diagnostic, ...] | Synthesis | Generation | Exploration | Verification | Formatted
+"""What a task's job gives: the findings for a check, else what the method of the client returns."""

@@ -5,7 +5,8 @@ import sys
 from pathlib import Path
 
 from robosc.cli.arguments import add_model_arguments, read_bundle
-from robosc.cli.output import ExitCode, diagnostics_json, print_diagnostics, print_json, write_bytes
+from robosc.cli.output import ExitCode, print_diagnostics, print_json, write_bytes
+from robosc.json_documents import diagnostics_json
 
 
 def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:

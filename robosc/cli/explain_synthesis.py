@@ -11,7 +11,8 @@ from robosc.cli.arguments import (
     engine_options,
     read_bundle,
 )
-from robosc.cli.output import ExitCode, ProgressLine, diagnostics_json, print_json
+from robosc.cli.output import ExitCode, ProgressLine, print_json
+from robosc.json_documents import diagnostics_json
 from robosc.model.structure import Deployment
 
 _EPILOG = """\

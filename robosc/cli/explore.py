@@ -5,7 +5,8 @@ import sys
 
 from robosc.cli import synth
 from robosc.cli.arguments import add_deployment_argument, add_engine_options, add_model_arguments, read_bundle
-from robosc.cli.output import ExitCode, diagnostics_json, print_json
+from robosc.cli.output import ExitCode, print_json
+from robosc.json_documents import diagnostics_json
 
 DEFAULT_LIMIT = 100_000
 

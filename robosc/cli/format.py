@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from robosc.cli.output import ExitCode, UsageError, diagnostics_json, print_diagnostics, print_json, write_bytes
+from robosc.cli.output import ExitCode, UsageError, print_diagnostics, print_json, write_bytes
 from robosc.errors import Diagnostic, LanguageError, Severity
+from robosc.json_documents import diagnostics_json
 from robosc.source import Bundle, Location, SourceFile
 
 _STANDARD_INPUT = "-"

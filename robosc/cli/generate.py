@@ -13,7 +13,8 @@ from robosc.cli.arguments import (
     add_model_arguments,
     read_bundle,
 )
-from robosc.cli.output import ExitCode, UsageError, diagnostics_json, print_json
+from robosc.cli.output import ExitCode, UsageError, print_json
+from robosc.json_documents import diagnostics_json
 from robosc.source import Bundle
 
 if TYPE_CHECKING:

@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING
 
 from robosc.cli import synth
 from robosc.cli.arguments import read_bundle
-from robosc.cli.output import diagnostics_json, print_json
+from robosc.cli.output import print_json
 from robosc.cli.sign import read_supervisor
+from robosc.json_documents import diagnostics_json
 from robosc.model.structure import Deployment
 
 if TYPE_CHECKING:

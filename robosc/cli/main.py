@@ -25,17 +25,10 @@ from robosc.cli import (
 )
 from robosc.cli import format as format_
 from robosc.cli.arguments import Parser, WrongArguments
-from robosc.cli.output import (
-    CommandError,
-    ExitCode,
-    counts_text,
-    diagnostics_json,
-    prepare_streams,
-    print_diagnostics,
-    print_json,
-)
+from robosc.cli.output import CommandError, ExitCode, counts_text, prepare_streams, print_diagnostics, print_json
 from robosc.cli.plugins import Plugin, wanted_plugins
 from robosc.errors import Diagnostic, LanguageError, RoboscError
+from robosc.json_documents import diagnostics_json
 from robosc.source import visible
 
 _COMMANDS = (

@@ -8,7 +8,6 @@ goes to standard output and holds the findings too. Where a command cannot do wh
 import codecs
 import errno
 import io
-import json
 import os
 import sys
 import tempfile
@@ -18,6 +17,7 @@ from pathlib import Path
 from typing import TextIO
 
 from robosc.errors import Diagnostic, Severity
+from robosc.json_documents import counts, json_text
 from robosc.source import Bundle
 
 
@@ -67,8 +67,7 @@ def print_json(document: Mapping[str, object]) -> None:
     """One JSON document on standard output, keys in the order given."""
     # What cannot be encoded is escaped, and in JSON by JSON's own rules.
     is_unicode = codecs.lookup(sys.stdout.encoding or "ascii").name.startswith("utf")
-    text = json.dumps(document, indent=2, ensure_ascii=not is_unicode, allow_nan=False)
-    sys.stdout.write(text + "\n")
+    sys.stdout.write(json_text(document, is_ascii=not is_unicode))
 
 
 def print_diagnostics(diagnostics: Sequence[Diagnostic], bundle: Bundle | None) -> None:
@@ -83,20 +82,10 @@ def print_diagnostics(diagnostics: Sequence[Diagnostic], bundle: Bundle | None) 
         sys.stderr.write(f"{counts_text(diagnostics)}{hint}\n")
 
 
-def counts(diagnostics: Sequence[Diagnostic]) -> dict[str, int]:
-    """How many errors, warnings and notes there are."""
-    return {f"{severity}s": sum(diagnostic.severity is severity for diagnostic in diagnostics) for severity in Severity}
-
-
 def counts_text(diagnostics: Sequence[Diagnostic]) -> str:
     """For instance `2 errors, 1 warning`."""
     parts = [f"{count} {name if count != 1 else name[:-1]}" for name, count in counts(diagnostics).items() if count]
     return ", ".join(parts) or "no findings"
-
-
-def diagnostics_json(diagnostics: Sequence[Diagnostic]) -> dict[str, object]:
-    """The findings and their counts as JSON values."""
-    return {**counts(diagnostics), "diagnostics": [diagnostic.to_json() for diagnostic in diagnostics]}
 
 
 def has_errors(diagnostics: Sequence[Diagnostic], *, strict: bool = False) -> bool:

@@ -8,15 +8,9 @@ from typing import TYPE_CHECKING
 
 from robosc.cli import synth
 from robosc.cli.arguments import engine_options, read_bundle
-from robosc.cli.output import (
-    ExitCode,
-    ProgressLine,
-    UsageError,
-    diagnostics_json,
-    print_diagnostics,
-    print_json,
-)
+from robosc.cli.output import ExitCode, ProgressLine, UsageError, print_diagnostics, print_json
 from robosc.errors import LanguageError
+from robosc.json_documents import diagnostics_json
 from robosc.source import Bundle, SourceFile
 
 if TYPE_CHECKING:
@@ -88,7 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
 def verify(arguments: argparse.Namespace, supervisor: "Supervisor") -> int:
     """Verify the properties that the arguments name in a supervisor's controlled system, and print the verdicts."""
     from robosc.automata import to_automata
-    from robosc.model_checking import verdict_json, verdict_text
+    from robosc.model_checking import verdict_text, verdicts_json
 
     properties = read_properties(arguments, supervisor.model)
     if properties is None:
@@ -97,12 +91,7 @@ def verify(arguments: argparse.Namespace, supervisor: "Supervisor") -> int:
     verdicts = _verdicts(arguments, system, supervisor, properties)
     holds = all(verdict.holds for verdict in verdicts)
     if arguments.json:
-        print_json(
-            {
-                "status": "holds" if holds else "fails",
-                "properties": [verdict_json(verdict, system, supervisor.model) for verdict in verdicts],
-            }
-        )
+        print_json(verdicts_json(verdicts, system, supervisor.model))
     else:
         for verdict in (item for item in verdicts if not (arguments.quiet and item.holds)):
             sys.stdout.write(verdict_text(verdict, system, supervisor.model))
@@ -147,8 +136,10 @@ def _listing(path: Path) -> SourceFile:
 
 
 def _report_faults(arguments: argparse.Namespace, error: LanguageError, files: Sequence[SourceFile]) -> None:
+    from robosc.model_checking import property_errors_json
+
     if arguments.json:
-        print_json({"status": "property errors", **diagnostics_json(error.diagnostics)})
+        print_json(property_errors_json(error.diagnostics))
     else:
         print_diagnostics(error.diagnostics, Bundle(files[0], tuple(files[1:])) if files else None)
 

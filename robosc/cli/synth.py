@@ -15,15 +15,8 @@ from robosc.cli.arguments import (
     engine_options,
     read_bundle,
 )
-from robosc.cli.output import (
-    ExitCode,
-    ProgressLine,
-    diagnostics_json,
-    print_diagnostics,
-    print_json,
-    require_other_file,
-    write_bytes,
-)
+from robosc.cli.output import ExitCode, ProgressLine, print_diagnostics, print_json, require_other_file, write_bytes
+from robosc.json_documents import diagnostics_json
 from robosc.model.structure import Deployment
 from robosc.source import Bundle
 

@@ -7,14 +7,7 @@ from typing import TYPE_CHECKING
 
 from robosc.cli import properties
 from robosc.cli.arguments import add_engine_options, add_model_arguments, add_verify_limit_argument, read_bundle
-from robosc.cli.output import (
-    ExitCode,
-    ProgressLine,
-    UsageError,
-    diagnostics_json,
-    print_diagnostics,
-    print_json,
-)
+from robosc.cli.output import ExitCode, ProgressLine, UsageError, print_diagnostics, print_json
 from robosc.cli.sign import read_supervisor, signer_of
 from robosc.errors import InvalidSupervisorError
 from robosc.model.structure import Deployment
@@ -107,6 +100,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _verify_supervisor(arguments: argparse.Namespace) -> int:
     from robosc.supervisor.codec import decode
     from robosc.supervisor.recheck import recheck
+    from robosc.supervisor.recheck_report import has_passed, recheck_json
     from robosc.synthesis.engines import resolve_engine
     from robosc.verification import Limits
 
@@ -131,19 +125,19 @@ def _verify_supervisor(arguments: argparse.Namespace) -> int:
         )
     finally:
         progress.clear()
-    has_passed = found.has_passed and not (arguments.strict and found.unchecked())
-    if has_passed and (arguments.property or arguments.properties):
+    is_right = has_passed(found, is_strict=arguments.strict)
+    if is_right and (arguments.property or arguments.properties):
         # Of a supervisor that passed only the verdicts are asked for.
         return properties.verify(arguments, supervisor)
     if arguments.json:
-        print_json(_document(found, supervisor, has_passed=has_passed))
+        print_json(recheck_json(found, supervisor, is_strict=arguments.strict))
     else:
         print_diagnostics(found.diagnostics, bundle)
         if found.diagnostics or found.judgement or found.faults:
-            _print_report(arguments, found, supervisor, has_passed=has_passed)
+            _print_report(arguments, found, supervisor, is_right=is_right)
         else:
             sys.stderr.write(f"{arguments.model}: a library has no robot that a supervisor could be for\n")
-    return ExitCode.OK if has_passed else ExitCode.FAILED
+    return ExitCode.OK if is_right else ExitCode.FAILED
 
 
 def _verify_signature(arguments: argparse.Namespace) -> int:
@@ -173,54 +167,23 @@ def _tell_signer(arguments: argparse.Namespace, key: "PublicKey") -> None:
 
 
 def _report_malformed(arguments: argparse.Namespace, error: InvalidSupervisorError | SignatureError) -> ExitCode:
+    from robosc.supervisor.recheck_report import malformed_json
+
     if arguments.json:
-        print_json({"status": "failed", "reason": str(error)})
+        print_json(malformed_json(error))
     else:
         sys.stderr.write(f"{arguments.supervisor}: {visible(str(error))}\n")
     return ExitCode.FAILED
 
 
-def _document(found: "Recheck", supervisor: "Supervisor", *, has_passed: bool) -> dict[str, object]:
-    judgement = found.judgement
-    return {
-        "status": "passed" if has_passed else "failed" if found.faults or found.diagnostics else "not checked",
-        "model": supervisor.model.name,
-        "deployment": str(supervisor.deployment),
-        "checks": {name: str(outcome) for name, outcome in found.outcomes().items()},
-        "faults": [_fault_json(fault) for fault in found.faults],
-        "remarks": list(found.notes),
-        "states": judgement.verification.states if judgement else None,
-        "transitions": judgement.verification.transitions if judgement else None,
-        "method": judgement.method if judgement else None,
-        **diagnostics_json(found.diagnostics),
-    }
-
-
-def _fault_json(fault: "Fault") -> dict[str, object]:
-    document: dict[str, object] = {"check": fault.check, "message": fault.message}
-    if fault.trace is not None and fault.state is not None:
-        document |= {
-            "trace": list(fault.trace),
-            "shortest": fault.is_shortest,
-            "state": {
-                "components": fault.state.components,
-                "variables": fault.state.variables,
-                "communications": fault.state.communications,
-            },
-        }
-    return document
-
-
-def _print_report(
-    arguments: argparse.Namespace, found: "Recheck", supervisor: "Supervisor", *, has_passed: bool
-) -> None:
+def _print_report(arguments: argparse.Namespace, found: "Recheck", supervisor: "Supervisor", *, is_right: bool) -> None:
     lines: list[str] = []
     unchecked = [name.replace("_", " ") for name in found.unchecked()]
     if found.diagnostics:
         lines.append(f"{arguments.supervisor}: failed: the texts hold no model that it could be for")
     elif found.faults:
         lines.append(f"{arguments.supervisor}: failed: no right supervisor of {arguments.model}")
-    elif not has_passed:
+    elif not is_right:
         lines.append(f"{arguments.supervisor}: not checked: {', '.join(unchecked)}")
     else:
         lines.append(f"{arguments.supervisor}: passed: a right supervisor of {arguments.model}")
@@ -237,7 +200,7 @@ def _print_report(
         lines += _fault_lines(fault)
     if not arguments.quiet:
         lines += [f"note: {note}" for note in found.notes]
-    if not (has_passed and arguments.quiet):
+    if not (is_right and arguments.quiet):
         sys.stdout.write("".join(f"{visible(line)}\n" for line in lines))
 
 

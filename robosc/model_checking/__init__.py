@@ -3,7 +3,7 @@
 from robosc.model_checking.checking import verify_properties
 from robosc.model_checking.formulas import Property, formula_text
 from robosc.model_checking.outcome import Remainder, Run, RunKind, Verdict
-from robosc.model_checking.report import verdict_json, verdict_text
+from robosc.model_checking.report import property_errors_json, verdict_text, verdicts_json
 from robosc.model_checking.resolution import properties_of
 
 __all__ = [
@@ -14,7 +14,8 @@ __all__ = [
     "Verdict",
     "formula_text",
     "properties_of",
-    "verdict_json",
+    "property_errors_json",
     "verdict_text",
+    "verdicts_json",
     "verify_properties",
 ]

@@ -1,12 +1,14 @@
 """Verdicts for people and for machines: each state of a run in the words of the model."""
 
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from robosc.automata.state import Subject, subject_domain, subjects
 from robosc.automata.structure import System
+from robosc.errors import Diagnostic
 from robosc.expressions import Value
 from robosc.expressions.text import automaton_text
+from robosc.json_documents import diagnostics_json
 from robosc.model.structure import Model
 from robosc.model_checking.formulas import formula_text
 from robosc.model_checking.outcome import Run, State, Verdict
@@ -65,7 +67,20 @@ def _value_text(value: Value) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def verdict_json(verdict: Verdict, system: System, model: Model) -> dict[str, object]:
+def verdicts_json(verdicts: Sequence[Verdict], system: System, model: Model) -> dict[str, object]:
+    """All verdicts as JSON values; `status` is `holds` or `fails`."""
+    return {
+        "status": "holds" if all(verdict.holds for verdict in verdicts) else "fails",
+        "properties": [_verdict_json(verdict, system, model) for verdict in verdicts],
+    }
+
+
+def property_errors_json(diagnostics: Sequence[Diagnostic]) -> dict[str, object]:
+    """That properties cannot be understood, as JSON values."""
+    return {"status": "property errors", **diagnostics_json(diagnostics)}
+
+
+def _verdict_json(verdict: Verdict, system: System, model: Model) -> dict[str, object]:
     """A verdict as JSON values."""
     return {
         "name": verdict.property.name or None,

@@ -111,6 +111,12 @@ def engine_names() -> tuple[str, ...]:
     return tuple(sorted({*_FACTORIES, *(point.name for point in entry_points(group=ENTRY_POINTS))}))
 
 
+def installed_engines() -> tuple[str, ...]:
+    """Every engine that can be used, the fastest first; those of other packages follow by name."""
+    own = ("cudd", "autoref") if _has_cudd() else ("autoref",)
+    return (*own, *(name for name in engine_names() if name not in ("cudd", "autoref")))
+
+
 def resolve_engine(name: str) -> str:
     """The engine that a name stands for: `auto` is CUDD where its extension is installed.
 

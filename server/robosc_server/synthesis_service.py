@@ -1,4 +1,4 @@
-"""The SynthesisService: bytes come in and go out, and every failure is told as one gRPC status.
+"""The SynthesisService: bytes come in and go out; what is refused is raised, and told by what stands around every call.
 
 Requests and responses stay serialized here: a request is looked at once (`tasks.requests`), workers make the responses,
 and one that is kept is sent as it is. What the generated bindings would do in between costs more than all of that.
@@ -6,20 +6,22 @@ and one that is kept is sent as it is. What the generated bindings would do in b
 
 import asyncio
 from collections import deque
-from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager
+from collections.abc import Awaitable, Callable
 from typing import Any, Protocol, Self
 
 import grpc
 import grpc.aio
+from google.protobuf.message import DecodeError
 
+from robosc_api.security import caller_of
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_server.callers import caller_of
-from robosc_server.failures import RefusedError, abort, abort_with_fault
-from robosc_server.tasks.requests import RequestLimits, accepted
+from robosc_server.failures import RefusedError
+from robosc_server.tasks.requests import NOT_A_MESSAGE, RequestLimits, accepted
 from robosc_server.tasks.task import Reason, Report, Result, Task, TaskKind
 
-SERVICE_NAME = pb.DESCRIPTOR.services_by_name["SynthesisService"].full_name
+_SERVICE = pb.DESCRIPTOR.services_by_name["SynthesisService"]
+SERVICE_NAME = _SERVICE.full_name
+METHODS = tuple(method.name for method in _SERVICE.methods)
 
 SEND_TIMEOUT_S = 60.0
 """How long a caller may leave one message of a result unread."""
@@ -79,36 +81,32 @@ class SynthesisService:
 
     def _unary(self, kind: TaskKind) -> Any:
         async def answer(request: bytes, context: Context) -> bytes:
-            async with translated(context):
-                task = accepted(kind, request, self._limits)
-                result = self._desk.kept(task.key)
-                if result is None:
-                    result = await self._desk.result(task, caller_of(context), _drop)
-                return result.messages[0]
-            raise AssertionError("unreachable: a call that fails is aborted")
+            task = accepted(kind, request, self._limits)
+            result = self._desk.kept(task.key)
+            if result is None:
+                result = await self._desk.result(task, caller_of(context), _drop)
+            return result.messages[0]
 
         return answer
 
     def _stream(self, kind: TaskKind) -> Any:
         async def answer(request: bytes, context: Context) -> None:
-            async with translated(context):
-                task = accepted(kind, request, self._limits)
-                result = self._desk.kept(task.key)
-                if result is None:
-                    async with _Progress(context) as progress:
-                        result = await self._desk.result(task, caller_of(context), progress.tell)
-                await send(context, result.messages)
+            task = accepted(kind, request, self._limits)
+            result = self._desk.kept(task.key)
+            if result is None:
+                async with _Progress(context) as progress:
+                    result = await self._desk.result(task, caller_of(context), progress.tell)
+            await send(context, result.messages)
 
         return answer
 
 
 def _answering(request_type: Any, answer: bytes) -> Any:
     async def fixed(request: bytes, context: Context) -> bytes:
-        async with translated(context):
-            try:
-                request_type.FromString(request)
-            except ValueError as error:
-                raise RefusedError(Reason.MALFORMED_REQUEST, "the request is no message of this service") from error
+        try:
+            request_type.FromString(request)
+        except DecodeError as error:
+            raise RefusedError(Reason.MALFORMED_REQUEST, NOT_A_MESSAGE) from error
         return answer
 
     return fixed
@@ -175,22 +173,6 @@ def _unread() -> RefusedError:
 def progress_message(report: Report) -> bytes:
     """The message that tells where the work is: the same bytes in the response of each streaming method."""
     return pb.SynthesizeResponse(progress=pb.Progress(stage=report.stage, message=report.message)).SerializeToString()
-
-
-@asynccontextmanager
-async def translated(context: Context) -> AsyncIterator[None]:
-    """End the call with the right status for what goes wrong inside.
-
-    A caller that goes away, or whose deadline passes, has this task cancelled by gRPC; the work then ends.
-    """
-    try:
-        yield
-    except RefusedError as error:
-        await abort(context, error)
-    except grpc.aio.AbortError:
-        raise
-    except Exception as error:
-        await abort_with_fault(context, error)
 
 
 async def _drop(report: Report) -> None:

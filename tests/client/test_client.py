@@ -1,7 +1,11 @@
+"""Both clients against a server that answers what a test has written, over real gRPC."""
+
+import asyncio
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
+from contextlib import ExitStack
+from datetime import UTC, datetime
 from typing import Any
 
 import grpc
@@ -9,201 +13,480 @@ import pytest
 
 import robosc_client
 from robosc.errors import Diagnostic, RelatedPlace, Severity
-from robosc.language import load_bundle
-from robosc.model import check
 from robosc.model.structure import Deployment
 from robosc.source import Bundle, Location, SourceFile
-from robosc.synthesis import Statistics
 from robosc.targets import GenerateOptions, SupervisedController
+from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client import (
+    AsyncClient,
+    Check,
     Client,
     ClientError,
     DeadlineError,
+    Explore,
+    Format,
+    Generate,
+    JobError,
+    JobState,
     RequestRefusedError,
+    RetryPolicy,
+    ServerBusyError,
     ServerUnavailableError,
     ServiceError,
+    SynthesisOptions,
     SynthesisStatus,
+    Synthesize,
+    TaskKind,
+    Verify,
 )
-from robosc_client import convert as client_convert
-from robosc_server import convert as server_convert
-from robosc_server.settings import Settings
-from robosc_server.work import CheckOutcome, Figures, GenerateOutcome, SynthesizeOutcome
-from support.service import FAKE_WORKER, PATIENCE_S, Scripted, bundle_of, eventually, is_running, scripted, served
+from robosc_client.convert.requests import request_of
+from support.answers import (
+    enveloped,
+    exploration,
+    generation,
+    job,
+    progress,
+    supervisor,
+    synthesis,
+    verification,
+    watched,
+)
+from support.both_clients import KINDS, client_of
+from support.models import bundle_of
+from support.scripted_service import PATIENCE_S, Refusal, scripted
 
-EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*/*.rscd"))
 NOWHERE = "127.0.0.1:1"
+BUNDLE = bundle_of("robot R { }")
+QUICK = RetryPolicy(first_s=0.001, longest_s=0.01)
+AWAY = Refusal(grpc.StatusCode.UNAVAILABLE, "the server is ending", "SHUTTING_DOWN")
+BUSY = Refusal(grpc.StatusCode.RESOURCE_EXHAUSTED, "too much to do", "SERVER_BUSY", 2.0)
 
 
-@pytest.fixture(scope="module")
-def fake() -> Any:
-    """A client of a server whose work does what the model's text says."""
-    with served(Settings(port=0, workers=2, max_bundle_bytes=1000), FAKE_WORKER) as address, Client(address) as client:
-        yield client
-
-
-def result(**fields: Any) -> Any:
-    return [pb.SynthesizeResponse(result=pb.SynthesisResult(**fields))]
+@pytest.fixture(params=KINDS)
+def connect(request: Any) -> Any:
+    """Opens a client of either kind that tries again quickly."""
+    return lambda address, **options: client_of(request.param, address, **{"retries": QUICK, **options})
 
 
 def test_public_names() -> None:
-    assert set(robosc_client.__all__) == {
-        "Client",
-        "ClientError",
-        "CredentialsError",
-        "DeadlineError",
-        "Generation",
-        "Progress",
-        "RequestRefusedError",
-        "ServerUnavailableError",
-        "ServiceError",
-        "Statistics",
-        "Summary",
-        "Synthesis",
-        "SynthesisStatus",
-    }
+    assert sorted(robosc_client.__all__) == [
+        "AsyncClient", "Check", "Client", "ClientError", "CredentialsError", "DeadlineError", "Exploration", "Explore",
+        "Format", "Formatted", "Generate", "Generation", "Job", "JobError", "JobFailure", "JobState", "NO_RETRIES",
+        "Progress", "RequestRefusedError", "RetryPolicy", "ServerBusyError", "ServerInfo", "ServerLimits",
+        "ServerUnavailableError", "ServiceError", "StateGraph", "StateValues", "Statistics", "Submission", "Summary",
+        "Synthesis", "SynthesisOptions", "SynthesisStatus", "Synthesize", "Task", "TaskKind", "TaskResult",
+        "Verification", "VerificationStatus", "Verify",
+    ]  # fmt: skip
     assert all(hasattr(robosc_client, name) for name in robosc_client.__all__)
+
+
+def test_both_clients_have_the_same_methods() -> None:
+    names = [{name for name in vars(kind) if not name.startswith("_")} for kind in (Client, AsyncClient)]
+    assert names[0] == names[1]
+
+
+TASKS: dict[str, Any] = {
+    "Check": (lambda client: client.check(BUNDLE), [pb.CheckResponse()]),
+    "Synthesize": (lambda client: client.synthesize(BUNDLE), [progress(), synthesis()]),
+    "Generate": (lambda client: client.generate(BUNDLE, "ros2"), generation()),
+    "Explore": (lambda client: client.explore(BUNDLE), exploration()),
+    "Verify": (lambda client: client.verify(Verify(bundle=BUNDLE, properties=("AG a",))), [verification()]),
+    "Format": (lambda client: client.format(BUNDLE.main), [pb.FormatResponse(text="robot R {\n}\n")]),
+    "ListTargets": (lambda client: client.list_targets(), [pb.ListTargetsResponse()]),
+    "GetVersion": (lambda client: client.get_version(), [pb.GetVersionResponse(version="1")]),
+    "SubmitJob": (lambda client: client.submit(Check(BUNDLE)), [jobs_pb2.SubmitJobResponse(job=job())]),
+    "GetJob": (lambda client: client.get_job("job-1"), [jobs_pb2.GetJobResponse(job=job())]),
+    "CancelJob": (lambda client: client.cancel_job("job-1"), [jobs_pb2.CancelJobResponse(job=job())]),
+    "ListJobs": (lambda client: list(client.list_jobs()), [jobs_pb2.ListJobsResponse()]),
+    "GetJobResult": (lambda client: client.job_result("job-1"), enveloped("synthesize", [synthesis()])),
+    "WatchJob": (lambda client: list(client.watch("job-1")), watched(job(1, jobs_pb2.JOB_STATE_SUCCEEDED))),
+}
+"""For each method of the services a call of it, and an answer."""
+
+
+def test_every_method_is_tested() -> None:
+    methods = [
+        method.name
+        for service in (
+            pb.DESCRIPTOR.services_by_name["SynthesisService"],
+            jobs_pb2.DESCRIPTOR.services_by_name["JobService"],
+        )
+        for method in service.methods
+    ]
+    assert sorted(TASKS) == sorted(methods)
+
+
+@pytest.mark.parametrize("method", TASKS)
+class TestEveryMethod:
+    def test_answer(self, connect: Any, method: str) -> None:
+        call, answer = TASKS[method]
+        with scripted(**{method: [answer]}) as (address, script), connect(address) as client:
+            call(client)
+            assert len(script.of(method)) == 1
+
+    def test_nobody_there(self, connect: Any, method: str) -> None:
+        with connect(NOWHERE) as client, pytest.raises(ServerUnavailableError, match=f"no server answers at {NOWHERE}"):
+            TASKS[method][0](client)
+
+    @pytest.mark.parametrize("refusal", [AWAY, BUSY])
+    def test_tried_again(self, connect: Any, method: str, refusal: Refusal) -> None:
+        call, answer = TASKS[method]
+        slept: list[float] = []
+        with (
+            scripted(**{method: [[refusal], [refusal], answer]}) as (address, script),
+            connect(address, sleep=slept.append) as client,
+        ):
+            call(client)
+            assert len(script.of(method)) == 3
+            # The very same request: also the key of a job that was submitted.
+            assert all(request == script.of(method)[0] for request in script.of(method))
+        assert len(slept) == 2
+        assert min(slept) >= (refusal.retry_after_s or 0)
+
+    def test_not_tried_for_ever(self, connect: Any, method: str) -> None:
+        with (
+            scripted(**{method: [[AWAY]]}) as (address, script),
+            connect(address, sleep=lambda seconds: None) as client,
+            pytest.raises(ServerUnavailableError, match="the server is ending") as caught,
+        ):
+            TASKS[method][0](client)
+        assert caught.value.reason == "SHUTTING_DOWN"
+        assert len(script.of(method)) == (QUICK.watch_attempts if method == "WatchJob" else QUICK.attempts)
+
+    @pytest.mark.parametrize(
+        ("code", "reason", "error"),
+        [
+            ("INVALID_ARGUMENT", "MALFORMED_REQUEST", RequestRefusedError),
+            ("RESOURCE_EXHAUSTED", "CPU_LIMIT", RequestRefusedError),
+            ("RESOURCE_EXHAUSTED", "SERVER_BUSY", ServerBusyError),
+            ("RESOURCE_EXHAUSTED", "", RequestRefusedError),
+            ("UNAUTHENTICATED", "UNAUTHENTICATED", RequestRefusedError),
+            ("PERMISSION_DENIED", "PERMISSION_DENIED", RequestRefusedError),
+            ("DEADLINE_EXCEEDED", "TIME_LIMIT", DeadlineError),
+            ("INTERNAL", "WORKER_DIED", ServiceError),
+            ("NOT_FOUND", "NO_SUCH_JOB", JobError),
+            ("FAILED_PRECONDITION", "JOB_NOT_ENDED", JobError),
+            ("ALREADY_EXISTS", "IDEMPOTENCY_KEY_REUSED", JobError),
+            ("UNIMPLEMENTED", "", ServiceError),
+        ],
+    )
+    def test_refused(self, connect: Any, method: str, code: str, reason: str, error: Any) -> None:
+        refusal = Refusal(grpc.StatusCode[code], "that is why\x1b[31m", reason)
+        with (
+            scripted(**{method: [[refusal]]}) as (address, script),
+            connect(address) as client,
+            pytest.raises(error) as caught,
+        ):
+            TASKS[method][0](client)
+        assert type(caught.value) is error
+        assert str(caught.value).isprintable()
+        assert caught.value.reason == (reason if code != "UNIMPLEMENTED" else "")
+        assert len(script.of(method)) == 1
+
+    def test_an_empty_answer(self, connect: Any, method: str) -> None:
+        """None at all, or a message without anything in it; a watch asks again, but not for ever."""
+        if method in ("Check", "Format", "ListTargets", "GetVersion", "ListJobs"):
+            return  # An empty message is an answer.
+        empty = type(TASKS[method][1][0])()
+        with scripted(**{method: [[empty]]}) as (address, _), connect(address) as client, pytest.raises(ServiceError):
+            TASKS[method][0](client)
 
 
 class TestErrors:
     def test_kin(self) -> None:
         assert issubclass(ServerUnavailableError, ConnectionError)
         assert issubclass(DeadlineError, TimeoutError)
-        for error in (ServerUnavailableError, DeadlineError, RequestRefusedError, ServiceError):
+        assert issubclass(ServerBusyError, RequestRefusedError)
+        for error in (ServerUnavailableError, DeadlineError, RequestRefusedError, ServiceError, JobError):
             assert issubclass(error, ClientError)
 
-    @pytest.mark.parametrize(
-        "call",
-        [
-            lambda client: client.check(bundle_of("")),
-            lambda client: client.synthesize(bundle_of("")),
-            lambda client: client.generate(bundle_of(""), target="python"),
-        ],
-    )
-    def test_nobody_there(self, call: Any) -> None:
-        with Client(NOWHERE) as client, pytest.raises(ServerUnavailableError, match=NOWHERE):
-            call(client)
+    def test_deadline(self, connect: Any) -> None:
+        ended = threading.Event()
 
-    def test_deadline(self, fake: Any) -> None:
-        pids = []
-        with pytest.raises(DeadlineError, match=r"within 1\.5 seconds"):
-            fake.synthesize(
-                bundle_of("stuck"), deadline_s=1.5, on_progress=lambda progress: pids.append(int(progress.message))
-            )
-        assert len(pids) == 1
-        assert eventually(lambda: not is_running(pids[0]))
+        def stuck(context: Any) -> Any:
+            context.add_callback(ended.set)
+            yield progress()
+            ended.wait(PATIENCE_S)
 
-    def test_the_servers_own_limit(self) -> None:
-        settings = Settings(port=0, workers=1, max_synthesis_seconds=1.0)
-        with (
-            served(settings, FAKE_WORKER) as address,
-            Client(address) as client,
-            pytest.raises(DeadlineError, match="works at most 1 seconds"),
-        ):
-            client.check(bundle_of("stuck"), deadline_s=PATIENCE_S)
+        with scripted(Synthesize=[[stuck]]) as (address, _), connect(address) as client:
+            told: list[Any] = []
+            with pytest.raises(DeadlineError, match=r"within 0\.5 seconds"):
+                client.synthesize(BUNDLE, deadline_s=0.5, on_progress=told.append)
+            assert len(told) == 1
+            assert ended.wait(PATIENCE_S)
 
-    def test_refused(self, fake: Any) -> None:
-        with pytest.raises(RequestRefusedError, match="there is no such thing"):
-            fake.check(bundle_of("refuse"))
-        with pytest.raises(RequestRefusedError, match="1011 bytes"):
-            fake.check(bundle_of("x" * 1001))
-        with pytest.raises(RequestRefusedError, match="Unicode"):
-            fake.check(bundle_of("", "robot\udcff.rscd"))
+    def test_what_a_caller_raises_ends_the_work(self, connect: Any) -> None:
+        ended = threading.Event()
 
-    def test_server_fault(self, fake: Any) -> None:
-        with pytest.raises(ServiceError, match=r"internal error [0-9a-f]{8}") as caught:
-            fake.check(bundle_of("fault"))
-        assert "Traceback" not in str(caught.value)
-
-    def test_a_stranger_answers(self) -> None:
-        with ThreadPoolExecutor(1) as threads:
-            server = grpc.server(threads)
-            port = server.add_insecure_port("127.0.0.1:0")
-            server.start()
-            with Client(f"127.0.0.1:{port}") as client, pytest.raises(ServiceError, match="no RoboSC server"):
-                client.check(bundle_of(""))
-            server.stop(None).wait()
-
-
-class TestProgress:
-    def test_every_report_in_order(self, fake: Any) -> None:
-        messages = []
-        synthesis = fake.synthesize(bundle_of("reports"), on_progress=lambda item: messages.append(item.message))
-        assert messages == [f"step {number}" for number in range(100)]
-        assert (synthesis.status, synthesis.reason) == (SynthesisStatus.EMPTY, "because")
-
-    def test_an_exception_of_the_caller_ends_the_work(self, fake: Any) -> None:
-        pids = []
+        def stuck(context: Any) -> Any:
+            context.add_callback(ended.set)
+            yield progress()
+            ended.wait(PATIENCE_S)
 
         class StopNowError(Exception):
             pass
 
-        def stop(progress: Any) -> None:
-            pids.append(int(progress.message))
+        def stop(told: Any) -> None:
             raise StopNowError
 
-        begun = time.monotonic()
-        with pytest.raises(StopNowError) as caught:
-            fake.synthesize(bundle_of("stuck"), on_progress=stop)
-        # The call itself is still referred to by the exception, so it is not its destruction that ends it.
-        assert eventually(lambda: not is_running(pids[0]))
-        assert caught.tb
-        print(f"work ended after {time.monotonic() - begun:.3f} s")
+        with scripted(Synthesize=[[stuck]]) as (address, _), connect(address) as client:
+            with pytest.raises(StopNowError) as caught:
+                client.synthesize(BUNDLE, on_progress=stop)
+            # The call itself is still referred to by the exception, so it is not its destruction that ends it.
+            assert ended.wait(PATIENCE_S)
+            assert caught.tb
 
-    def test_two_threads_share_a_client(self, fake: Any) -> None:
-        results = []
-        threads = [
-            threading.Thread(target=lambda: results.append(fake.synthesize(bundle_of("reports")).status))
-            for _ in range(4)
-        ]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join(PATIENCE_S)
-        assert results == [SynthesisStatus.EMPTY] * 4
+    def test_cancelling_a_task_ends_the_work(self) -> None:
+        begun, ended = threading.Event(), threading.Event()
 
+        def stuck(context: Any) -> None:
+            context.add_callback(ended.set)
+            begun.set()
+            ended.wait(PATIENCE_S)
 
-class TestHostileServers:
-    @pytest.mark.parametrize(
-        "answers",
-        [
-            [],
-            [pb.SynthesizeResponse()],
-            result(),
-            result(status=17),
-            result(status=pb.SYNTHESIS_STATUS_SUPERVISOR),
-            result(status=pb.SYNTHESIS_STATUS_EMPTY, supervisor=b"x"),
-            result(status=pb.SYNTHESIS_STATUS_EMPTY, diagnostics=[pb.Diagnostic()]),
-            result(status=pb.SYNTHESIS_STATUS_EMPTY, explanation="{"),
-            result(status=pb.SYNTHESIS_STATUS_EMPTY, explanation='{"blamed": []}'),
-            result(status=pb.SYNTHESIS_STATUS_EMPTY, explanation="[" * 100_000),
-            result(status=pb.SYNTHESIS_STATUS_SUPERVISOR, supervisor=b"x", summary=pb.Summary(states="many")),
-        ],
-    )
-    def test_synthesis(self, answers: Any) -> None:
-        with scripted(Scripted(synthesize=answers)) as address, Client(address) as client, pytest.raises(ServiceError):
-            client.synthesize(bundle_of(""))
+        async def run(address: str) -> None:
+            async with AsyncClient(address) as client:
+                task = asyncio.create_task(client.synthesize(BUNDLE))
+                await asyncio.to_thread(begun.wait, PATIENCE_S)
+                task.cancel()
+                with pytest.raises(asyncio.CancelledError):
+                    await task
+                assert await asyncio.to_thread(ended.wait, PATIENCE_S)
 
-    @pytest.mark.parametrize("path", ["/etc/passwd", "../x", "a/../../x", "", "a\0b", "a//b", "C:\\x"])
-    def test_paths_of_generated_files(self, path: Any) -> None:
-        response = pb.GenerateResponse(
-            status=pb.SYNTHESIS_STATUS_SUPERVISOR, files=[pb.GeneratedFile(path=path, content="x")]
-        )
+        with scripted(Synthesize=[[stuck]]) as (address, _):
+            asyncio.run(run(address))
+
+    def test_not_tried_again_once_there_was_an_answer(self, connect: Any) -> None:
+        with scripted(Synthesize=[[progress(), AWAY]]) as (address, script), connect(address) as client:
+            with pytest.raises(ServerUnavailableError):
+                client.synthesize(BUNDLE)
+            assert len(script.of("Synthesize")) == 1
+
+    def test_details_of_another_domain_or_that_are_none(self, connect: Any) -> None:
+        strange = Refusal(grpc.StatusCode.RESOURCE_EXHAUSTED, "no", "SERVER_BUSY", 0.0, domain="elsewhere.example")
+
+        def broken(context: grpc.ServicerContext) -> Any:
+            context.set_trailing_metadata((("grpc-status-details-bin", b"\xff\xff\xff"),))
+            context.abort(grpc.StatusCode.INTERNAL, "oh")
+
+        with scripted(Check=[[strange], [broken]]) as (address, script), connect(address) as client:
+            with pytest.raises(RequestRefusedError) as caught:
+                client.check(BUNDLE)
+            assert (type(caught.value), caught.value.reason) == (RequestRefusedError, "")
+            with pytest.raises(ServiceError, match="oh"):
+                client.check(BUNDLE)
+            assert len(script.of("Check")) == 2
+
+    def test_what_cannot_be_sent(self, connect: Any) -> None:
+        with connect(NOWHERE) as client:
+            for bundle in (bundle_of("\udcff"), Bundle(SourceFile("robot\udcff.rscd", ""))):
+                with pytest.raises(RequestRefusedError, match="Unicode"):
+                    client.check(bundle)
+            with pytest.raises(RequestRefusedError):
+                client.explore(BUNDLE, maximum_states=-1)
+            with pytest.raises(RequestRefusedError):
+                client.submit(Check(BUNDLE), retention_s=1e300)
+
+    def test_a_stranger_answers(self, connect: Any) -> None:
+        with ThreadPoolExecutor(1) as threads:
+            server = grpc.server(threads)
+            port = server.add_insecure_port("127.0.0.1:0")
+            server.start()
+            with connect(f"127.0.0.1:{port}") as client, pytest.raises(ServiceError, match="no RoboSC server"):
+                client.check(BUNDLE)
+            server.stop(None).wait()
+
+    def test_a_message_that_is_too_large(self, connect: Any) -> None:
+        large = supervisor(b"x" * 2**26)
+        large.result.reason = "y" * 2**22
+        with scripted(Synthesize=[[large]]) as (address, _), connect(address) as client, pytest.raises(ClientError):
+            client.synthesize(BUNDLE)
+
+    def test_endless_progress_ends_with_the_deadline(self, connect: Any) -> None:
+        def endless(context: grpc.ServicerContext) -> Any:
+            while context.is_active():
+                yield progress()
+
         with (
-            scripted(Scripted(generate=response)) as address,
+            scripted(Synthesize=[[endless]]) as (address, _),
+            connect(address) as client,
+            pytest.raises(DeadlineError),
+        ):
+            client.synthesize(BUNDLE, deadline_s=0.3)
+
+    def test_two_threads_share_a_client(self) -> None:
+        answers = [progress(number) for number in range(100)]
+        with (
+            scripted(Synthesize=[[*answers, synthesis()]]) as (address, _),
             Client(address) as client,
+            ThreadPoolExecutor(4) as threads,
+        ):
+            found = list(threads.map(lambda _: client.synthesize(BUNDLE).status, range(8)))
+        assert found == [SynthesisStatus.EMPTY] * 8
+
+
+class TestWatch:
+    def states(self, *numbers: int) -> Any:
+        """A job's revisions; the last one has ended."""
+        *first, last = numbers
+        return watched(*(job(number) for number in first), job(last, jobs_pb2.JOB_STATE_SUCCEEDED))
+
+    def test_resumed_after_lost_connections(self, connect: Any) -> None:
+        """What ends a watch before its job: an error, and a stream that ends; nothing is told twice."""
+        parts = [[AWAY], [*watched(job(1), job(4)), AWAY], watched(job(5)), [AWAY], [AWAY], self.states(7, 9)]
+        with (
+            scripted(WatchJob=parts) as (address, script),
+            connect(address, sleep=lambda seconds: None, retries=RetryPolicy(watch_attempts=4)) as client,
+        ):
+            assert [item.revision for item in client.watch("job-1")] == [1, 4, 5, 7, 9]
+            assert [item.after_revision for item in script.of("WatchJob")] == [0, 0, 4, 5, 5, 5]
+
+    def test_resumed_with_a_server_that_was_started_anew(self, connect: Any) -> None:
+        def held(context: Any) -> Any:
+            yield from watched(job(1))
+            while context.is_active():
+                time.sleep(0.01)
+
+        with ExitStack() as first:
+            address, _ = first.enter_context(scripted(WatchJob=[[held]]))
+            with connect(address, retries=RetryPolicy(first_s=0.05, watch_attempts=50)) as client:
+                items = iter(client.watch("job-1"))
+                assert next(items).revision == 1
+                first.close()
+                with scripted(port=int(address.rpartition(":")[2]), WatchJob=[self.states(2)]) as (_, script):
+                    assert [item.revision for item in items] == [2]
+                    assert script.of("WatchJob")[0].after_revision == 1
+
+    def test_a_stream_that_always_ends_is_not_asked_for_ever(self, connect: Any) -> None:
+        with (
+            scripted(WatchJob=[[]]) as (address, script),
+            connect(address, sleep=lambda seconds: None) as client,
+            pytest.raises(ServerUnavailableError),
+        ):
+            list(client.watch("job-1"))
+        assert len(script.of("WatchJob")) == QUICK.watch_attempts
+
+    @pytest.mark.parametrize(
+        "jobs", [(job(3), job(3)), (job(3), job(2)), (job(id="job-2"),), (job(0),), (job(state=0),), (job(kind=0),)]
+    )
+    def test_what_no_server_tells(self, connect: Any, jobs: Any) -> None:
+        with (
+            scripted(WatchJob=[watched(*jobs)]) as (address, _),
+            connect(address) as client,
             pytest.raises(ServiceError, match="malformed"),
         ):
-            client.generate(bundle_of(""), target="python")
+            list(client.watch("job-1"))
 
-    def test_severity(self) -> None:
-        response = pb.CheckResponse(diagnostics=[pb.Diagnostic()])
+    def test_deadline(self, connect: Any) -> None:
+        def held(context: Any) -> Any:
+            yield from watched(job(1))
+            while context.is_active():
+                time.sleep(0.01)
+
+        with scripted(WatchJob=[[held]]) as (address, _), connect(address) as client, pytest.raises(DeadlineError):
+            client.wait("job-1", deadline_s=0.4)
+
+    def test_wait(self, connect: Any) -> None:
+        with scripted(WatchJob=[self.states(1, 2, 3)]) as (address, _), connect(address) as client:
+            found = client.wait("job-1")
+            assert (found.state, found.revision) == (JobState.SUCCEEDED, 3)
+
+    def test_an_unread_watch_is_ended(self, connect: Any) -> None:
+        ended = threading.Event()
+
+        def held(context: Any) -> Any:
+            context.add_callback(ended.set)
+            yield from watched(job(1))
+            ended.wait(PATIENCE_S)
+
+        with scripted(WatchJob=[[held]]) as (address, _), connect(address) as client:
+            items = client.watch("job-1")
+            next(items)
+            items.close()
+            assert ended.wait(PATIENCE_S)
+
+
+class TestJobs:
+    def test_values(self, connect: Any) -> None:
+        message = job(
+            5,
+            jobs_pb2.JOB_STATE_FAILED,
+            label="mine\x1b",
+            attempts=2,
+            from_store=True,
+            waiting_before=3,
+            progress=pb.Progress(stage="check", message="m"),
+        )
+        message.start_time.seconds = 1_700_000_001
+        message.end_time.seconds = 1_700_000_002
+        message.expire_time.seconds = 1_700_000_003
+        with scripted(GetJob=[[jobs_pb2.GetJobResponse(job=message)]]) as (address, _), connect(address) as client:
+            found = client.get_job("job-1")
+        assert (found.id, found.owner, found.kind, found.state) == (
+            "job-1", "tester", TaskKind.SYNTHESIZE, JobState.FAILED
+        )  # fmt: skip
+        assert found.created == datetime.fromtimestamp(1_700_000_000, UTC)
+        assert [item.timestamp() % 10 for item in (found.started, found.ended, found.expires)] == [1, 2, 3]
+        assert (found.attempts, found.from_store, found.waiting_before, found.main_file) == (2, True, 3, "robot.rscd")
+        assert (found.failure.reason, found.failure.message) == ("CPU_LIMIT", "too long")
+        assert found.label == "mine\\x1b"
+
+    @pytest.mark.parametrize(
+        "message",
+        [
+            job(id="../x"),
+            job(id=""),
+            job(id="x" * 200),
+            job(id="other"),
+            job(failure=jobs_pb2.Failure(reason="x")),
+            job(create_time={"seconds": 2**60}),
+        ],
+    )
+    def test_what_no_server_tells(self, connect: Any, message: Any) -> None:
         with (
-            scripted(Scripted(check=response)) as address,
-            Client(address) as client,
-            pytest.raises(ServiceError, match="severity"),
+            scripted(GetJob=[[jobs_pb2.GetJobResponse(job=message)]]) as (address, _),
+            connect(address) as client,
+            pytest.raises(ServiceError, match="malformed"),
         ):
-            client.check(bundle_of(""))
+            client.get_job("job-1")
+
+    def test_submission(self, connect: Any) -> None:
+        answer = jobs_pb2.SubmitJobResponse(job=job(), existed=True)
+        with scripted(SubmitJob=[[answer]]) as (address, script), connect(address) as client:
+            assert client.submit(Check(BUNDLE)).existed
+            client.submit(Check(BUNDLE))
+            client.submit(Synthesize(BUNDLE), idempotency_key="mine", label="a label", retention_s=1.5)
+            first, second, third = script.of("SubmitJob")
+        assert len(first.idempotency_key) == 32
+        assert first.idempotency_key != second.idempotency_key
+        assert first.task.WhichOneof("request") == "check"
+        assert not first.HasField("retention")
+        assert (third.idempotency_key, third.label, third.retention.ToMilliseconds()) == ("mine", "a label", 1500)
+
+    def test_pages(self, connect: Any) -> None:
+        def page(token: str, *numbers: int) -> list[Any]:
+            return [jobs_pb2.ListJobsResponse(jobs=[job(id=f"job-{n}") for n in numbers], next_page_token=token)]
+
+        pages = [page("a", 1, 2), page("b"), page("", 3)]
+        with scripted(ListJobs=pages) as (address, script), connect(address) as client:
+            chosen = {"states": (JobState.QUEUED,), "kind": TaskKind.CHECK, "all_owners": True, "page_size": 2}
+            assert [item.id for item in client.list_jobs(**chosen)] == ["job-1", "job-2", "job-3"]
+            assert [item.page_token for item in script.of("ListJobs")] == ["", "a", "b"]
+            asked = script.of("ListJobs")[2]
+        assert (list(asked.states), asked.kind, asked.all_owners, asked.page_size) == ([1], 1, True, 2)
+
+    def test_pages_without_an_end(self, connect: Any) -> None:
+        same = [jobs_pb2.ListJobsResponse(next_page_token="a")]
+        many = [jobs_pb2.ListJobsResponse(jobs=[job() for _ in range(3)])]
+        changing = [[jobs_pb2.ListJobsResponse(next_page_token=str(number))] for number in range(200)]
+        for pages in ([same], [many], changing):
+            with (
+                scripted(ListJobs=pages) as (address, _),
+                connect(address) as client,
+                pytest.raises(ServiceError, match="no end"),
+            ):
+                list(client.list_jobs(page_size=2))
 
 
 PLACE = Location("robot.rscd", 3, 7, 4)
@@ -216,101 +499,125 @@ FINDINGS = (
 )
 
 
+def location(place: Location | None) -> Any:
+    return place and pb.Location(file=place.file, line=place.line, column=place.column, length=place.length)
+
+
 class TestConversion:
-    """What one side packs the other unpacks to the same values."""
-
-    def test_bundle(self) -> None:
-        bundle = Bundle(
-            SourceFile("robot.rscd", "robot \u00e9"), (SourceFile("../shared/a.rscd", ""),), ("here", "../shared")
-        )
-        request = client_convert.synthesize_request(bundle, Deployment.LAYER, "autoref")
-        job = server_convert.synthesize_job(request, 1000)
-        assert (job.bundle, job.deployment, job.engine) == (bundle, Deployment.LAYER, "autoref")
-        assert not job.allow_livelock
-        allowing = client_convert.synthesize_request(bundle, Deployment.LAYER, "autoref", allow_livelock=True)
-        assert server_convert.synthesize_job(allowing, 1000).allow_livelock
-        plain = (bundle, Deployment.CONTROLLER, "auto", "ros2", GenerateOptions())
-        generate = client_convert.generate_request(*plain)
-        assert server_convert.generate_job(generate, 1000).target == "ros2"
-        assert server_convert.generate_job(generate, 1000).options == GenerateOptions()
-        generate = client_convert.generate_request(*plain, allow_livelock=True)
-        assert server_convert.generate_job(generate, 1000).synthesis.allow_livelock
-        assert server_convert.check_job(client_convert.check_request(bundle), 1000).bundle == bundle
-
-    @pytest.mark.parametrize(
-        "options",
-        [
-            GenerateOptions("walker"),
-            GenerateOptions(publish_state=True),
-            GenerateOptions(log_events=True),
-            GenerateOptions(supervised=SupervisedController("p", executable="x")),
-            GenerateOptions(supervised=SupervisedController("p", launch_file="x.launch.py")),
-        ],
-    )
-    def test_what_is_chosen_about_the_files(self, options: GenerateOptions) -> None:
-        bundle = Bundle(SourceFile("robot.rscd", ""))
-        request = client_convert.generate_request(bundle, Deployment.LAYER, "auto", "ros2", options)
-        assert server_convert.generate_job(request, 1000).options == options
-
-    def test_a_supervised_controller_with_a_path_is_refused(self) -> None:
-        request = pb.GenerateRequest(target="ros2", bundle=pb.Bundle(main=pb.SourceFile(name="m")))
-        request.options.deployment = pb.DEPLOYMENT_LAYER
-        request.generation.supervised.package = "p"
-        request.generation.supervised.executable = "/bin/sh"
-        with pytest.raises(server_convert.RequestError, match="without a path"):
-            server_convert.generate_job(request, 1000)
-
-    def test_libraries_are_sorted_for_the_core(self) -> None:
-        files = [pb.SourceFile(name=name) for name in ("b", "a")]
-        request = pb.CheckRequest(bundle=pb.Bundle(main=pb.SourceFile(name="m"), libraries=files))
-        assert [file.name for file in server_convert.check_job(request, 1000).bundle.libraries] == ["a", "b"]
-
-    def test_no_options_are_the_defaults(self) -> None:
-        request = pb.SynthesizeRequest(bundle=pb.Bundle(main=pb.SourceFile(name="m")))
-        job = server_convert.synthesize_job(request, 1000)
-        assert (job.deployment, job.engine) == (Deployment.CONTROLLER, "auto")
-
-    def test_diagnostics(self) -> None:
-        assert client_convert.check_diagnostics(server_convert.check_response(CheckOutcome(FINDINGS))) == FINDINGS
-
-    def test_diagnostics_of_every_example(self) -> None:
-        found = [check(load_bundle(model)).diagnostics for model in EXAMPLES]
-        assert any(found)
-        for diagnostics in found:
-            assert (
-                client_convert.check_diagnostics(server_convert.check_response(CheckOutcome(diagnostics)))
-                == diagnostics
+    def test_diagnostics(self, connect: Any) -> None:
+        numbers: Any = {Severity.ERROR: 1, Severity.WARNING: 2, Severity.NOTE: 3}
+        messages = [
+            pb.Diagnostic(
+                severity=numbers[item.severity],
+                code=item.code,
+                message=item.message,
+                location=location(item.location),
+                mend=item.mend,
+                related=[pb.RelatedPlace(message=at.message, location=location(at.location)) for at in item.related],
             )
+            for item in FINDINGS
+        ]
+        with scripted(Check=[[pb.CheckResponse(diagnostics=messages)]]) as (address, _), connect(address) as client:
+            assert client.check(BUNDLE) == FINDINGS
 
-    @pytest.mark.parametrize("status", list(SynthesisStatus))
-    def test_synthesis(self, status: Any) -> None:
-        is_made = status is SynthesisStatus.SUPERVISOR
-        figures = Figures(2, 3, str(10**40), "", (("move.request", "true"),), "text\n") if is_made else None
-        statistics = Statistics("autoref", 7, 3, 10**12, 5) if is_made else None
-        outcome = SynthesizeOutcome(str(status), FINDINGS, "why", b"x" if is_made else b"", figures, statistics)
-        there: Any = client_convert.progress_or_synthesis(server_convert.synthesize_response(outcome))
-        assert (there.status, there.diagnostics, there.reason) == (status, FINDINGS, "why")
-        assert there.supervisor == outcome.supervisor
-        if figures:
-            assert there.summary.states == 10**40
-            assert there.summary.transitions is None
-            assert there.summary.added == figures.added
-            assert (there.summary.controllable_events, there.summary.uncontrollable_events) == (2, 3)
-            assert there.summary.text == "text\n"
-            assert there.statistics == robosc_client.Statistics("autoref", 7, 3, 10**12)
-        else:
-            assert there.summary is None
-            assert there.statistics is None
-
-    @pytest.mark.parametrize("status", list(SynthesisStatus))
-    def test_generation(self, status: Any) -> None:
-        files = (("a/b.py", "text", True), ("c", "", False)) if status is SynthesisStatus.SUPERVISOR else ()
-        there: Any = client_convert.generation(
-            server_convert.generate_response(GenerateOutcome(str(status), FINDINGS, "why", files))
+    def test_synthesis(self, connect: Any) -> None:
+        summary = pb.Summary(
+            controllable_events=2,
+            uncontrollable_events=3,
+            states=str(10**40),
+            added=[pb.AddedCondition(event="move.request", condition="true")],
+            text="text\n",
         )
-        assert (there.status, there.diagnostics, there.reason) == (status, FINDINGS, "why")
-        if files:
-            assert dict(there.files) == {"a/b.py": "text", "c": ""}
-            assert there.files.executables == {"a/b.py"}
-        else:
-            assert there.files is None
+        statistics = pb.Statistics(engine="autoref", state_bits=7, iterations=3, peak_nodes=10**12)
+        answer = supervisor(b"x", summary=summary, statistics=statistics, signature=b"s")
+        with scripted(Synthesize=[[answer]]) as (address, _), connect(address) as client:
+            found = client.synthesize(BUNDLE)
+        assert found.summary == robosc_client.Summary(2, 3, 10**40, None, (("move.request", "true"),), "text\n")
+        assert found.statistics == robosc_client.Statistics("autoref", 7, 3, 10**12)
+        assert (found.supervisor, found.signature, found.reason) == (b"x", b"s", "")
+
+    def test_about_the_server(self, connect: Any) -> None:
+        limits = pb.ServerLimits(bundle_bytes=1, bundle_files=2, task_seconds=3.5, retention_seconds=10)
+        version = pb.GetVersionResponse(version="9", engines=["cudd", "autoref"], limits=limits)
+        targets = pb.ListTargetsResponse(targets=[pb.Target(name="ros2", description="a package")])
+        with (
+            scripted(GetVersion=[[version]], ListTargets=[[targets]]) as (address, _),
+            connect(address) as client,
+        ):
+            found = client.get_version()
+            assert (found.version, found.engines) == ("9", ("cudd", "autoref"))
+            assert (found.limits.bundle_bytes, found.limits.task_seconds) == (1, 3.5)
+            assert [(item.name, item.description) for item in client.list_targets()] == [("ros2", "a package")]
+
+    def test_requests(self) -> None:
+        """Every field of every request says what was meant."""
+        bundle = Bundle(
+            SourceFile("robot.rscd", "robot \u00e9"),
+            (SourceFile("../shared/a.rscd", ""),),
+            ("here",),
+            (SourceFile("std_msgs/msg/Bool.msg", "bool data"),),
+        )
+        options = SynthesisOptions(
+            deployment=Deployment.LAYER, engine="autoref", allow_livelock=True, allow_reordering=True, maximum_nodes=5
+        )
+        sent_options = pb.SynthesisOptions(
+            deployment=pb.DEPLOYMENT_LAYER,
+            engine="autoref",
+            allow_livelock=True,
+            allow_reordering=True,
+            maximum_nodes=5,
+        )
+        sent = pb.Bundle(
+            main=pb.SourceFile(name="robot.rscd", text="robot \u00e9"),
+            libraries=[pb.SourceFile(name="../shared/a.rscd")],
+            searched=["here"],
+            interfaces=[pb.SourceFile(name="std_msgs/msg/Bool.msg", text="bool data")],
+        )
+        assert request_of(Check(bundle)) == pb.CheckRequest(bundle=sent)
+        assert request_of(Synthesize(bundle, options)) == pb.SynthesizeRequest(bundle=sent, options=sent_options)
+        plain = pb.SynthesisOptions(deployment=pb.DEPLOYMENT_CONTROLLER)
+        assert request_of(Synthesize(bundle)) == pb.SynthesizeRequest(bundle=sent, options=plain)
+        chosen = GenerateOptions("walker", True, True, SupervisedController("p", executable="x"))
+        assert request_of(Generate(bundle, "ros2", chosen, options)) == pb.GenerateRequest(
+            bundle=sent,
+            options=sent_options,
+            target="ros2",
+            generation=pb.GenerateOptions(
+                package="walker",
+                publish_state=True,
+                log_events=True,
+                supervised=pb.SupervisedController(package="p", executable="x"),
+            ),
+        )
+        launched = GenerateOptions(supervised=SupervisedController("p", launch_file="x.launch.py"))
+        found: Any = request_of(Generate(bundle, "ros2", launched))
+        assert found.generation.supervised == pb.SupervisedController(package="p", launch_file="x.launch.py")
+        assert request_of(Explore(bundle, options, 7)) == pb.ExploreRequest(
+            bundle=sent, options=sent_options, maximum_states=7
+        )
+        assert request_of(Format(bundle.main)) == pb.FormatRequest(file=sent.main)
+        assert request_of(
+            Verify(
+                bundle=bundle,
+                supervisor=b"x",
+                deployment=Deployment.LAYER,
+                properties=("AG a",),
+                property_files=(SourceFile("p", "AG b"),),
+                engine="cudd",
+                allow_reordering=True,
+                maximum_nodes=3,
+                maximum_states=9,
+                is_strict=True,
+            )
+        ) == pb.VerifyRequest(
+            bundle=sent,
+            options=pb.SynthesisOptions(
+                deployment=pb.DEPLOYMENT_LAYER, engine="cudd", allow_reordering=True, maximum_nodes=3
+            ),
+            supervisor=b"x",
+            properties=["AG a"],
+            property_files=[pb.SourceFile(name="p", text="AG b")],
+            maximum_states=9,
+            strict=True,
+        )
+        assert request_of(Verify(bundle=bundle)) == pb.VerifyRequest(bundle=sent, options=pb.SynthesisOptions())

@@ -36,7 +36,7 @@ from robosc_api.security import Credentials
 from robosc_bridge.configuration.structure import SupervisorSource
 from robosc_bridge.daemon.kept import is_kept, keep, state_folder
 from robosc_bridge.errors import BridgeError
-from robosc_client import Client, ClientError, ServerUnavailableError, SynthesisStatus
+from robosc_client import Client, ClientError, ServerUnavailableError, SynthesisOptions, SynthesisStatus
 
 MODEL_SUFFIX, SUPERVISOR_SUFFIX = ".rscd", ".rsup"
 _SERVER_LIMIT_S = 120.0
@@ -304,9 +304,8 @@ def _served(bundle: Bundle, server: str, source: Source, tell: Callable[[str], N
     tell(f"{bundle.main.name}: synthesis at {server}")
     try:
         with Client(server, source.credentials) as client:
-            answer = client.synthesize(
-                bundle, deployment=source.deployment, allow_livelock=source.allow_livelock, deadline_s=_SERVER_LIMIT_S
-            )
+            options = SynthesisOptions(deployment=source.deployment, allow_livelock=source.allow_livelock)
+            answer = client.synthesize(bundle, options, deadline_s=_SERVER_LIMIT_S)
     except (ServerUnavailableError, TimeoutError) as error:
         if kept is None or not is_kept(kept):
             raise NoSupervisorError(f"{error}, and none is kept of an earlier start") from error

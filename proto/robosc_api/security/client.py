@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import grpc
+import grpc.aio
 
 from robosc_api.security.addresses import is_loopback_host, split
 from robosc_api.security.errors import SecurityError
@@ -41,15 +42,42 @@ def open_channel(
     Raises:
         SecurityError: A file cannot be used, or a token would be sent in the clear to another machine.
     """
-    is_secure = credentials.is_secure or credentials.ca is not None or credentials.certificate is not None
-    token = None if credentials.token_file is None else _token(credentials.token_file)
-    if not is_secure:
-        if token is not None and not is_loopback_host(_host(address)):
-            raise SecurityError(f"a token is sent to another machine with TLS only, and {address} is one")
-        channel = grpc.insecure_channel(address, options=options)
-    else:
+    token = _usable_token(address, credentials)
+    if _is_secure(credentials):
         channel = grpc.secure_channel(address, _channel_credentials(credentials), options=options)
+    else:
+        channel = grpc.insecure_channel(address, options=options)
     return channel if token is None else grpc.intercept_channel(channel, _Bearer(token))
+
+
+def open_async_channel(
+    address: str,
+    credentials: Credentials = Credentials(),
+    options: tuple[tuple[str, Any], ...] = (),
+) -> grpc.aio.Channel:
+    """The same for asyncio; its calls are to be of one request each.
+
+    Raises:
+        SecurityError: As `open_channel`.
+    """
+    token = _usable_token(address, credentials)
+    interceptors = [] if token is None else [_AsyncBearer(token), _AsyncStreamBearer(token)]
+    if _is_secure(credentials):
+        secrets = _channel_credentials(credentials)
+        return grpc.aio.secure_channel(address, secrets, options=options, interceptors=interceptors)
+    return grpc.aio.insecure_channel(address, options=options, interceptors=interceptors)
+
+
+def _is_secure(credentials: Credentials) -> bool:
+    return credentials.is_secure or credentials.ca is not None or credentials.certificate is not None
+
+
+def _usable_token(address: str, credentials: Credentials) -> str | None:
+    """The token, where it may be sent to the address."""
+    token = None if credentials.token_file is None else _token(credentials.token_file)
+    if token is not None and not _is_secure(credentials) and not is_loopback_host(_host(address)):
+        raise SecurityError(f"a token is sent to another machine with TLS only, and {address} is one")
+    return token
 
 
 def check_credentials(credentials: Credentials) -> None:
@@ -122,3 +150,29 @@ class _Details(grpc.ClientCallDetails):
         self.credentials = meant.credentials
         self.wait_for_ready = meant.wait_for_ready
         self.compression = meant.compression
+
+
+class _AsyncBearer(grpc.aio.UnaryUnaryClientInterceptor):
+    """Shows a token with each call of asyncio that has one answer."""
+
+    def __init__(self, token: str) -> None:
+        self._entry = ("authorization", f"Bearer {token}")
+
+    async def intercept_unary_unary(self, continuation: Any, client_call_details: Any, request: Any) -> Any:
+        """With the token."""
+        return await continuation(_with_entry(client_call_details, self._entry), request)
+
+
+class _AsyncStreamBearer(grpc.aio.UnaryStreamClientInterceptor):
+    """Shows a token with each call of asyncio that has a stream of answers."""
+
+    def __init__(self, token: str) -> None:
+        self._entry = ("authorization", f"Bearer {token}")
+
+    async def intercept_unary_stream(self, continuation: Any, client_call_details: Any, request: Any) -> Any:
+        """With the token."""
+        return await continuation(_with_entry(client_call_details, self._entry), request)
+
+
+def _with_entry(meant: Any, entry: tuple[str, str]) -> Any:
+    return meant._replace(metadata=grpc.aio.Metadata(*(meant.metadata or ()), entry))

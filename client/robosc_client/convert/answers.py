@@ -1,0 +1,158 @@
+"""Parts of response messages to values, each checked."""
+
+from collections.abc import Iterable
+
+from robosc.errors import Diagnostic, RelatedPlace, Severity
+from robosc.explanation import EmptyExplanation, from_text
+from robosc.source import Location, visible
+from robosc.targets import TargetInfo
+from robosc_api.v1 import synthesis_pb2 as pb
+from robosc_client.errors import malformed
+from robosc_client.results import (
+    Progress,
+    ServerInfo,
+    ServerLimits,
+    Statistics,
+    Summary,
+    SynthesisStatus,
+    VerificationStatus,
+)
+
+MAXIMUM_SHOWN = 1000
+"""Characters of a line that is shown while work goes on."""
+
+_MAXIMUM_DIGITS = 4000
+
+_SEVERITIES = {
+    pb.SEVERITY_ERROR: Severity.ERROR,
+    pb.SEVERITY_WARNING: Severity.WARNING,
+    pb.SEVERITY_NOTE: Severity.NOTE,
+}
+_STATUSES = {
+    pb.SYNTHESIS_STATUS_SUPERVISOR: SynthesisStatus.SUPERVISOR,
+    pb.SYNTHESIS_STATUS_EMPTY: SynthesisStatus.EMPTY,
+    pb.SYNTHESIS_STATUS_MODEL_ERRORS: SynthesisStatus.MODEL_ERRORS,
+    pb.SYNTHESIS_STATUS_UNSUPPORTED_MODEL: SynthesisStatus.UNSUPPORTED_MODEL,
+}
+_VERDICTS = {
+    pb.VERIFICATION_STATUS_PASSED: VerificationStatus.PASSED,
+    pb.VERIFICATION_STATUS_FAILED: VerificationStatus.FAILED,
+    pb.VERIFICATION_STATUS_NOT_CHECKED: VerificationStatus.NOT_CHECKED,
+    pb.VERIFICATION_STATUS_PROPERTY_ERRORS: VerificationStatus.PROPERTY_ERRORS,
+    pb.VERIFICATION_STATUS_NO_SUPERVISOR: VerificationStatus.NO_SUPERVISOR,
+    pb.VERIFICATION_STATUS_UNSUPPORTED_MODEL: VerificationStatus.UNSUPPORTED_MODEL,
+}
+
+
+def diagnostics_of(messages: Iterable[pb.Diagnostic]) -> tuple[Diagnostic, ...]:
+    """Findings as the core's values.
+
+    Raises:
+        ServiceError: A severity is unknown.
+    """
+    return tuple(map(_diagnostic, messages))
+
+
+def progress_of(message: pb.Progress) -> Progress:
+    """Where work is: two short texts that are harmless on a terminal."""
+    return Progress(visible(message.stage[:MAXIMUM_SHOWN]), visible(message.message[:MAXIMUM_SHOWN]))
+
+
+def status_of(number: pb.SynthesisStatus) -> SynthesisStatus:
+    """How a synthesis ended.
+
+    Raises:
+        ServiceError: The number says nothing.
+    """
+    if number not in _STATUSES:
+        raise malformed(f"unknown status {number}")
+    return _STATUSES[number]
+
+
+def verification_status_of(number: pb.VerificationStatus) -> VerificationStatus:
+    """What a verification found; raises as `status_of`."""
+    if number not in _VERDICTS:
+        raise malformed(f"unknown status {number}")
+    return _VERDICTS[number]
+
+
+def explanation_of(text: str) -> EmptyExplanation | None:
+    """What is to blame, or None where nothing is told.
+
+    Raises:
+        ServiceError: The text is no such document.
+    """
+    try:
+        return from_text(text) if text else None
+    except ValueError as error:
+        raise malformed(str(error)) from error
+
+
+def summary_of(message: pb.Summary) -> Summary:
+    """A supervisor in figures and words.
+
+    Raises:
+        ServiceError: A count is no number.
+    """
+    return Summary(
+        controllable_events=message.controllable_events,
+        uncontrollable_events=message.uncontrollable_events,
+        states=_count(message.states),
+        transitions=_count(message.transitions) if message.transitions else None,
+        added=tuple((item.event, item.condition) for item in message.added),
+        text=message.text,
+    )
+
+
+def statistics_of(message: pb.Statistics) -> Statistics:
+    """Figures of a synthesis."""
+    return Statistics(message.engine, message.state_bits, message.iterations, message.peak_nodes)
+
+
+def targets_of(message: pb.ListTargetsResponse) -> tuple[TargetInfo, ...]:
+    """What can be generated."""
+    return tuple(TargetInfo(item.name, item.description) for item in message.targets)
+
+
+def server_info_of(message: pb.GetVersionResponse) -> ServerInfo:
+    """What a server is."""
+    limits = message.limits
+    return ServerInfo(
+        version=message.version,
+        engines=tuple(message.engines),
+        limits=ServerLimits(
+            bundle_bytes=limits.bundle_bytes,
+            bundle_files=limits.bundle_files,
+            task_seconds=limits.task_seconds,
+            task_cpu_seconds=limits.task_cpu_seconds,
+            task_memory_bytes=limits.task_memory_bytes,
+            task_nodes=limits.task_nodes,
+            result_bytes=limits.result_bytes,
+            waiting_tasks=limits.waiting_tasks,
+            waiting_tasks_per_caller=limits.waiting_tasks_per_caller,
+            retention_seconds=limits.retention_seconds,
+        ),
+    )
+
+
+def _location(message: pb.Location) -> Location:
+    return Location(message.file, message.line, message.column, message.length)
+
+
+def _diagnostic(message: pb.Diagnostic) -> Diagnostic:
+    if message.severity not in _SEVERITIES:
+        raise malformed(f"unknown severity {message.severity}")
+    return Diagnostic(
+        severity=_SEVERITIES[message.severity],
+        code=message.code,
+        message=message.message,
+        location=_location(message.location) if message.HasField("location") else None,
+        mend=message.mend,
+        related=tuple(RelatedPlace(place.message, _location(place.location)) for place in message.related),
+    )
+
+
+def _count(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and len(text) <= _MAXIMUM_DIGITS):
+        raise malformed("a count is no decimal number")
+    return int(text)

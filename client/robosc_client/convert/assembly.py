@@ -1,0 +1,389 @@
+"""Results put together from the messages of a stream, as they come: no input or output is done here.
+
+Every size that a server declares is looked at before anything is collected, and no more is collected than it declared;
+chunks in another order, after the end, or too long, are refused, and so is a stream that never gets to its result.
+"""
+
+import hashlib
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import msgspec
+
+from robosc.errors import Diagnostic
+from robosc.signatures import MAXIMUM_SIGNATURE_BYTES
+from robosc.targets import GeneratedFiles
+from robosc_api.v1 import jobs_pb2
+from robosc_api.v1 import synthesis_pb2 as pb
+from robosc_client.convert.answers import (
+    diagnostics_of,
+    explanation_of,
+    progress_of,
+    statistics_of,
+    status_of,
+    summary_of,
+    verification_status_of,
+)
+from robosc_client.errors import malformed
+from robosc_client.jobs import TaskKind
+from robosc_client.paths import paths_problem
+from robosc_client.results import (
+    Exploration,
+    Formatted,
+    Generation,
+    Progress,
+    StateGraph,
+    Synthesis,
+    SynthesisStatus,
+    TaskResult,
+    Verification,
+)
+
+MAXIMUM_BYTES = 64 * 2**20
+"""Of one result, and of one message: what a server gives unless its settings say otherwise."""
+
+MAXIMUM_FILES = 10_000
+"""Of one result."""
+
+MAXIMUM_CHUNK_BYTES = 64 * 1024
+"""Of a piece of a file or graph."""
+
+MAXIMUM_PROGRESS = 1_000_000
+"""Messages that tell where the work is: many days of them, from a server that is one."""
+
+
+class Assembly[Result](Protocol):
+    """Puts one result together."""
+
+    def take(self, message: Any) -> Progress | None:
+        """Take the next message; gives what it tells of the work.
+
+        Raises:
+            ServiceError: No server of this version sends it, or not here.
+        """
+
+    def result(self) -> Result:
+        """The result, once the stream has ended.
+
+        Raises:
+            ServiceError: It ended before there was a whole one.
+        """
+
+
+class Whole[Message, Result]:
+    """Of a method that answers with one message."""
+
+    def __init__(self, convert: Callable[[Message], Result]) -> None:
+        self._convert = convert
+        self._found: list[Result] = []
+
+    def take(self, message: Message) -> None:
+        """The answer."""
+        if self._found:
+            raise malformed("there is more after its end")
+        self._found.append(self._convert(message))
+
+    def result(self) -> Result:
+        """The answer."""
+        if not self._found:
+            raise malformed("there is none")
+        return self._found[0]
+
+
+class _Stream:
+    """What every stream of the service has: progress, then one result."""
+
+    def __init__(self) -> None:
+        self._reports = 0
+        self._has_result = False
+
+    def take(self, message: Any) -> Progress | None:
+        """Take the next message."""
+        match message.WhichOneof("event"):
+            case "progress":
+                self._reports += 1
+                if self._has_result or self._reports > MAXIMUM_PROGRESS:
+                    raise malformed("it tells of work for ever, or after its end")
+                return progress_of(message.progress)
+            case "result":
+                if self._has_result:
+                    raise malformed("there is more than one result")
+                self._has_result = True
+                self._take_result(message.result)
+            case "chunk":
+                if not self._has_result:
+                    raise malformed("a piece comes before the result")
+                self._take_chunk(message.chunk)
+            case _:
+                raise malformed("a message says nothing that a client of this version knows")
+        return None
+
+    def _take_result(self, message: Any) -> None:
+        raise NotImplementedError
+
+    def _take_chunk(self, chunk: Any) -> None:
+        raise malformed("there is more after its end")
+
+    def _require_result(self) -> None:
+        if not self._has_result:
+            raise malformed("it ended without a result")
+
+
+class SynthesisAssembly(_Stream):
+    """Of Synthesize."""
+
+    _found: Synthesis
+
+    def _take_result(self, message: pb.SynthesisResult) -> None:
+        status = status_of(message.status)
+        if (status is SynthesisStatus.SUPERVISOR) != bool(message.supervisor):
+            raise malformed("its status and its supervisor do not fit")
+        expected = hashlib.sha256(message.supervisor).digest() if message.supervisor else b""
+        if message.supervisor_digest != expected:
+            raise malformed("the supervisor's digest does not fit")
+        if len(message.signature) > MAXIMUM_SIGNATURE_BYTES or (message.signature and not message.supervisor):
+            raise malformed("it has a signature that is none")
+        self._found = Synthesis(
+            status=status,
+            diagnostics=diagnostics_of(message.diagnostics),
+            reason=message.reason,
+            supervisor=message.supervisor,
+            summary=summary_of(message.summary) if message.HasField("summary") else None,
+            statistics=statistics_of(message.statistics) if message.HasField("statistics") else None,
+            explanation=explanation_of(message.explanation),
+            signature=message.signature,
+        )
+
+    def result(self) -> Synthesis:
+        """How it ended."""
+        self._require_result()
+        return self._found
+
+
+class GenerationAssembly(_Stream):
+    """Of Generate: files, each from its beginning to its end."""
+
+    _head: pb.GenerationResult
+    _status: SynthesisStatus
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._place = 0
+        self._contents: list[bytearray] = []
+
+    def _take_result(self, message: pb.GenerationResult) -> None:
+        self._status = status_of(message.status)
+        if (self._status is SynthesisStatus.SUPERVISOR) != bool(message.files):
+            raise malformed("its status and its files do not fit")
+        if len(message.files) > MAXIMUM_FILES or sum(file.size for file in message.files) > MAXIMUM_BYTES:
+            raise malformed(f"it has more than {MAXIMUM_FILES} files, or {MAXIMUM_BYTES} bytes")
+        paths = [file.path for file in message.files]
+        if paths != sorted(set(paths)):
+            raise malformed("its files are not sorted by their paths")
+        problem = paths_problem(paths)
+        if problem:
+            raise malformed(problem)
+        if message.digest != (_files_digest(message) if message.files else b""):
+            raise malformed("the digest of its files does not fit")
+        self._head = message
+        self._contents = [bytearray() for _ in message.files]
+
+    def _take_chunk(self, chunk: pb.FileChunk) -> None:
+        files = self._head.files
+        if chunk.file >= len(files):
+            raise malformed("a piece of no file")
+        while self._place < chunk.file and self._is_whole(self._place):
+            self._place += 1
+        content, size = self._contents[chunk.file], files[chunk.file].size
+        if chunk.file != self._place or chunk.offset != len(content):
+            raise malformed("pieces of files are not in their order")
+        # A piece of nothing would be a way to go on for ever; an empty file may have one.
+        is_empty = not chunk.data and size > 0
+        if is_empty or len(chunk.data) > MAXIMUM_CHUNK_BYTES or len(content) + len(chunk.data) > size:
+            raise malformed("a piece of a file is empty or too long")
+        content += chunk.data
+        if not size:
+            self._place += 1
+
+    def _is_whole(self, place: int) -> bool:
+        return len(self._contents[place]) == self._head.files[place].size
+
+    def result(self) -> Generation:
+        """How it ended."""
+        self._require_result()
+        head = self._head
+        files = None
+        if self._status is SynthesisStatus.SUPERVISOR:
+            if not all(map(self._is_whole, range(len(head.files)))):
+                raise malformed("it ended in the middle of the files")
+            files = self._files()
+        return Generation(
+            self._status, diagnostics_of(head.diagnostics), head.reason, files, explanation_of(head.explanation)
+        )
+
+    def _files(self) -> GeneratedFiles:
+        texts: dict[str, str] = {}
+        for file, content in zip(self._head.files, self._contents, strict=True):
+            if hashlib.sha256(content).digest() != file.digest:
+                raise malformed(f"the digest of {file.path!r} does not fit")
+            try:
+                texts[file.path] = content.decode("utf-8")
+            except UnicodeDecodeError as error:
+                raise malformed(f"{file.path!r} is no UTF-8") from error
+        try:
+            return GeneratedFiles(texts, frozenset(file.path for file in self._head.files if file.executable))
+        except ValueError as error:
+            raise malformed(str(error)) from error
+
+
+def _files_digest(message: pb.GenerationResult) -> bytes:
+    """The digest over all files, as the API defines it."""
+    listing = hashlib.sha256()
+    for file in message.files:
+        try:
+            path = file.path.encode("utf-8")
+        except UnicodeEncodeError as error:
+            raise malformed("a path is no Unicode") from error
+        listing.update(path + b"\0" + (b"\1" if file.executable else b"\0") + file.digest)
+    return listing.digest()
+
+
+class ExplorationAssembly(_Stream):
+    """Of Explore: one document in pieces."""
+
+    _head: pb.ExplorationResult
+    _status: SynthesisStatus
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._content = bytearray()
+
+    def _take_result(self, message: pb.ExplorationResult) -> None:
+        self._status = status_of(message.status)
+        if (self._status is SynthesisStatus.SUPERVISOR) != bool(message.size):
+            raise malformed("its status and its graph do not fit")
+        if message.size > MAXIMUM_BYTES:
+            raise malformed(f"the graph has more than {MAXIMUM_BYTES} bytes")
+        self._head = message
+
+    def _take_chunk(self, chunk: bytes) -> None:
+        if not 0 < len(chunk) <= MAXIMUM_CHUNK_BYTES or len(self._content) + len(chunk) > self._head.size:
+            raise malformed("a piece of the graph is empty or too long")
+        self._content += chunk
+
+    def result(self) -> Exploration:
+        """How it ended."""
+        self._require_result()
+        head = self._head
+        if len(self._content) != head.size:
+            raise malformed("it ended in the middle of the graph")
+        if head.digest != (hashlib.sha256(self._content).digest() if head.size else b""):
+            raise malformed("the graph's digest does not fit")
+        return Exploration(
+            self._status,
+            diagnostics_of(head.diagnostics),
+            head.reason,
+            self._graph() if head.size else None,
+            explanation_of(head.explanation),
+        )
+
+    def _graph(self) -> StateGraph:
+        try:
+            graph = msgspec.json.decode(self._content, type=StateGraph)
+        except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+            raise malformed(f"the graph is none: {error}") from error
+        numbers = range(len(graph.states))
+        is_whole = graph.initial in numbers and all(a in numbers and b in numbers for a, _, b in graph.transitions)
+        if not is_whole or (len(graph.states), len(graph.transitions)) != (self._head.states, self._head.transitions):
+            raise malformed("the graph lacks states or transitions")
+        return graph
+
+
+class VerificationAssembly(_Stream):
+    """Of Verify."""
+
+    _found: Verification
+
+    def _take_result(self, message: pb.VerificationResult) -> None:
+        try:
+            report = msgspec.json.decode(message.report, type=dict[str, Any]) if message.report else {}
+        except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
+            raise malformed(f"the report is none: {error}") from error
+        self._found = Verification(
+            verification_status_of(message.status), diagnostics_of(message.diagnostics), message.reason, report
+        )
+
+    def result(self) -> Verification:
+        """How it ended."""
+        self._require_result()
+        return self._found
+
+
+def check_assembly() -> Whole[pb.CheckResponse, tuple[Diagnostic, ...]]:
+    """Of Check."""
+    return Whole(lambda message: diagnostics_of(message.diagnostics))
+
+
+def format_assembly(before: str | None) -> Whole[pb.FormatResponse, Formatted]:
+    """Of Format.
+
+    Args:
+        before: The text that was given: only its layout may be another afterwards; None: it is not at hand.
+    """
+
+    def convert(message: pb.FormatResponse) -> Formatted:
+        diagnostics = diagnostics_of(message.diagnostics)
+        text = None if diagnostics else message.text
+        if text is not None and before is not None and _letters(text) != _letters(before):
+            raise malformed("the text differs in more than its layout")
+        return Formatted(text, diagnostics)
+
+    return Whole(convert)
+
+
+def _letters(text: str) -> str:
+    return "".join(text.split())
+
+
+class JobResultAssembly:
+    """Of GetJobResult: the messages of one of the others, each in an envelope."""
+
+    def __init__(self) -> None:
+        self._kind: TaskKind | None = None
+        self._inner: Assembly[TaskResult]
+
+    def take(self, message: jobs_pb2.GetJobResultResponse) -> None:
+        """Take the next message."""
+        name = message.WhichOneof("response")
+        if name is None or name not in TaskKind:
+            raise malformed("a message says nothing that a client of this version knows")
+        if self._kind is None:
+            self._kind = TaskKind(name)
+            self._inner = assembly_of(self._kind)
+        if self._kind is not TaskKind(name):
+            raise malformed("results of two kinds")
+        if self._inner.take(getattr(message, name)) is not None:
+            raise malformed("a result tells of work")
+
+    def result(self) -> TaskResult:
+        """The result."""
+        if self._kind is None:
+            raise malformed("it ended without a result")
+        return self._inner.result()
+
+
+def assembly_of(kind: TaskKind) -> Assembly[TaskResult]:
+    """A new assembly for the responses of a kind of task."""
+    match kind:
+        case TaskKind.CHECK:
+            return check_assembly()
+        case TaskKind.SYNTHESIZE:
+            return SynthesisAssembly()
+        case TaskKind.GENERATE:
+            return GenerationAssembly()
+        case TaskKind.EXPLORE:
+            return ExplorationAssembly()
+        case TaskKind.VERIFY:
+            return VerificationAssembly()
+        case TaskKind.FORMAT:
+            return format_assembly(None)

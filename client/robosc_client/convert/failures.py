@@ -1,0 +1,61 @@
+"""How a call failed, as gRPC tells it and as google.rpc tells more (AIP-193)."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import grpc
+
+from robosc.source import visible
+
+_DETAILS = "grpc-status-details-bin"
+_DOMAIN = "robosc"
+_MAXIMUM_MESSAGE = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """How a call failed.
+
+    Attributes:
+        code: gRPC's status code.
+        message: One sentence; harmless on a terminal.
+        reason: The server's word for it; empty: it has told none.
+        retry_after_s: When the server wants to be asked again; None: it has not told.
+    """
+
+    code: grpc.StatusCode
+    message: str = ""
+    reason: str = ""
+    retry_after_s: float | None = None
+
+
+def failure_of(error: grpc.RpcError) -> Failure:
+    """How a call failed; what is malformed in the details counts as not told."""
+    # Every error of a call is also a grpc.Call; the stubs do not say so.
+    call: Any = error
+    message = visible((call.details() or "")[:_MAXIMUM_MESSAGE])
+    for key, value in call.trailing_metadata() or ():
+        if key == _DETAILS and isinstance(value, bytes):
+            reason, retry_after_s = _details(value)
+            return Failure(call.code(), message, reason, retry_after_s)
+    return Failure(call.code(), message)
+
+
+def _details(content: bytes) -> tuple[str, float | None]:
+    """Reason, and seconds to wait. What they are written in is imported when it is needed."""
+    from google.protobuf.message import DecodeError
+    from google.rpc import error_details_pb2, status_pb2
+
+    reason, retry_after_s = "", None
+    try:
+        for item in status_pb2.Status.FromString(content).details:
+            info, retry = error_details_pb2.ErrorInfo(), error_details_pb2.RetryInfo()
+            if item.Unpack(info) and info.domain == _DOMAIN:
+                reason = visible(info.reason[:100])
+            elif item.Unpack(retry):
+                seconds = retry.retry_delay.seconds + retry.retry_delay.nanos / 1e9
+                retry_after_s = seconds if math.isfinite(seconds) and seconds >= 0 else None
+    except DecodeError:
+        return "", None
+    return reason, retry_after_s

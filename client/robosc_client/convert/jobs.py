@@ -1,0 +1,91 @@
+"""Messages about jobs to values, each checked."""
+
+import re
+from datetime import UTC, datetime
+
+from google.protobuf.timestamp_pb2 import Timestamp
+
+from robosc.source import visible
+from robosc_api.v1 import jobs_pb2 as pb
+from robosc_client.convert.answers import MAXIMUM_SHOWN, progress_of
+from robosc_client.errors import malformed
+from robosc_client.jobs import Job, JobFailure, JobState, Submission, TaskKind
+
+_ID = re.compile(r"[A-Za-z0-9-]{1,100}\Z")
+
+_KINDS = {
+    pb.TASK_KIND_CHECK: TaskKind.CHECK,
+    pb.TASK_KIND_SYNTHESIZE: TaskKind.SYNTHESIZE,
+    pb.TASK_KIND_GENERATE: TaskKind.GENERATE,
+    pb.TASK_KIND_EXPLORE: TaskKind.EXPLORE,
+    pb.TASK_KIND_VERIFY: TaskKind.VERIFY,
+    pb.TASK_KIND_FORMAT: TaskKind.FORMAT,
+}
+_STATES = {
+    pb.JOB_STATE_QUEUED: JobState.QUEUED,
+    pb.JOB_STATE_RUNNING: JobState.RUNNING,
+    pb.JOB_STATE_SUCCEEDED: JobState.SUCCEEDED,
+    pb.JOB_STATE_FAILED: JobState.FAILED,
+    pb.JOB_STATE_CANCELLED: JobState.CANCELLED,
+}
+
+
+def job_of(message: pb.Job) -> Job:
+    """A job; its texts are harmless on a terminal.
+
+    Raises:
+        ServiceError: The message is of no job.
+    """
+    if not _ID.match(message.id):
+        raise malformed("a job's id is none")
+    if message.kind not in _KINDS or message.state not in _STATES:
+        raise malformed(f"unknown kind {message.kind} or state {message.state} of a job")
+    state = _STATES[message.state]
+    if (state is JobState.FAILED) != message.HasField("failure"):
+        raise malformed("a job's state and its failure do not fit")
+    return Job(
+        id=message.id,
+        owner=_shown(message.owner),
+        kind=_KINDS[message.kind],
+        state=state,
+        revision=message.revision,
+        main_file=_shown(message.main_file),
+        label=_shown(message.label),
+        created=_time(message.create_time),
+        started=_time(message.start_time) if message.HasField("start_time") else None,
+        ended=_time(message.end_time) if message.HasField("end_time") else None,
+        expires=_time(message.expire_time) if message.HasField("expire_time") else None,
+        attempts=message.attempts,
+        progress=progress_of(message.progress) if message.HasField("progress") else None,
+        failure=JobFailure(_shown(message.failure.reason), _shown(message.failure.message))
+        if message.HasField("failure")
+        else None,
+        from_store=message.from_store,
+        waiting_before=message.waiting_before,
+    )
+
+
+def submission_of(message: pb.SubmitJobResponse) -> Submission:
+    """What became of a submission; raises as `job_of`."""
+    return Submission(job_of(message.job), message.existed)
+
+
+def job_in(message: pb.GetJobResponse | pb.CancelJobResponse | pb.WatchJobResponse) -> Job:
+    """The job in an answer; raises as `job_of`."""
+    return job_of(message.job)
+
+
+def page_of(message: pb.ListJobsResponse) -> tuple[tuple[Job, ...], str]:
+    """Jobs, and what asks for those that follow; raises as `job_of`."""
+    return tuple(map(job_of, message.jobs)), message.next_page_token
+
+
+def _shown(text: str) -> str:
+    return visible(text[:MAXIMUM_SHOWN])
+
+
+def _time(message: Timestamp) -> datetime:
+    try:
+        return message.ToDatetime(UTC)
+    except (ValueError, OverflowError) as error:
+        raise malformed("a time is none") from error

@@ -1,0 +1,62 @@
+"""Names of files that a server sends: only those that are harmless in a folder, on any system, are taken.
+
+On top of what `robosc.targets.GeneratedFiles` refuses (absolute paths, `..`, backslashes, drives, what Windows forbids,
+the manifest) these are about names that a system understands in its own way, and about names that meet each other.
+"""
+
+import unicodedata
+from collections.abc import Iterable
+from pathlib import PurePosixPath
+
+MAXIMUM_NAME_BYTES = 255
+"""Of one part of a path: what the usual file systems take."""
+
+MAXIMUM_PATH_BYTES = 1024
+"""Of a whole path."""
+
+_DEVICES = frozenset(
+    ["con", "prn", "aux", "nul", "conin$", "conout$"]
+    + [f"{name}{number}" for name in ("com", "lpt") for number in "0123456789¹²³"]
+)
+"""What Windows takes for a device, whatever its extension."""
+
+
+def path_problem(path: str) -> str:
+    """What is wrong with one path; empty: nothing."""
+    try:
+        length = len(path.encode("utf-8"))
+    except UnicodeEncodeError:
+        return "it is no Unicode"
+    if length > MAXIMUM_PATH_BYTES:
+        return f"it has more than {MAXIMUM_PATH_BYTES} bytes"
+    if not path.isprintable():
+        return "it has characters that are not printable"
+    for part in PurePosixPath(path).parts:
+        if len(part.encode("utf-8")) > MAXIMUM_NAME_BYTES:
+            return f"a name in it has more than {MAXIMUM_NAME_BYTES} bytes"
+        if part != part.strip() or part.endswith("."):
+            return "a name in it begins or ends with a blank, or ends with a full stop"
+        if part.partition(".")[0].rstrip().casefold() in _DEVICES:
+            return "a name in it stands for a device on Windows"
+    return ""
+
+
+def paths_problem(paths: Iterable[str]) -> str:
+    """What is wrong with some paths, together; empty: nothing.
+
+    Two names that differ in case, or in how their letters are composed, are one file on some systems; and a file cannot
+    be the folder of another.
+    """
+    files: set[str] = set()
+    folders: set[str] = set()
+    for path in paths:
+        problem = path_problem(path)
+        if problem:
+            return f"{path[:100]!r}: {problem}"
+        folded = PurePosixPath(unicodedata.normalize("NFKC", path).casefold())
+        if str(folded) in files:
+            return f"{path!r}: two files of that name, but for the case of letters"
+        files.add(str(folded))
+        folders.update(str(parent) for parent in folded.parents)
+    both = sorted(files & folders)
+    return f"{both[0]!r}: a file and a folder of that name" if both else ""

@@ -1,0 +1,177 @@
+"""When a call that failed is made again: decided here, without making or waiting for anything.
+
+Tried again is what cannot have any effect twice: every task gives the same result for the same request, and a job is
+submitted with a key by which the server knows it. The delays grow exponentially and are scattered at random, so that
+clients that lost one server together do not come back together (Marc Brooker, "Exponential Backoff And Jitter", AWS
+Architecture Blog, 2015).
+"""
+
+import random
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import grpc
+
+from robosc_client.convert.failures import Failure
+from robosc_client.errors import (
+    ClientError,
+    DeadlineError,
+    JobError,
+    RequestRefusedError,
+    ServerBusyError,
+    ServerUnavailableError,
+    ServiceError,
+)
+
+# gRPC measures a deadline with a clock of its own.
+_CLOCK_TOLERANCE_S = 0.05
+
+_BUSY = frozenset({"SERVER_BUSY", "QUOTA_EXCEEDED"})
+
+_REFUSALS = frozenset(
+    {
+        grpc.StatusCode.INVALID_ARGUMENT,
+        grpc.StatusCode.PERMISSION_DENIED,
+        grpc.StatusCode.RESOURCE_EXHAUSTED,
+        grpc.StatusCode.UNAUTHENTICATED,
+    }
+)
+_JOB_CODES = frozenset({grpc.StatusCode.NOT_FOUND, grpc.StatusCode.FAILED_PRECONDITION, grpc.StatusCode.ALREADY_EXISTS})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RetryPolicy:
+    """How often and when calls are made again.
+
+    Attributes:
+        attempts: Calls in all, the first included; 1: none is made again.
+        watch_attempts: The same for a watch, after each message anew.
+        first_s: The first delay, before it is scattered between a half and the whole of it.
+        factor: Each delay by the one before: from 1 to 10.
+        longest_s: The longest delay.
+        longest_asked_s: The longest delay that a server may ask for; if it asks for more, its error is raised.
+        scatter: Random numbers from 0 to 1.
+        clock: Seconds, as `time.monotonic`.
+    """
+
+    attempts: int = 4
+    watch_attempts: int = 10
+    first_s: float = 0.1
+    factor: float = 2.0
+    longest_s: float = 10.0
+    longest_asked_s: float = 60.0
+    scatter: Callable[[], float] = random.random
+    clock: Callable[[], float] = time.monotonic
+
+    def __post_init__(self) -> None:
+        is_sound = 0 < self.first_s <= self.longest_s and 1 <= self.factor <= 10
+        if min(self.attempts, self.watch_attempts) < 1 or not is_sound:
+            raise ValueError("a call needs at least one attempt, and delays that grow by a factor from 1 to 10")
+
+
+DEFAULT_RETRIES = RetryPolicy()
+
+NO_RETRIES = RetryPolicy(attempts=1, watch_attempts=1)
+"""Every failure is told at once."""
+
+
+class Attempts:
+    """One call, as often as it is made."""
+
+    def __init__(self, policy: RetryPolicy, address: str, deadline_s: float | None, *, is_watch: bool = False) -> None:
+        """Begin.
+
+        Args:
+            policy: How often and when.
+            address: Whom it is made to, for messages.
+            deadline_s: Seconds from now that all attempts and delays may take together; None: any number.
+            is_watch: Whether what was received counts for the next attempt, too.
+        """
+        self._policy = policy
+        self._address = address
+        self._deadline_s = deadline_s
+        self._begun_s = policy.clock()
+        self._most = policy.watch_attempts if is_watch else policy.attempts
+        self._is_watch = is_watch
+        self._failed = 0
+
+    def timeout_s(self) -> float | None:
+        """Seconds that the next attempt may take; None: any number.
+
+        Raises:
+            DeadlineError: There are none left.
+        """
+        left_s = self._left_s()
+        if left_s is not None and left_s <= 0:
+            raise self._deadline_error()
+        return left_s
+
+    def succeeded(self) -> None:
+        """Something was received: a watch has all its attempts again."""
+        self._failed = 0
+
+    def delay_after(self, failure: Failure, *, has_answered: bool) -> float:
+        """Seconds until the next attempt.
+
+        Args:
+            failure: How the last one failed.
+            has_answered: Whether it had received anything.
+
+        Raises:
+            ClientError: There is no next one.
+        """
+        self._failed += 1
+        if not self._is_worth_it(failure, has_answered=has_answered) or self._failed >= self._most:
+            raise self._error(failure)
+        delay_s = self._delay_s(failure.retry_after_s)
+        left_s = self._left_s()
+        if delay_s is None or (left_s is not None and delay_s >= left_s):
+            raise self._error(failure)
+        return delay_s
+
+    def _is_worth_it(self, failure: Failure, *, has_answered: bool) -> bool:
+        if failure.code is grpc.StatusCode.UNAVAILABLE:
+            return self._is_watch or not has_answered
+        is_busy = failure.code is grpc.StatusCode.RESOURCE_EXHAUSTED and failure.reason in _BUSY
+        return is_busy and failure.retry_after_s is not None
+
+    def _delay_s(self, asked_s: float | None) -> float | None:
+        """None: the server asks for more than is waited."""
+        policy = self._policy
+        # No number of failures makes the power too large.
+        grown_s = policy.first_s * policy.factor ** min(self._failed - 1, 64)
+        delay_s = min(grown_s, policy.longest_s) * (0.5 + policy.scatter() / 2)
+        if asked_s is None:
+            return delay_s
+        return None if asked_s > policy.longest_asked_s else asked_s + delay_s / 2
+
+    def _left_s(self) -> float | None:
+        if self._deadline_s is None:
+            return None
+        return self._begun_s + self._deadline_s - self._policy.clock()
+
+    def _deadline_error(self) -> DeadlineError:
+        return DeadlineError(f"no result from {self._address} within {self._deadline_s:g} seconds")
+
+    def _error(self, failure: Failure) -> ClientError:
+        """Our error for a failure."""
+        code, reason, message = failure.code, failure.reason, failure.message
+        if code is grpc.StatusCode.UNAVAILABLE:
+            if reason:
+                return ServerUnavailableError(f"the server at {self._address} cannot do it now: {message}", reason)
+            return ServerUnavailableError(f"no server answers at {self._address}")
+        if code is grpc.StatusCode.DEADLINE_EXCEEDED:
+            left_s = self._left_s()
+            if left_s is not None and left_s <= _CLOCK_TOLERANCE_S:
+                return self._deadline_error()
+            return DeadlineError(f"no result from {self._address}: {message}", reason)
+        if reason in _BUSY:
+            return ServerBusyError(f"the server at {self._address} refuses: {message}", reason, failure.retry_after_s)
+        if code in _REFUSALS:
+            return RequestRefusedError(f"the server at {self._address} refuses: {message}", reason)
+        if code in _JOB_CODES:
+            return JobError(f"the server at {self._address} answers: {message}", reason)
+        if code is grpc.StatusCode.UNIMPLEMENTED:
+            return ServiceError(f"what answers at {self._address} is no RoboSC server of this version")
+        return ServiceError(f"the server at {self._address} failed ({code.name.lower()}): {message}", reason)

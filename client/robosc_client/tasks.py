@@ -1,0 +1,107 @@
+"""What a server can be asked to do, as values: done at once, or submitted as a job."""
+
+from dataclasses import dataclass
+
+from robosc.model.structure import Deployment
+from robosc.source import Bundle, SourceFile
+from robosc.targets import GenerateOptions
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SynthesisOptions:
+    """How a supervisor is made.
+
+    Attributes:
+        deployment: Where the supervisor will stand.
+        engine: Name of the server's engine for decision diagrams, or `auto`.
+        allow_livelock: Whether a supervisor is made even if silent steps of its controller never end.
+        allow_reordering: Whether the engine may change the order of its variables while it works.
+        maximum_nodes: Nodes of decision diagrams beyond which the work is given up; None: the server's limit.
+    """
+
+    deployment: Deployment = Deployment.CONTROLLER
+    engine: str = "auto"
+    allow_livelock: bool = False
+    allow_reordering: bool = False
+    maximum_nodes: int | None = None
+
+
+DEFAULT_OPTIONS = SynthesisOptions()
+DEFAULT_GENERATION = GenerateOptions()
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """Find everything that is wrong with a model or library."""
+
+    bundle: Bundle
+
+
+@dataclass(frozen=True, slots=True)
+class Synthesize:
+    """Synthesize and certify a supervisor."""
+
+    bundle: Bundle
+    options: SynthesisOptions = DEFAULT_OPTIONS
+
+
+@dataclass(frozen=True, slots=True)
+class Generate:
+    """Synthesize a supervisor, and generate the files of a target around it."""
+
+    bundle: Bundle
+    target: str
+    generation: GenerateOptions = DEFAULT_GENERATION
+    options: SynthesisOptions = DEFAULT_OPTIONS
+
+
+@dataclass(frozen=True, slots=True)
+class Explore:
+    """Explore everything that the robot may do under its supervisor.
+
+    Attributes:
+        maximum_states: States beyond which it is given up; None: 100,000.
+    """
+
+    bundle: Bundle
+    options: SynthesisOptions = DEFAULT_OPTIONS
+    maximum_states: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verify:
+    """Check a supervisor against its model, or verify properties of the robot under its supervisor.
+
+    Attributes:
+        bundle: The model and its libraries.
+        supervisor: A supervisor's file (`.rsup`), of which nothing is believed; empty: one is made of the model.
+        deployment: Where the supervisor is to stand; None: as its file says, and a controller without one.
+        properties: Properties in the property language.
+        property_files: Texts with a property on each line.
+        engine: As in SynthesisOptions.
+        allow_reordering: As in SynthesisOptions.
+        maximum_nodes: As in SynthesisOptions.
+        maximum_states: States up to which a given supervisor is searched one by one; None: 1,000,000.
+        is_strict: Whether a given supervisor passes only if permissiveness was checked, too.
+    """
+
+    bundle: Bundle
+    supervisor: bytes = b""
+    deployment: Deployment | None = None
+    properties: tuple[str, ...] = ()
+    property_files: tuple[SourceFile, ...] = ()
+    engine: str = "auto"
+    allow_reordering: bool = False
+    maximum_nodes: int | None = None
+    maximum_states: int | None = None
+    is_strict: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """Put a text into its canonical layout."""
+
+    file: SourceFile
+
+
+type Task = Check | Synthesize | Generate | Explore | Verify | Format

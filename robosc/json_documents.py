@@ -1,0 +1,34 @@
+"""JSON documents for machines: the same text wherever they are made, on the command line or in a service."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+
+from robosc.errors import Diagnostic, Severity
+
+_INDENT = 2
+
+
+def json_pieces(document: Mapping[str, object], *, is_ascii: bool = False) -> Iterator[str]:
+    """The text of a document in pieces, keys in the order given.
+
+    Args:
+        document: JSON values.
+        is_ascii: Whether other characters are escaped.
+    """
+    yield from json.JSONEncoder(indent=_INDENT, ensure_ascii=is_ascii, allow_nan=False).iterencode(document)
+    yield "\n"
+
+
+def json_text(document: Mapping[str, object], *, is_ascii: bool = False) -> str:
+    """The text of a document, as `json_pieces` cuts it."""
+    return "".join(json_pieces(document, is_ascii=is_ascii))
+
+
+def counts(diagnostics: Sequence[Diagnostic]) -> dict[str, int]:
+    """How many errors, warnings and notes there are."""
+    return {f"{severity}s": sum(diagnostic.severity is severity for diagnostic in diagnostics) for severity in Severity}
+
+
+def diagnostics_json(diagnostics: Sequence[Diagnostic]) -> dict[str, object]:
+    """The findings and their counts as JSON values."""
+    return {**counts(diagnostics), "diagnostics": [diagnostic.to_json() for diagnostic in diagnostics]}

@@ -1,0 +1,77 @@
+"""An attempt to make a supervisor, and what is told of it however it ends."""
+
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any, Protocol, Self
+
+from robosc.errors import UnsupportedModelError
+from robosc.explanation import to_text
+from robosc.model.structure import Deployment
+from robosc.supervisor import Made, make_supervisor
+from robosc_api.v1 import synthesis_pb2 as pb
+from robosc_server.tasks.convert import given, told
+from robosc_server.tasks.task import Report
+
+OnReport = Callable[[Report], None]
+
+
+class Request(Protocol):
+    """A request for something that needs a supervisor."""
+
+    @property
+    def bundle(self) -> pb.Bundle:
+        """The model and its libraries."""
+
+    @property
+    def options(self) -> pb.SynthesisOptions:
+        """How it is made."""
+
+
+class Attempt:
+    """Around all that may find out that a model cannot be handled: that error is kept, and ends the block.
+
+    Attributes:
+        made: What was made; None where the attempt did not come so far.
+        error: Why the model cannot be handled, or None.
+    """
+
+    def __init__(self) -> None:
+        self.made: Made | None = None
+        self.error: UnsupportedModelError | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> bool:
+        if isinstance(error, UnsupportedModelError):
+            self.error = error
+            return True
+        return False
+
+    def make(self, request: Request, maximum_nodes: int, on_report: OnReport, *, allow_livelock: bool) -> Made:
+        """Make the supervisor that a request is about."""
+        options = request.options
+        self.made = make_supervisor(
+            given.bundle(request.bundle),
+            deployment=given.deployment(options) or Deployment.CONTROLLER,
+            engine=given.engine(options, maximum_nodes),
+            allow_livelock=allow_livelock,
+            on_progress=lambda step: on_report(Report(step.stage, step.message)),
+        )
+        return self.made
+
+    def ending(self) -> dict[str, Any]:
+        """The fields that every result has: `status`, `diagnostics`, `reason` and `explanation`."""
+        made, error = self.made, self.error
+        diagnostics = made.diagnostics if made else ()
+        if error is not None or made is None:
+            status, reason = pb.SYNTHESIS_STATUS_UNSUPPORTED_MODEL, str(error)
+            return {"status": status, "diagnostics": told.findings(diagnostics), "reason": reason}
+        return {
+            "status": told.STATUSES[made.status],
+            "diagnostics": told.findings(diagnostics),
+            "reason": made.reason,
+            "explanation": to_text(made.explanation) if made.explanation else "",
+        }

@@ -1,0 +1,67 @@
+"""What requests give: texts and options, as the core's values. Requests have been accepted: their names are right."""
+
+from collections.abc import Iterable
+
+from robosc.model.structure import Deployment
+from robosc.source import Bundle, SourceFile
+from robosc.synthesis import EngineOptions
+from robosc.targets import GenerateOptions, SupervisedController
+from robosc_api.v1 import synthesis_pb2 as pb
+
+
+class OptionError(Exception):
+    """Options that cannot be; one sentence for the caller."""
+
+
+_DEPLOYMENTS = {pb.DEPLOYMENT_CONTROLLER: Deployment.CONTROLLER, pb.DEPLOYMENT_LAYER: Deployment.LAYER}
+
+
+def bundle(message: pb.Bundle) -> Bundle:
+    """The texts, libraries and interfaces by name: their order in a request means nothing."""
+    return Bundle(
+        main=source_file(message.main),
+        libraries=_sorted_files(message.libraries),
+        searched=tuple(message.searched),
+        interfaces=_sorted_files(message.interfaces),
+    )
+
+
+def source_file(message: pb.SourceFile) -> SourceFile:
+    """One text."""
+    return SourceFile(message.name, message.text)
+
+
+def _sorted_files(messages: Iterable[pb.SourceFile]) -> tuple[SourceFile, ...]:
+    return tuple(sorted(map(source_file, messages), key=lambda file: file.name))
+
+
+def deployment(options: pb.SynthesisOptions) -> Deployment | None:
+    """Where a supervisor will stand, or must; None: it is not said."""
+    return _DEPLOYMENTS.get(options.deployment)
+
+
+def engine_name(options: pb.SynthesisOptions) -> str:
+    """The engine that is asked for."""
+    return options.engine or "auto"
+
+
+def engine(options: pb.SynthesisOptions, maximum_nodes: int) -> EngineOptions:
+    """How decision diagrams are made, with no more nodes than `maximum_nodes`."""
+    nodes = min(options.maximum_nodes or maximum_nodes, maximum_nodes)
+    return EngineOptions(engine_name(options), options.allow_reordering, nodes)
+
+
+def generation(options: pb.GenerateOptions) -> GenerateOptions:
+    """What is chosen about generated files.
+
+    Raises:
+        OptionError: A name of the supervised controller is none.
+    """
+    supervised = None
+    if options.HasField("supervised"):
+        named = options.supervised
+        try:
+            supervised = SupervisedController(named.package, named.executable or None, named.launch_file or None)
+        except ValueError as error:
+            raise OptionError(f"the supervised controller: {error}") from error
+    return GenerateOptions(options.package or None, options.publish_state, options.log_events, supervised)

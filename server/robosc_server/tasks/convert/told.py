@@ -1,0 +1,73 @@
+"""What responses tell: findings and figures, as messages."""
+
+from collections.abc import Iterable
+
+from robosc.automata import to_automata
+from robosc.errors import Diagnostic, RelatedPlace, Severity
+from robosc.source import Location
+from robosc.supervisor import MadeStatus, Supervisor
+from robosc.supervisor.summary import added_texts, summary_text
+from robosc.synthesis import Statistics
+from robosc_api.v1 import synthesis_pb2 as pb
+
+_SEVERITIES = {
+    Severity.ERROR: pb.SEVERITY_ERROR,
+    Severity.WARNING: pb.SEVERITY_WARNING,
+    Severity.NOTE: pb.SEVERITY_NOTE,
+}
+
+STATUSES = {
+    MadeStatus.SUPERVISOR: pb.SYNTHESIS_STATUS_SUPERVISOR,
+    MadeStatus.EMPTY: pb.SYNTHESIS_STATUS_EMPTY,
+    MadeStatus.MODEL_ERRORS: pb.SYNTHESIS_STATUS_MODEL_ERRORS,
+}
+
+
+def findings(diagnostics: Iterable[Diagnostic]) -> list[pb.Diagnostic]:
+    """All findings, in their order."""
+    return [
+        pb.Diagnostic(
+            severity=_SEVERITIES[item.severity],
+            code=item.code,
+            message=item.message,
+            location=_location(item.location) if item.location else None,
+            mend=item.mend,
+            related=map(_related, item.related),
+        )
+        for item in diagnostics
+    ]
+
+
+def _location(location: Location) -> pb.Location:
+    return pb.Location(file=location.file, line=location.line, column=location.column, length=location.length)
+
+
+def _related(place: RelatedPlace) -> pb.RelatedPlace:
+    return pb.RelatedPlace(message=place.message, location=_location(place.location))
+
+
+def statistics(found: Statistics) -> pb.Statistics:
+    """Figures of the work."""
+    return pb.Statistics(
+        engine=found.engine,
+        state_bits=found.state_bits,
+        iterations=found.iterations,
+        peak_nodes=found.peak_nodes,
+    )
+
+
+def summary(supervisor: Supervisor) -> pb.Summary:
+    """A supervisor in figures and words."""
+    system = to_automata(supervisor.model, supervisor.deployment)
+    controllable = sum(event.is_controllable for event in system.events)
+    return pb.Summary(
+        controllable_events=controllable,
+        uncontrollable_events=len(system.events) - controllable,
+        states=supervisor.certificate.states,
+        transitions=supervisor.certificate.transitions or "",
+        added=[
+            pb.AddedCondition(event=event, condition=condition)
+            for event, condition in added_texts(supervisor, system).items()
+        ],
+        text=summary_text(supervisor),
+    )

@@ -1,0 +1,58 @@
+"""What this server is and can generate: answers that stay the same as long as it runs.
+
+Making them imports targets and looks for engines, which takes a while: make them once, before serving.
+"""
+
+from robosc._version import __version__
+from robosc_api.v1 import synthesis_pb2 as pb
+from robosc_server.tasks.requests import RequestLimits
+from robosc_server.tasks.task import TaskLimits
+
+
+def server_limits(
+    request: RequestLimits,
+    task: TaskLimits,
+    *,
+    waiting_tasks: int,
+    waiting_tasks_per_caller: int,
+    retention_seconds: float,
+) -> pb.ServerLimits:
+    """What a server takes and gives.
+
+    Args:
+        request: What a request may have.
+        task: What a task may take.
+        waiting_tasks: Tasks that may wait, of all callers together.
+        waiting_tasks_per_caller: Tasks of one caller that may wait.
+        retention_seconds: How long a job is kept after it has ended.
+    """
+    return pb.ServerLimits(
+        bundle_bytes=request.bundle_bytes,
+        bundle_files=request.bundle_files,
+        task_seconds=task.seconds,
+        task_cpu_seconds=task.cpu_seconds,
+        task_memory_bytes=task.memory_bytes,
+        task_nodes=task.nodes,
+        result_bytes=task.result_bytes,
+        waiting_tasks=waiting_tasks,
+        waiting_tasks_per_caller=waiting_tasks_per_caller,
+        retention_seconds=retention_seconds,
+    )
+
+
+def version_response(limits: pb.ServerLimits) -> pb.GetVersionResponse:
+    """What this server is."""
+    from robosc.synthesis.engines import installed_engines
+
+    return pb.GetVersionResponse(version=__version__, engines=installed_engines(), limits=limits)
+
+
+def targets_response() -> pb.ListTargetsResponse:
+    """What can be generated, the name that stands for all targets included."""
+    from robosc.targets import ALL, available_targets
+
+    descriptions = {info.name: info.description for info in available_targets()}
+    descriptions[ALL] = "all of them, each in a folder of its own"
+    return pb.ListTargetsResponse(
+        targets=[pb.Target(name=name, description=descriptions[name]) for name in sorted(descriptions)]
+    )

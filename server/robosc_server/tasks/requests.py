@@ -1,0 +1,292 @@
+"""Requests as they come in: looked at, refused or accepted, and given the key that says what they mean.
+
+This stands before everything else, in the server's own process, and looks at bytes of strangers: their number is
+limited before they are parsed, the parser refuses nesting (beyond 100 levels, unknown fields included) and texts that
+are no UTF-8, and no name is ever opened. Nothing of the core's stages is imported.
+"""
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import entry_points
+from typing import Any
+
+from google.protobuf.message import DecodeError
+
+from robosc._version import __version__
+from robosc.source import visible
+from robosc_api.v1 import synthesis_pb2 as pb
+from robosc_server.failures import RefusedError
+from robosc_server.tasks.task import Reason, Task, TaskKind
+
+NOT_A_MESSAGE = "the request is no message of this service"
+
+_PLUGINS = ("robosc.targets", "robosc.bdd_engines")
+"""Groups of entry points of packages that have a say in results."""
+
+_FRAMING_BYTES = 64 * 1024
+"""What a message may have beside its names and texts: tags and lengths of a thousand files take 20 kB."""
+
+_DEFAULT_GRAPH_STATES = 100_000
+_DEFAULT_VERIFIED_STATES = 1_000_000
+_MAXIMUM_VERIFIED_STATES = 10**9
+
+
+@dataclass(frozen=True, slots=True)
+class RequestLimits:
+    """What a request may have.
+
+    Attributes:
+        bundle_bytes: Of all its names and texts; a given supervisor and properties count, too.
+        bundle_files: Its files; as many places that were searched, and as many properties.
+        name_bytes: Of the name of a file, a target or an engine.
+        nodes: Of decision diagrams, all together, that a task may have; whoever asks for more gets so many.
+    """
+
+    bundle_bytes: int = 2**20
+    bundle_files: int = 1000
+    name_bytes: int = 255
+    nodes: int = 20_000_000
+
+    @property
+    def request_bytes(self) -> int:
+        """Of a whole message: no longer one is parsed."""
+        return self.bundle_bytes + _FRAMING_BYTES
+
+
+def accepted(kind: TaskKind, request: bytes, limits: RequestLimits) -> Task:
+    """The task that a request asks for.
+
+    Args:
+        kind: What the request is.
+        request: Its message, serialized.
+        limits: What it may have.
+
+    Raises:
+        RefusedError: It is no message, has names that cannot be, lacks something or has too much.
+    """
+    if len(request) > limits.request_bytes:
+        raise _too_large(f"the request has {len(request)} bytes, this server takes at most {limits.request_bytes}")
+    parse, look_at = _KINDS[kind]
+    try:
+        message = parse(request)
+    except DecodeError:
+        # The parser's own words may quote the message.
+        raise RefusedError(Reason.MALFORMED_REQUEST, NOT_A_MESSAGE) from None
+    look = _Look(limits)
+    # Python's notation of nested values is read back as those values only: other values have another notation.
+    meaning = repr((_makers(), kind.value, look_at(message, look)))
+    look.require_small()
+    return Task(kind, request, hashlib.sha256(meaning.encode("utf-8")).hexdigest(), look.main_file)
+
+
+@cache
+def _makers() -> tuple[str, ...]:
+    """What makes results, by version: this distribution, and those whose targets and engines it uses."""
+    dists = [point.dist for group in _PLUGINS for point in entry_points(group=group)]
+    others = {f"{dist.name} {dist.version}" for dist in dists if dist is not None and dist.name != "robosc"}
+    return (__version__, *sorted(others))
+
+
+class _Look:
+    """Looks at the parts of one request, and counts their bytes.
+
+    Attributes:
+        main_file: Name of the main file.
+    """
+
+    __slots__ = ("_bytes", "_limits", "main_file")
+
+    def __init__(self, limits: RequestLimits) -> None:
+        self._limits = limits
+        self._bytes = 0
+        self.main_file = ""
+
+    def require_small(self) -> None:
+        """Do nothing if all that was counted is within the limit.
+
+        Raises:
+            RefusedError: It is not.
+        """
+        limit = self._limits.bundle_bytes
+        if self._bytes > limit:
+            raise _too_large(f"the names and texts have {self._bytes} bytes, this server takes at most {limit}")
+
+    def require_few(self, count: int, what: str) -> None:
+        """Do nothing if there are no more files, or other things, than there may be.
+
+        Raises:
+            RefusedError: There are.
+        """
+        limit = self._limits.bundle_files
+        if count > limit:
+            raise _too_large(f"the request has {count} {what}, this server takes at most {limit}")
+
+    def bundle(self, message: Any) -> tuple[object, ...]:
+        """What a bundle means, whatever the order of its libraries and of its interfaces.
+
+        Raises:
+            RefusedError: Its names cannot be, or it has too much.
+        """
+        libraries, interfaces, searched = message.libraries, message.interfaces, message.searched
+        self.require_few(1 + len(libraries) + len(interfaces), "files")
+        self.require_few(len(searched), "places that were searched")
+        if not message.HasField("main"):
+            raise _malformed("the bundle has no main file")
+        main = self.file(message.main)
+        self.main_file = main[0]
+        others = sorted(map(self.file, libraries)), sorted(map(self.file, interfaces))
+        names = {self.main_file}
+        for group in others:
+            for name, _ in group:
+                if name in names:
+                    raise _malformed(f"two files of the bundle are called '{name}'")
+                names.add(name)
+        return main, *others, [self.text(place) for place in searched]
+
+    def file(self, message: Any) -> tuple[str, str]:
+        """Name of a file and digest of its text.
+
+        Raises:
+            RefusedError: Nothing can be called so.
+        """
+        name: str = message.name
+        _require_relative(name)
+        return self.name(name, "a file's name"), self.content(message.text.encode("utf-8"))
+
+    def name(self, name: str, what: str) -> str:
+        """A name that can be printed and is not too long; it may be empty.
+
+        Raises:
+            RefusedError: It is something else.
+        """
+        if not name.isprintable():
+            raise _malformed(f"{what} has a character that cannot be printed, such as NUL")
+        size = len(name) if name.isascii() else len(name.encode("utf-8"))
+        if size > self._limits.name_bytes:
+            raise _malformed(f"{what} has {size} bytes, more than {self._limits.name_bytes}")
+        self._bytes += size
+        return name
+
+    def text(self, text: str) -> str:
+        """The digest of a text."""
+        return self.content(text.encode("utf-8"))
+
+    def content(self, content: bytes) -> str:
+        """The digest of a content."""
+        self._bytes += len(content)
+        return hashlib.sha256(content).hexdigest()
+
+    def options(self, message: Any, *, deployment: int = pb.DEPLOYMENT_CONTROLLER) -> tuple[object, ...]:
+        """What options of a synthesis mean, with the defaults filled in.
+
+        Args:
+            message: The options.
+            deployment: What it means to say nothing of the deployment.
+
+        Raises:
+            RefusedError: There is no such deployment.
+        """
+        chosen = message.deployment or deployment
+        if chosen not in _DEPLOYMENTS:
+            raise _malformed(f"there is no deployment of number {chosen}")
+        engine = self.name(message.engine, "the engine's name") or "auto"
+        nodes = min(message.maximum_nodes or self._limits.nodes, self._limits.nodes)
+        return chosen, engine, message.allow_livelock, message.allow_reordering, nodes
+
+
+_DEPLOYMENTS = (pb.DEPLOYMENT_UNSPECIFIED, pb.DEPLOYMENT_CONTROLLER, pb.DEPLOYMENT_LAYER)
+
+
+def _require_relative(name: str) -> None:
+    r"""A file's name says nothing of a place on a machine: no root, no drive (`C:`), no host (`\\`)."""
+    if not name:
+        raise _malformed("a file has no name")
+    if name[0] in "/\\" or name[1:2] == ":":
+        raise _malformed(f"a file's name must be relative, not '{visible(name[:80])}'")
+
+
+def _check(message: Any, look: _Look) -> object:
+    return look.bundle(message.bundle)
+
+
+def _synthesize(message: Any, look: _Look) -> object:
+    return look.bundle(message.bundle), look.options(message.options)
+
+
+def _generate(message: Any, look: _Look) -> object:
+    if not message.target:
+        raise _malformed("the request names no target")
+    choices = message.generation
+    supervised = None
+    if choices.HasField("supervised"):
+        named = choices.supervised
+        supervised = [
+            look.name(text, "a name of the supervised controller")
+            for text in (named.package, named.executable, named.launch_file)
+        ]
+    return (
+        _synthesize(message, look),
+        look.name(message.target, "the target's name"),
+        look.name(choices.package, "the package's name"),
+        choices.publish_state,
+        choices.log_events,
+        supervised,
+    )
+
+
+def _explore(message: Any, look: _Look) -> object:
+    deployment, engine, _, *rest = look.options(message.options)
+    # Silent steps are allowed, whatever the options say of them.
+    return look.bundle(message.bundle), deployment, engine, rest, message.maximum_states or _DEFAULT_GRAPH_STATES
+
+
+def _verify(message: Any, look: _Look) -> object:
+    is_given = bool(message.supervisor)
+    if not is_given and (message.maximum_states or message.strict):
+        raise _malformed("maximum_states and strict say how to check a supervisor: the request has none")
+    if not is_given and not message.properties and not message.property_files:
+        raise _malformed("the request has neither a supervisor nor properties")
+    if message.maximum_states > _MAXIMUM_VERIFIED_STATES:
+        raise _malformed(f"maximum_states is more than {_MAXIMUM_VERIFIED_STATES}")
+    look.require_few(len(message.properties), "properties")
+    look.require_few(len(message.property_files), "files of properties")
+    # A supervisor that is given may be for any deployment.
+    unsaid = pb.DEPLOYMENT_UNSPECIFIED if is_given else pb.DEPLOYMENT_CONTROLLER
+    deployment, engine, _, *rest = look.options(message.options, deployment=unsaid)
+    return (
+        look.bundle(message.bundle),
+        (deployment, engine, rest),
+        look.content(message.supervisor) if is_given else None,
+        [look.text(text) for text in message.properties],
+        [look.file(file) for file in message.property_files],
+        message.maximum_states or _DEFAULT_VERIFIED_STATES,
+        message.strict,
+    )
+
+
+def _format(message: Any, look: _Look) -> object:
+    if not message.HasField("file"):
+        raise _malformed("the request has no file")
+    found = look.file(message.file)
+    look.main_file = found[0]
+    return found
+
+
+_KINDS: dict[TaskKind, tuple[Callable[[bytes], Any], Callable[[Any, _Look], object]]] = {
+    TaskKind.CHECK: (pb.CheckRequest.FromString, _check),
+    TaskKind.SYNTHESIZE: (pb.SynthesizeRequest.FromString, _synthesize),
+    TaskKind.GENERATE: (pb.GenerateRequest.FromString, _generate),
+    TaskKind.EXPLORE: (pb.ExploreRequest.FromString, _explore),
+    TaskKind.VERIFY: (pb.VerifyRequest.FromString, _verify),
+    TaskKind.FORMAT: (pb.FormatRequest.FromString, _format),
+}
+
+
+def _malformed(message: str) -> RefusedError:
+    return RefusedError(Reason.MALFORMED_REQUEST, message)
+
+
+def _too_large(message: str) -> RefusedError:
+    return RefusedError(Reason.REQUEST_TOO_LARGE, message)

@@ -1,0 +1,188 @@
+"""The work itself, in a worker: from a request's message to the messages that answer it, with the core.
+
+Each kind of task does what a command of `robosc` does: the same supervisor byte for byte, the same documents. What is
+wrong with a model is an answer. Everything else that can go wrong is a `Failure`.
+"""
+
+import hashlib
+import traceback
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+from robosc.automata import to_automata
+from robosc.errors import LanguageError, NodeLimitError
+from robosc.exploration import DEFAULT_LIMIT, Graph, explore, graph_json
+from robosc.formatting import format_text
+from robosc.json_documents import json_pieces
+from robosc.model import check
+from robosc.supervisor import Supervisor, encode
+from robosc.supervisor.conditions import state_predicates
+from robosc.synthesis import UnknownEngineError
+from robosc.targets import GeneratedFiles, UnknownTargetError, generated, require_generatable
+from robosc_api.v1 import synthesis_pb2 as pb
+from robosc_server.tasks.attempt import Attempt, OnReport
+from robosc_server.tasks.convert import given, pieces, told
+from robosc_server.tasks.pace import PacedReports
+from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, TaskKind, TaskLimits
+from robosc_server.tasks.verify import NoPropertyError, verification
+
+
+class _ResultTooLargeError(Exception):
+    """A result beyond its limit."""
+
+
+def run_task(kind: TaskKind, request: bytes, limits: TaskLimits, on_report: OnReport) -> Outcome:
+    """Do a task to its end.
+
+    Args:
+        kind: What it is.
+        request: The message of an accepted request.
+        limits: What it may take; time and memory are the process's, and its keeper sees to them.
+        on_report: Told now and then where the work is.
+    """
+    try:
+        return Result(_bounded(_WORK[kind](request, limits, PacedReports(on_report)), limits.result_bytes))
+    except NodeLimitError as error:
+        return Failure(Reason.NODE_LIMIT, str(error))
+    except MemoryError:
+        return Failure(Reason.MEMORY_LIMIT, f"the work needs more than {limits.memory_bytes} bytes of memory")
+    except _ResultTooLargeError:
+        return Failure(Reason.RESULT_TOO_LARGE, f"the result has more than {limits.result_bytes} bytes")
+    except (UnknownTargetError, UnknownEngineError, given.OptionError, NoPropertyError) as error:
+        return Failure(Reason.MALFORMED_REQUEST, str(error))
+    except Exception as error:  # The worker's border: whatever it was, the server logs it and lives on.
+        return Failure(Reason.INTERNAL_FAULT, "a fault of the server", _places(error))
+
+
+def _places(error: BaseException) -> str:
+    """Where a fault was, for a log: without its message, which may hold names of the model."""
+    cause = error.__cause__ or (None if error.__suppress_context__ else error.__context__)
+    before = f"{_places(cause)}\n" if cause is not None else ""
+    return f"{before}{''.join(traceback.format_tb(error.__traceback__))}{type(error).__qualname__}"
+
+
+def _bounded(messages: Iterable[Any], maximum_bytes: int) -> tuple[bytes, ...]:
+    """Messages as bytes.
+
+    Raises:
+        _ResultTooLargeError: They have more than `maximum_bytes`.
+    """
+    found: list[bytes] = []
+    size = 0
+    for message in messages:
+        found.append(message.SerializeToString(deterministic=True))
+        size += len(found[-1])
+        if size > maximum_bytes:
+            raise _ResultTooLargeError
+    return tuple(found)
+
+
+def _check(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator[pb.CheckResponse]:
+    request = pb.CheckRequest.FromString(content)
+    bundle = given.bundle(request.bundle)
+    on_report(Report("check", bundle.main.name))
+    yield pb.CheckResponse(diagnostics=told.findings(check(bundle).diagnostics))
+
+
+def _synthesize(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator[pb.SynthesizeResponse]:
+    request = pb.SynthesizeRequest.FromString(content)
+    attempt = Attempt()
+    result = pb.SynthesisResult()
+    with attempt:
+        made = attempt.make(request, limits.nodes, on_report, allow_livelock=request.options.allow_livelock)
+        if made.statistics is not None:
+            result.statistics.CopyFrom(told.statistics(made.statistics))
+        if made.supervisor is not None:
+            content = encode(made.supervisor)
+            result.supervisor, result.supervisor_digest = content, hashlib.sha256(content).digest()
+            result.summary.CopyFrom(told.summary(made.supervisor))
+    result.MergeFrom(pb.SynthesisResult(**attempt.ending()))
+    yield pb.SynthesizeResponse(result=result)
+
+
+def _generate(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator[pb.GenerateResponse]:
+    request = pb.GenerateRequest.FromString(content)
+    require_generatable(request.target)
+    choices = given.generation(request.generation)
+    attempt = Attempt()
+    files: GeneratedFiles | None = None
+    with attempt:
+        made = attempt.make(request, limits.nodes, on_report, allow_livelock=request.options.allow_livelock)
+        on_report(Report("generation", request.target))
+        attempt.made, files = generated(made, request.target, choices)
+    listing = [] if files is None else pieces.listing(files)
+    digest = pieces.digest_of(listing) if listing else b""
+    yield pb.GenerateResponse(result=pb.GenerationResult(files=listing, digest=digest, **attempt.ending()))
+    if files is not None:
+        yield from (pb.GenerateResponse(chunk=chunk) for chunk in pieces.file_chunks(files))
+
+
+def _explore(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator[pb.ExploreResponse]:
+    request = pb.ExploreRequest.FromString(content)
+    attempt = Attempt()
+    graph: Graph | None = None
+    with attempt:
+        # The graph is of everything allowed, whatever an executor would choose.
+        made = attempt.make(request, limits.nodes, on_report, allow_livelock=True)
+        if made.supervisor is not None:
+            on_report(Report("exploration", f"{made.supervisor.certificate.states} states"))
+            graph = _graph(made.supervisor, request.maximum_states or DEFAULT_LIMIT)
+    if graph is None:
+        yield pb.ExploreResponse(result=pb.ExplorationResult(**attempt.ending()))
+        return
+    text = _bounded_text(json_pieces(graph_json(graph)), limits.result_bytes)
+    digest = hashlib.sha256(text).digest()
+    states, transitions = len(graph.states), len(graph.transitions)
+    yield pb.ExploreResponse(
+        result=pb.ExplorationResult(
+            states=states, transitions=transitions, size=len(text), digest=digest, **attempt.ending()
+        )
+    )
+    yield from (pb.ExploreResponse(chunk=chunk) for chunk in pieces.pieces(text))
+
+
+def _graph(supervisor: Supervisor, maximum_states: int) -> Graph:
+    """Everything that the robot may do.
+
+    Raises:
+        UnsupportedModelError: That is more than `maximum_states`.
+    """
+    system = to_automata(supervisor.model, supervisor.deployment)
+    return explore(system, state_predicates(system, supervisor.added), supervisor.model, limit=maximum_states)
+
+
+def _bounded_text(texts: Iterable[str], maximum_bytes: int) -> bytes:
+    """The bytes of a text that comes in pieces; nobody waits for the rest of one that is too long.
+
+    Raises:
+        _ResultTooLargeError: It has more than `maximum_bytes`.
+    """
+    content = bytearray()
+    for text in texts:
+        content += text.encode("utf-8")
+        if len(content) > maximum_bytes:
+            raise _ResultTooLargeError
+    return bytes(content)
+
+
+def _verify(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator[pb.VerifyResponse]:
+    request = pb.VerifyRequest.FromString(content)
+    yield pb.VerifyResponse(result=verification(request, limits.nodes, on_report))
+
+
+def _format(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator[pb.FormatResponse]:
+    request = pb.FormatRequest.FromString(content)
+    try:
+        yield pb.FormatResponse(text=format_text(request.file.text, request.file.name))
+    except LanguageError as error:
+        yield pb.FormatResponse(diagnostics=told.findings(error.diagnostics))
+
+
+_WORK: dict[TaskKind, Callable[[bytes, TaskLimits, OnReport], Iterator[Any]]] = {
+    TaskKind.CHECK: _check,
+    TaskKind.SYNTHESIZE: _synthesize,
+    TaskKind.GENERATE: _generate,
+    TaskKind.EXPLORE: _explore,
+    TaskKind.VERIFY: _verify,
+    TaskKind.FORMAT: _format,
+}

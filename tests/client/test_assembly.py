@@ -1,0 +1,296 @@
+"""What a client takes from a server, and what it refuses: no server is needed for that."""
+
+import copy
+import hashlib
+import json
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robosc_api.v1 import jobs_pb2
+from robosc_api.v1 import synthesis_pb2 as pb
+from robosc_client import ServiceError, SynthesisStatus, VerificationStatus
+from robosc_client.convert import assembly
+from robosc_client.convert.assembly import (
+    ExplorationAssembly,
+    GenerationAssembly,
+    JobResultAssembly,
+    SynthesisAssembly,
+    VerificationAssembly,
+    check_assembly,
+    format_assembly,
+)
+from support.answers import (
+    FILES,
+    GRAPH,
+    chunks,
+    enveloped,
+    exploration,
+    files_digest,
+    generation,
+    progress,
+    supervisor,
+    synthesis,
+    verification,
+)
+
+
+def assembled(assembly_: Any, messages: Any) -> Any:
+    for message in messages:
+        assembly_.take(message)
+    return assembly_.result()
+
+
+def refused(assembly_: Any, messages: Any, words: str = "malformed") -> None:
+    with pytest.raises(ServiceError, match=words):
+        assembled(assembly_, messages)
+
+
+class TestSynthesis:
+    def test_result(self) -> None:
+        found = assembled(SynthesisAssembly(), [progress(), supervisor(b"x", signature=b"signed")])
+        assert (found.status, found.supervisor, found.signature) == (SynthesisStatus.SUPERVISOR, b"x", b"signed")
+
+    def test_progress_is_harmless_on_a_terminal(self) -> None:
+        told = SynthesisAssembly().take(progress(stage="\x1b]0;title\x07" + "x" * 2000))
+        assert told is not None
+        assert told.stage.isprintable()
+        assert len(told.stage) < 1100
+
+    @pytest.mark.parametrize(
+        ("messages", "words"),
+        [
+            ([], "without a result"),
+            ([progress()], "without a result"),
+            ([pb.SynthesizeResponse()], "nothing that"),
+            ([synthesis(), synthesis()], "more than one"),
+            ([synthesis(), progress()], "after its end"),
+            ([synthesis(status=0)], "unknown status"),
+            ([synthesis(status=17)], "unknown status"),
+            ([synthesis(status=pb.SYNTHESIS_STATUS_SUPERVISOR)], "do not fit"),
+            ([synthesis(supervisor=b"x")], "do not fit"),
+            ([supervisor(supervisor_digest=b"")], "digest"),
+            ([supervisor(supervisor_digest=bytes(32))], "digest"),
+            ([synthesis(supervisor_digest=bytes(32))], "digest"),
+            ([synthesis(signature=b"x")], "signature"),
+            ([supervisor(signature=bytes(2000))], "signature"),
+            ([synthesis(diagnostics=[pb.Diagnostic()])], "severity"),
+            ([synthesis(explanation="{")], "malformed"),
+            ([synthesis(explanation='{"blamed": []}')], "malformed"),
+            ([synthesis(explanation="[" * 100_000)], "malformed"),
+            ([supervisor(summary=pb.Summary(states="many"))], "count"),
+            ([supervisor(summary=pb.Summary(states="-1"))], "count"),
+            ([supervisor(summary=pb.Summary(states="9" * 100_000))], "count"),
+        ],
+    )
+    def test_refused(self, messages: Any, words: str) -> None:
+        refused(SynthesisAssembly(), messages, words)
+
+    def test_endless_progress(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(assembly, "MAXIMUM_PROGRESS", 1000)
+        refused(SynthesisAssembly(), (progress(number) for number in iter(int, 1)), "for ever")
+
+
+class TestGeneration:
+    @pytest.mark.parametrize("piece", [1000, 65536])
+    def test_result(self, piece: int) -> None:
+        found = assembled(GenerationAssembly(), generation(piece=piece))
+        assert {path: text.encode() for path, text in found.files.items()} == {
+            path: data for path, (data, _) in FILES.items()
+        }
+        assert found.files.executables == {"a/one.py"}
+
+    def test_an_empty_file_may_have_an_empty_piece(self) -> None:
+        head, first, *others = generation()
+        empty = pb.GenerateResponse(chunk=pb.FileChunk(file=1))
+        assert assembled(GenerationAssembly(), [head, first, empty, *others]).files is not None
+        refused(GenerationAssembly(), [head, first, empty, empty], "order")
+
+    def test_no_files(self) -> None:
+        result = pb.GenerationResult(status=pb.SYNTHESIS_STATUS_UNSUPPORTED_MODEL, reason="odd")
+        found = assembled(GenerationAssembly(), [pb.GenerateResponse(result=result)])
+        assert (found.files, found.reason) == (None, "odd")
+
+    def test_pieces_in_any_other_order_are_refused(self) -> None:
+        head, *pieces = generation(piece=40_000)
+        for place in range(len(pieces) - 1):
+            changed = [*pieces[:place], pieces[place + 1], pieces[place], *pieces[place + 2 :]]
+            refused(GenerationAssembly(), [head, *changed], "order")
+        for place in range(len(pieces)):
+            refused(GenerationAssembly(), [head, *pieces[:place], *pieces[place + 1 :]], "order|middle")
+            refused(GenerationAssembly(), [head, *pieces[: place + 1], *pieces[place:]], "order|too long|empty")
+
+    @pytest.mark.parametrize(
+        ("chunk", "words"),
+        [
+            (pb.FileChunk(file=3, data=b"x"), "no file"),
+            (pb.FileChunk(file=0, offset=1, data=b"x"), "order"),
+            (pb.FileChunk(file=0, offset=2**63, data=b"x"), "order"),
+            (pb.FileChunk(file=0, data=b""), "empty"),
+            (pb.FileChunk(file=0, data=b"x" * 100), "too long"),
+            (pb.FileChunk(file=0, data=b"x" * 70_000), "too long"),
+        ],
+    )
+    def test_wrong_pieces(self, chunk: Any, words: str) -> None:
+        refused(GenerationAssembly(), [generation()[0], pb.GenerateResponse(chunk=chunk)], words)
+
+    def test_more_than_was_declared(self) -> None:
+        more = pb.GenerateResponse(chunk=pb.FileChunk(file=2, offset=100_000, data=b"x"))
+        refused(GenerationAssembly(), [*generation(), more], "too long")
+
+    def test_pieces_before_the_result(self) -> None:
+        refused(GenerationAssembly(), chunks(FILES), "before")
+
+    @pytest.mark.parametrize("size", [2**26 + 1, 2**63])
+    def test_sizes_are_looked_at_first(self, size: int) -> None:
+        head = generation()[0]
+        head.result.files[0].size = size
+        refused(GenerationAssembly(), [head], "bytes")
+
+    def test_many_files(self) -> None:
+        head = pb.GenerateResponse()
+        head.result.status = pb.SYNTHESIS_STATUS_SUPERVISOR
+        for number in range(10_001):
+            head.result.files.add(path=f"{number:06}")
+        refused(GenerationAssembly(), [head], "10000 files")
+
+    def test_digests(self) -> None:
+        for change in (
+            lambda head: head.files[0].ClearField("digest"),
+            lambda head: setattr(head.files[0], "executable", False),
+            lambda head: setattr(head.files[0], "path", "a/zone.py"),
+            lambda head: head.ClearField("digest"),
+        ):
+            head, *pieces = copy.deepcopy(generation())
+            change(head.result)
+            refused(GenerationAssembly(), [head, *pieces], "digest")
+        head, *pieces = generation()
+        other = generation({**FILES, "a/one.py": (b"print(2)\n", True)})[1]
+        refused(GenerationAssembly(), [head, other, *pieces[1:]], "digest of 'a/one.py'")
+
+    def test_no_text(self) -> None:
+        refused(GenerationAssembly(), generation({"a": (b"\xff", False)}), "UTF-8")
+
+    def test_status_without_files(self) -> None:
+        refused(GenerationAssembly(), generation({}), "do not fit")
+
+    def test_not_sorted(self) -> None:
+        head = generation()[0]
+        files = [head.result.files[1], head.result.files[0]]
+        result = pb.GenerationResult(status=pb.SYNTHESIS_STATUS_SUPERVISOR, files=files, digest=files_digest(files))
+        refused(GenerationAssembly(), [pb.GenerateResponse(result=result)], "sorted")
+
+    @pytest.mark.parametrize(
+        "path",
+        [
+            "/etc/passwd", "../x", "a/../../x", "", ".", "a//b", "a/./b", "C:\\x", "C:x", "a\\b", "\\\\host\\x", "a\0b",
+            "a\nb", "a\x1b[2J", "a\u202eb", "nul", "x/CON.txt", "com1.py", "LPT\u00b9", "aux ", "a.", "a ", " a",
+            "x" * 256, "\u00e9" * 128, "/".join(["x" * 200] * 6), "a*b", "a?b", 'a"b', "a<b", ".robosc-manifest.json",
+        ],
+    )  # fmt: skip
+    def test_odd_paths(self, path: str) -> None:
+        refused(GenerationAssembly(), generation({path: (b"x", False)}))
+
+    @pytest.mark.parametrize(
+        "paths",
+        [("README", "readme"), ("a", "a/b"), ("A", "a/b"), ("x/A/y", "x/a"), ("\u00e9", "e\u0301"), ("ß", "SS")],
+    )
+    def test_names_that_meet(self, paths: Any) -> None:
+        refused(GenerationAssembly(), generation(dict.fromkeys(paths, (b"x", False))))
+
+    @given(st.data())
+    def test_nothing_is_collected_beyond_what_was_declared(self, data: st.DataObject) -> None:
+        """Whatever pieces come: no more bytes are held than the sizes allow, and a result is what was meant."""
+        files = {"a": (b"12", False), "b": (b"", False), "c": (b"345", False)}
+        head = generation(files)[0]
+        found = GenerationAssembly()
+        found.take(head)
+        piece = st.builds(
+            pb.FileChunk,
+            file=st.integers(0, 3),
+            offset=st.integers(0, 4),
+            data=st.sampled_from([b"", b"1", b"12", b"345"]),
+        )
+        sound = [item.chunk for item in chunks(files)]
+        for chunk in data.draw(st.one_of(st.just(sound), st.lists(piece, max_size=6))):
+            try:
+                found.take(pb.GenerateResponse(chunk=chunk))
+            except ServiceError:
+                break
+            assert all(len(item) <= file.size for item, file in zip(found._contents, head.result.files, strict=True))
+        try:
+            result = found.result()
+        except ServiceError:
+            return
+        assert result.files is not None
+        assert dict(result.files) == {"a": "12", "b": "", "c": "345"}
+
+
+class TestExploration:
+    def test_result(self) -> None:
+        found = assembled(ExplorationAssembly(), exploration())
+        assert found.graph is not None
+        assert found.graph.states[1].components == {"C": "t"}
+        assert found.graph.transitions == ((0, "go", 1), (1, "go", 0))
+
+    @pytest.mark.parametrize(
+        ("messages", "words"),
+        [
+            (exploration()[:-1], "middle"),
+            ([*exploration(), pb.ExploreResponse(chunk=b"x")], "too long"),
+            ([exploration()[0], pb.ExploreResponse(chunk=b"")], "empty"),
+            (exploration(piece=100_000)[1:], "before"),
+            (exploration(size=2**27), "more than"),
+            (exploration(size=0), "do not fit"),
+            (exploration(digest=bytes(32)), "digest"),
+            (exploration(states=3), "lacks"),
+            (exploration(transitions=1), "lacks"),
+            (exploration({**GRAPH, "initial": 2}), "lacks"),
+            (exploration({**GRAPH, "initial": -1}), "lacks"),
+            (exploration({**GRAPH, "transitions": [[0, "go", 1], [0, "go", 2]]}), "lacks"),
+            (exploration({**GRAPH, "states": 5}), "none"),
+            (exploration(b"[" * 100_000, 60_000), "none"),
+            (exploration(b"\xff"), "none"),
+        ],
+    )
+    def test_refused(self, messages: Any, words: str) -> None:
+        refused(ExplorationAssembly(), messages, words)
+
+
+class TestOthers:
+    def test_verification(self) -> None:
+        found = assembled(VerificationAssembly(), [verification()])
+        assert (found.status, found.report) == (VerificationStatus.PASSED, {"status": "holds"})
+        for wrong in ("[]", "{", "[" * 100_000, "null"):
+            refused(VerificationAssembly(), [verification(wrong)], "report")
+        refused(VerificationAssembly(), [verification(status=0)], "status")
+
+    def test_check(self) -> None:
+        assert assembled(check_assembly(), [pb.CheckResponse()]) == ()
+        refused(check_assembly(), [], "none")
+        odd: Any = 9
+        refused(check_assembly(), [pb.CheckResponse(diagnostics=[pb.Diagnostic(severity=odd)])], "severity")
+
+    def test_format(self) -> None:
+        assert assembled(format_assembly("a  b"), [pb.FormatResponse(text="a\nb\n")]).text == "a\nb\n"
+        refused(format_assembly("a b"), [pb.FormatResponse(text="a c")], "more than its layout")
+        broken = pb.FormatResponse(diagnostics=[pb.Diagnostic(severity=pb.SEVERITY_ERROR)])
+        assert assembled(format_assembly("a b"), [broken]).text is None
+
+    def test_results_of_jobs(self) -> None:
+        found = assembled(JobResultAssembly(), enveloped("generate", generation()))
+        assert set(found.files) == set(FILES)
+        assert assembled(JobResultAssembly(), enveloped("check", [pb.CheckResponse()])) == ()
+        assert assembled(JobResultAssembly(), enveloped("format", [pb.FormatResponse(text="x")])).text == "x"
+        refused(JobResultAssembly(), [], "without a result")
+        refused(JobResultAssembly(), [jobs_pb2.GetJobResultResponse()], "nothing that")
+        refused(JobResultAssembly(), enveloped("synthesize", [progress()]), "tells of work")
+        two = [*enveloped("synthesize", [synthesis()]), *enveloped("check", [pb.CheckResponse()])]
+        refused(JobResultAssembly(), two, "two kinds")
+
+
+def test_the_digest_of_a_graph_is_of_its_bytes() -> None:
+    content = json.dumps(GRAPH).encode()
+    assert exploration()[0].result.digest == hashlib.sha256(content).digest()

@@ -11,7 +11,7 @@ from google.protobuf.descriptor_pb2 import (
     FileDescriptorProto,
     FileDescriptorSet,
 )
-from grpc_tools import protoc  # type: ignore[import-untyped]
+from grpc_tools import protoc
 
 PROTO = Path(__file__).parents[2] / "proto"
 RELEASED = PROTO / "released" / "robosc_api_v1.binpb"

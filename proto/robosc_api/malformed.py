@@ -7,6 +7,9 @@ import grpc
 import grpc.aio
 from google.protobuf.message import DecodeError
 
+from robosc_api.failures import failure_metadata
+from robosc_api.streams import write_responses
+
 _MALFORMED = object()
 
 
@@ -14,29 +17,39 @@ class MalformedError(Exception):
     """What a stream of requests raises for one that is no message; whoever reads them lets it pass."""
 
 
-_REFUSAL = (grpc.StatusCode.INVALID_ARGUMENT, "the request is no message of this service")
+_CODE, _MESSAGE = grpc.StatusCode.INVALID_ARGUMENT, "the request is no message of this service"
 
 
 class MalformedRequests(grpc.aio.ServerInterceptor):
-    """Answers them for the methods of one service.
+    """Answers them for the methods of some services; methods that take bytes as they come look at them themselves.
 
     Args:
-        service: The service's full name.
+        services: Their full names.
     """
 
-    def __init__(self, service: str) -> None:
-        self._prefix = f"/{service}/"
+    def __init__(self, *services: str) -> None:
+        self._prefixes = tuple(f"/{service}/" for service in services)
+        # By method: the handler that was there, and the one behind a check, made once and not for each call.
+        self._made: dict[str, tuple[Any, Any]] = {}
 
     async def intercept_service(self, continuation: Callable[[Any], Awaitable[Any]], handler_call_details: Any) -> Any:
         """The method's handler, behind a check of its requests."""
         handler = await continuation(handler_call_details)
-        if handler is None or not handler_call_details.method.startswith(self._prefix):
+        method: str = handler_call_details.method
+        if handler is None or handler.request_deserializer is None or not method.startswith(self._prefixes):
             return handler
+        made = self._made.get(method)
+        if made is None or made[0] is not handler:
+            made = self._made[method] = handler, self._behind(handler)
+        return made[1]
+
+    @staticmethod
+    def _behind(handler: Any) -> Any:
         parse, serialize = _tolerant(handler.request_deserializer), handler.response_serializer
         if handler.unary_unary:
             return grpc.unary_unary_rpc_method_handler(_checked(handler.unary_unary), parse, serialize)
         if handler.unary_stream:
-            return grpc.unary_stream_rpc_method_handler(_checked(handler.unary_stream), parse, serialize)
+            return grpc.unary_stream_rpc_method_handler(_checked_stream(handler.unary_stream), parse, serialize)
         return grpc.stream_stream_rpc_method_handler(_checked_each(handler.stream_stream), parse, serialize)
 
 
@@ -53,8 +66,17 @@ def _tolerant(parse: Callable[[bytes], Any]) -> Callable[[bytes], Any]:
 def _checked(answer: Callable[[Any, Any], Awaitable[Any]]) -> Callable[[Any, Any], Awaitable[Any]]:
     async def checked(request: Any, context: Any) -> Any:
         if request is _MALFORMED:
-            await context.abort(*_REFUSAL)
+            await _refuse(context)
         return await answer(request, context)
+
+    return checked
+
+
+def _checked_stream(answer: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Awaitable[None]]:
+    async def checked(request: Any, context: Any) -> None:
+        if request is _MALFORMED:
+            await _refuse(context)
+        await write_responses(answer(request, context), context)
 
     return checked
 
@@ -71,6 +93,10 @@ def _checked_each(answer: Callable[[Any, Any], Awaitable[Any]]) -> Callable[[Any
             return await answer(requests(given), context)
         except MalformedError:
             # Here and not where it is read: that may be another task, which cannot end the call.
-            await context.abort(*_REFUSAL)
+            await _refuse(context)
 
     return checked
+
+
+async def _refuse(context: Any) -> None:
+    await context.abort(_CODE, _MESSAGE, failure_metadata(_CODE, _MESSAGE, "MALFORMED_REQUEST", context=context))

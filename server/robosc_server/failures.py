@@ -3,13 +3,10 @@
 from typing import Any, NoReturn
 
 import grpc
-from google.protobuf import any_pb2, duration_pb2
-from google.rpc import error_details_pb2, status_pb2
-from grpc_status import rpc_status
 
-from robosc_server.tasks.task import Reason
-
-DOMAIN = "robosc"
+from robosc_api.failures import failure_metadata
+from robosc_server.operations.logs import tell_fault
+from robosc_server.tasks.task import Failure, Reason
 
 _CODES = {
     Reason.MALFORMED_REQUEST: grpc.StatusCode.INVALID_ARGUMENT,
@@ -61,19 +58,18 @@ def code_of(reason: Reason) -> grpc.StatusCode:
 async def abort(context: Any, error: RefusedError) -> NoReturn:
     """End a call (of grpc.aio) with what is to be told."""
     code = code_of(error.reason)
-    details = [_packed(error_details_pb2.ErrorInfo(reason=error.reason, domain=DOMAIN))]
-    trailing: tuple[tuple[str, str], ...] = ()
-    if error.retry_after_s is not None:
-        delay = duration_pb2.Duration()
-        delay.FromNanoseconds(round(error.retry_after_s * 1e9))
-        details.append(_packed(error_details_pb2.RetryInfo(retry_delay=delay)))
-        trailing = (("retry-after", f"{error.retry_after_s:.3f}"),)
-    status = rpc_status.to_status(status_pb2.Status(code=code.value[0], message=error.message, details=details))
-    await context.abort(code, error.message, (*trailing, *status.trailing_metadata))
+    metadata = failure_metadata(code, error.message, error.reason, error.retry_after_s, context)
+    await context.abort(code, error.message, metadata)
     raise AssertionError("unreachable: abort raises")
 
 
-def _packed(message: Any) -> any_pb2.Any:
-    packed = any_pb2.Any()
-    packed.Pack(message)
-    return packed
+def refused(failure: Failure) -> RefusedError:
+    """How a task that ended without a result is told to its caller; what only the log should know goes there."""
+    if not failure.details:
+        return RefusedError(failure.reason, failure.message)
+    return RefusedError(failure.reason, f"{failure.message}; {fault_words(tell_fault(failure.details))}")
+
+
+def fault_words(identity: str) -> str:
+    """What a caller is told of a fault that the log has under an id."""
+    return f"internal error {identity}, please report it with the server's log"

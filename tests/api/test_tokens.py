@@ -6,6 +6,7 @@ import pytest
 
 from robosc_api.security import (
     Credentials,
+    Quota,
     Scope,
     SecurityError,
     TokenFile,
@@ -80,7 +81,11 @@ def test_a_token_has_a_scope() -> None:
     [
         ("robosc_secret", "tokens:1: not NAME SCOPE,SCOPE sha256:DIGEST"),
         ("a watch sha256:1234", "tokens:1: not NAME"),
-        (f"a fly sha256:{'0' * 64}", "there is no scope 'fly', only watch, operate, synthesize"),
+        (f"a fly sha256:{'0' * 64}", "there is no scope 'fly', only watch, operate, synthesize, admin"),
+        (f"a watch sha256:{'0' * 64} secret", "tokens:1: after the digest there may be waiting=N, per_minute=N, cpu_"),
+        (f"a watch sha256:{'0' * 64} waiting=secret", "tokens:1: waiting is a whole number from 1 to"),
+        (f"a watch sha256:{'0' * 64} waiting=0", "tokens:1: waiting is a whole number from 1 to"),
+        (f"a watch sha256:{'0' * 64} waiting=1 waiting=2", "tokens:1: waiting stands there twice"),
         (f"a watch sha256:{'0' * 64}\na watch sha256:{'1' * 64}", "tokens:2: 'a' stands there twice"),
     ],
 )
@@ -169,3 +174,30 @@ def test_a_token_that_others_may_read_is_told(
     file.chmod(mode)
     with open_channel("127.0.0.1:1", Credentials(token_file=file)):
         assert (f"{file}: others than its owner may read it" in caplog.text) is is_told
+
+
+def test_quotas_stand_behind_the_digest(tmp_path: Path) -> None:
+    quota = Quota(waiting=20, cpu_seconds_per_hour=3600)
+    token, line = make_token("a", (Scope.SYNTHESIZE, Scope.ADMIN), quota)
+    assert line.endswith(" waiting=20 cpu_seconds_per_hour=3600")
+    tokens = TokenFile(written(tmp_path, line + " # a comment", make_token("b", (Scope.ADMIN,))[1]))
+    found = tokens.find(token)
+    assert found is not None
+    assert found.quota == quota
+    assert tokens.named("a") == found
+    other = tokens.named("b")
+    assert other is not None
+    assert other.quota == Quota()
+    assert tokens.named("c") is None
+
+
+def test_quotas_by_flags_where_a_service_has_them() -> None:
+    parser = argparse.ArgumentParser()
+    add_token_arguments(parser, (Scope.SYNTHESIZE,), has_quotas=True)
+    _, told = written_token(parser.parse_args(["a", "--per-minute", "60"]))
+    assert told.splitlines()[-1].endswith(" per_minute=60")
+    for wrong in ("0", "-1", "x", "9999999999"):
+        with pytest.raises(SystemExit):
+            parser.parse_args(["a", "--waiting", wrong])
+    with pytest.raises(SystemExit):
+        arguments("a", "--waiting", "3")

@@ -6,33 +6,39 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-
-import grpc
+from typing import Any
 
 from robosc.source import Bundle, SourceFile
-from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_api.v1 import synthesis_pb2_grpc
-from robosc_server.main import running_server
-from robosc_server.pool import WORKER_COMMAND
-from robosc_server.settings import Settings
-
-FAKE_WORKER = (sys.executable, str(Path(__file__).with_name("fake_worker.py")))
-"""A worker that does what a model's text says: `stuck`, `die`, `refuse`, ..."""
+from robosc_server.application import running_server
+from robosc_server.operations.settings import Settings
+from robosc_server.workers.local import TASK_FUNCTION, LocalWorkers
 
 PATIENCE_S = 60.0
 """How long a test waits for what must happen; only a failing test waits so long."""
 
 
 @contextmanager
-def served(settings: Settings | None = None, worker_command: Sequence[str] = WORKER_COMMAND) -> Iterator[str]:
-    """A server in a thread of this process; yields its address."""
-    chosen = settings or Settings(port=0, workers=1)
+def served(task_function: str = TASK_FUNCTION, /, **settings: Any) -> Iterator[str]:
+    """A server in a thread of this process; yields its address.
+
+    Args:
+        task_function: What does the tasks, such as `fake_tasks.TASK_FUNCTION`.
+        **settings: Those that are not as usual.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        usual = {"port": 0, "worker_processes": 1, "state_dir": Path(folder), "drain_seconds": 0.5}
+        with _served(Settings(**(usual | settings)), task_function) as address:
+            yield address
+
+
+@contextmanager
+def _served(chosen: Settings, task_function: str) -> Iterator[str]:
     address: list[str] = []
     failure: list[BaseException] = []
     ready = threading.Event()
@@ -40,7 +46,7 @@ def served(settings: Settings | None = None, worker_command: Sequence[str] = WOR
     stop = asyncio.Event()
 
     async def run() -> None:
-        async with running_server(chosen, worker_command) as name:
+        async with running_server(chosen, LocalWorkers(chosen.worker_processes, task_function)) as name:
             address.append(name)
             ready.set()
             await stop.wait()
@@ -71,22 +77,36 @@ def served(settings: Settings | None = None, worker_command: Sequence[str] = WOR
 
 
 @contextmanager
-def server_process(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """`robosc-server` as a program; yields the process and its address."""
-    command = [sys.executable, "-m", "robosc_server.main", "--port", "0", "--workers", "1", *arguments]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    try:
-        assert process.stdout is not None
-        line = process.stdout.readline()
-        assert line.startswith("robosc-server listening on "), line + (process.stderr.read() if process.stderr else "")
-        yield process, line.split()[-1]
-    finally:
-        if process.poll() is None:
-            process.send_signal(signal.SIGTERM)
+def server_process(*arguments: str, **environment: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """`robosc-server` as a program, with a folder of its own for its state; yields the process and its address."""
+    with tempfile.TemporaryDirectory() as folder:
+        usual = ["--port", "0", "--worker-processes", "1", "--state-dir", folder, "--drain-seconds", "0.5"]
+        command = [sys.executable, "-m", "robosc_server.main", *usual, *arguments]
+        process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, **environment}
+        )
+        # Its log must not fill the pipe while nobody reads.
+        log: list[str] = []
+        assert process.stdout is not None and process.stderr is not None
+        reader = threading.Thread(target=lambda lines: log.extend(lines), args=(process.stderr,))
+        reader.start()
         try:
-            process.communicate(timeout=PATIENCE_S)
+            line = process.stdout.readline()
+            if not line.startswith("robosc-server listening on "):
+                process.kill()
+                reader.join(PATIENCE_S)
+                raise AssertionError(line + "".join(log))
+            yield process, line.split()[-1]
         finally:
-            process.kill()
+            if process.poll() is None:
+                process.send_signal(signal.SIGTERM)
+            try:
+                process.wait(PATIENCE_S)
+            finally:
+                process.kill()
+                reader.join(PATIENCE_S)
+                process.stdout.close()
+                process.stderr.close()
 
 
 def eventually(condition: Callable[[], bool]) -> bool:
@@ -111,40 +131,3 @@ def is_running(pid: int) -> bool:
 def bundle_of(text: str, name: str = "robot.rscd", **libraries: str) -> Bundle:
     """A bundle with a main file and libraries by name."""
     return Bundle(SourceFile(name, text), tuple(SourceFile(f"{key}.rscd", libraries[key]) for key in sorted(libraries)))
-
-
-class Scripted(synthesis_pb2_grpc.SynthesisServiceServicer):
-    """A server that answers what a test wants, right or wrong."""
-
-    def __init__(
-        self,
-        check: pb.CheckResponse | None = None,
-        synthesize: Sequence[pb.SynthesizeResponse] = (),
-        generate: pb.GenerateResponse | None = None,
-    ) -> None:
-        self.answers = check, synthesize, generate
-
-    def Check(self, request: pb.CheckRequest, context: grpc.ServicerContext) -> pb.CheckResponse | None:
-        return self.answers[0]
-
-    def Synthesize(
-        self, request: pb.SynthesizeRequest, context: grpc.ServicerContext
-    ) -> Iterator[pb.SynthesizeResponse]:
-        yield from self.answers[1]
-
-    def Generate(self, request: pb.GenerateRequest, context: grpc.ServicerContext) -> pb.GenerateResponse | None:
-        return self.answers[2]
-
-
-@contextmanager
-def scripted(servicer: Scripted) -> Iterator[str]:
-    """A server that answers as written; yields its address."""
-    with ThreadPoolExecutor(2) as threads:
-        server = grpc.server(threads)
-        synthesis_pb2_grpc.add_SynthesisServiceServicer_to_server(servicer, server)  # type: ignore[no-untyped-call]
-        port = server.add_insecure_port("127.0.0.1:0")
-        server.start()
-        try:
-            yield f"127.0.0.1:{port}"
-        finally:
-            server.stop(None).wait()

@@ -14,16 +14,20 @@ from robosc_api.security.arguments import (
     server_security_of,
     written_token,
 )
+from robosc_api.security.callers import CALLER, ENTRY, caller_of, is_admin
 from robosc_api.security.client import Credentials, check_credentials, open_async_channel, open_channel
 from robosc_api.security.errors import SecurityError
-from robosc_api.security.guard import CALLER, Guard, Rule
+from robosc_api.security.guard import Guard, Rule
 from robosc_api.security.listening import ServerSecurity, add_port, check_files, check_listening
-from robosc_api.security.tokens import Scope, TokenFile, make_token
+from robosc_api.security.tokens import Entry, Quota, Scope, TokenFile, make_token
 
 __all__ = [
     "CALLER",
+    "ENTRY",
     "Credentials",
+    "Entry",
     "Guard",
+    "Quota",
     "Rule",
     "Scope",
     "SecurityError",
@@ -33,10 +37,12 @@ __all__ = [
     "add_port",
     "add_server_arguments",
     "add_token_arguments",
+    "caller_of",
     "check_credentials",
     "check_files",
     "check_listening",
     "credentials_of",
+    "is_admin",
     "is_loopback_host",
     "is_loopback_peer",
     "joined",

@@ -7,7 +7,7 @@ from pathlib import Path
 from robosc_api.security.client import Credentials
 from robosc_api.security.errors import SecurityError
 from robosc_api.security.listening import ServerSecurity
-from robosc_api.security.tokens import Scope, make_token
+from robosc_api.security.tokens import Quota, Scope, make_token
 
 CA_VARIABLE = "ROBOSC_CA"
 TOKEN_VARIABLE = "ROBOSC_TOKEN_FILE"  # its name
@@ -78,8 +78,10 @@ def _from_environment(name: str) -> Path | None:
     return Path(value) if value else None
 
 
-def add_token_arguments(parser: argparse.ArgumentParser, scopes: tuple[Scope, ...]) -> None:
-    """Whose token it is, and what it is for."""
+def add_token_arguments(
+    parser: argparse.ArgumentParser, scopes: tuple[Scope, ...], *, has_quotas: bool = False
+) -> None:
+    """Whose token it is, and what it is for; where the service has quotas, how much it may ask for, too."""
     parser.add_argument("name", metavar="NAME", help="whose token it is, for the log")
     parser.add_argument(
         "--scope",
@@ -96,7 +98,23 @@ def add_token_arguments(parser: argparse.ArgumentParser, scopes: tuple[Scope, ..
         metavar="FILE",
         help="where the token is written, for its owner alone; a file that is there stays; default: standard output",
     )
-    parser.set_defaults(default_scopes=scopes)
+    parser.set_defaults(default_scopes=scopes, waiting=None, per_minute=None, cpu_seconds_per_hour=None)
+    if has_quotas:
+        for name, words in _QUOTA_HELP.items():
+            parser.add_argument(f"--{name.replace('_', '-')}", type=_amount, metavar="N", help=words)
+
+
+_QUOTA_HELP = {
+    "waiting": "tasks of it that may wait at once (default: what the server's settings say)",
+    "per_minute": "tasks that it may ask for in a minute (default: any number)",
+    "cpu_seconds_per_hour": "seconds of a processor's time that its tasks may take in an hour (default: any number)",
+}
+
+
+def _amount(text: str) -> int:
+    if not text.isascii() or not text.isdecimal() or not 1 <= len(text) <= 9 or int(text) == 0:
+        raise argparse.ArgumentTypeError("a whole number from 1 to 999999999 is needed")
+    return int(text)
 
 
 def written_token(arguments: argparse.Namespace) -> tuple[str, str]:
@@ -105,7 +123,8 @@ def written_token(arguments: argparse.Namespace) -> tuple[str, str]:
     Raises:
         SecurityError: The name cannot stand in a file of tokens, or the file for the token is there or cannot be made.
     """
-    token, line = make_token(arguments.name, tuple(arguments.scope or arguments.default_scopes))
+    quota = Quota(arguments.waiting, arguments.per_minute, arguments.cpu_seconds_per_hour)
+    token, line = make_token(arguments.name, tuple(arguments.scope or arguments.default_scopes), quota)
     if arguments.output is None:
         return f"{token}\n", f"Keep the token secret; it is not shown again. The line for the file of tokens:\n{line}\n"
     try:

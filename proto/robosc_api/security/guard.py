@@ -1,24 +1,23 @@
 """Whether a caller may do what it asks for, before the service sees it."""
 
 import logging
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
-from contextvars import ContextVar
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import grpc
 import grpc.aio
 
+from robosc_api.failures import failure_metadata
 from robosc_api.security.addresses import is_loopback_peer
+from robosc_api.security.callers import CALLER, ENTRY
 from robosc_api.security.tokens import Entry, Scope, TokenFile
+from robosc_api.streams import write_responses
 
 _log = logging.getLogger(__name__)
 
 _HEALTH = "/grpc.health.v1.Health/"
 _SCHEME = "bearer "
-
-CALLER: ContextVar[str] = ContextVar("caller", default="")
-"""Whose token the call under way came with; empty: none was asked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +49,8 @@ class Guard(grpc.aio.ServerInterceptor):
         self._rules = rules
         self._tokens = tokens
         self._has_client_certificates = has_client_certificates
+        # By method: the handler that was there, and the one behind a look at the caller, made once, not for each call.
+        self._made: dict[str, tuple[Any, Any]] = {}
 
     async def intercept_service(self, continuation: Callable[[Any], Awaitable[Any]], handler_call_details: Any) -> Any:
         """The method's handler, behind a look at the caller."""
@@ -57,14 +58,32 @@ class Guard(grpc.aio.ServerInterceptor):
         method: str = handler_call_details.method
         if handler is None or method.startswith(_HEALTH):
             return handler
+        made = self._made.get(method)
+        if made is None or made[0] is not handler:
+            made = self._made[method] = handler, self._behind(handler, method)
+        return made[1]
+
+    def _behind(self, handler: Any, method: str) -> Any:
+        """A handler that does nothing before the caller is admitted."""
         rule = self._rules.get(method, Rule())
+        if self._tokens is None and (rule.is_open or self._has_client_certificates):
+            return handler
 
         async def admit(context: Any) -> None:
             refusal = self._refusal(rule, method, context.invocation_metadata(), context.peer())
             if refusal is not None:
-                await context.abort(*refusal)
+                code, message = refusal
+                await context.abort(code, message, failure_metadata(code, message, code.name, context=context))
 
-        return _behind(handler, admit)
+        wrap = {
+            (False, False): (grpc.unary_unary_rpc_method_handler, _answer),
+            (False, True): (grpc.unary_stream_rpc_method_handler, _stream),
+            (True, False): (grpc.stream_unary_rpc_method_handler, _answer),
+            (True, True): (grpc.stream_stream_rpc_method_handler, _stream),
+        }
+        make, guarded = wrap[handler.request_streaming, handler.response_streaming]
+        inner = handler.unary_unary or handler.unary_stream or handler.stream_unary or handler.stream_stream
+        return make(guarded(inner, admit), handler.request_deserializer, handler.response_serializer)
 
     def _refusal(self, rule: Rule, method: str, metadata: Any, peer: str) -> tuple[grpc.StatusCode, str] | None:
         """Why a call is not admitted; None: it is."""
@@ -84,6 +103,7 @@ class Guard(grpc.aio.ServerInterceptor):
             wanted = " or ".join(f"'{scope}'" for scope in sorted(rule.scopes))
             return grpc.StatusCode.PERMISSION_DENIED, f"the token's scope does not include {wanted}"
         CALLER.set(entry.name)
+        ENTRY.set(entry)
         return None
 
     @staticmethod
@@ -95,19 +115,6 @@ class Guard(grpc.aio.ServerInterceptor):
         return tokens.find(given[0][len(_SCHEME) :].strip())
 
 
-def _behind(handler: Any, admit: Callable[[Any], Awaitable[None]]) -> Any:
-    """A handler that does nothing before the caller is admitted."""
-    wrap = {
-        (False, False): (grpc.unary_unary_rpc_method_handler, _answer),
-        (False, True): (grpc.unary_stream_rpc_method_handler, _stream),
-        (True, False): (grpc.stream_unary_rpc_method_handler, _answer),
-        (True, True): (grpc.stream_stream_rpc_method_handler, _stream),
-    }
-    make, guarded = wrap[handler.request_streaming, handler.response_streaming]
-    inner = handler.unary_unary or handler.unary_stream or handler.stream_unary or handler.stream_stream
-    return make(guarded(inner, admit), handler.request_deserializer, handler.response_serializer)
-
-
 def _answer(inner: Any, admit: Callable[[Any], Awaitable[None]]) -> Any:
     async def guarded(request: Any, context: Any) -> Any:
         await admit(context)
@@ -117,16 +124,8 @@ def _answer(inner: Any, admit: Callable[[Any], Awaitable[None]]) -> Any:
 
 
 def _stream(inner: Any, admit: Callable[[Any], Awaitable[None]]) -> Any:
-    """Handlers of streams are generators, or coroutines that write by themselves."""
-
-    async def guarded(request: Any, context: Any) -> AsyncIterator[Any] | None:
+    async def guarded(request: Any, context: Any) -> None:
         await admit(context)
-        made = inner(request, context)
-        if hasattr(made, "__aiter__"):
-            async for response in made:
-                await context.write(response)
-        else:
-            await made
-        return None
+        await write_responses(inner(request, context), context)
 
     return guarded

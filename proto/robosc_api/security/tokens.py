@@ -14,7 +14,7 @@ import stat
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import StrEnum
 from pathlib import Path
 
@@ -30,7 +30,9 @@ MAXIMUM_TOKEN = 512
 
 _LOOK_S = 1.0
 _PREFIX = "robosc_"
-_LINE = re.compile(r"(?P<name>[A-Za-z0-9._-]{1,64})\s+(?P<scopes>[a-z,]+)\s+sha256:(?P<digest>[0-9a-f]{64})\Z")
+_LINE = re.compile(
+    r"(?P<name>[A-Za-z0-9._-]{1,64})\s+(?P<scopes>[a-z,]+)\s+sha256:(?P<digest>[0-9a-f]{64})(?P<quota>(\s+\S+)*)\Z"
+)
 
 
 class Scope(StrEnum):
@@ -39,6 +41,31 @@ class Scope(StrEnum):
     WATCH = "watch"
     OPERATE = "operate"
     SYNTHESIZE = "synthesize"
+    ADMIN = "admin"
+
+
+@dataclass(frozen=True, slots=True)
+class Quota:
+    """What whoever shows a token may ask of a server; None: as much as anybody.
+
+    Attributes:
+        waiting: Tasks that may wait at once.
+        per_minute: Tasks that may be asked for in a minute.
+        cpu_seconds_per_hour: Seconds that the tasks of an hour may take of a processor.
+    """
+
+    waiting: int | None = None
+    per_minute: int | None = None
+    cpu_seconds_per_hour: int | None = None
+
+    def __str__(self) -> str:
+        """As it stands in the file of tokens."""
+        pairs = ((field.name, getattr(self, field.name)) for field in fields(self))
+        return " ".join(f"{name}={value}" for name, value in pairs if value is not None)
+
+
+_QUOTAS = tuple(field.name for field in fields(Quota))
+_AMOUNT = re.compile(r"[1-9][0-9]{0,8}\Z")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,21 +76,23 @@ class Entry:
         name: Whose it is, for the log.
         scopes: What it is for.
         digest: SHA-256 of the token, in hexadecimal digits.
+        quota: What it may ask for.
     """
 
     name: str
     scopes: frozenset[Scope]
     digest: str
+    quota: Quota = Quota()
 
 
-def make_token(name: str, scopes: tuple[Scope, ...]) -> tuple[str, str]:
+def make_token(name: str, scopes: tuple[Scope, ...], quota: Quota = Quota()) -> tuple[str, str]:
     """A new token, and the line for the file of tokens.
 
     Raises:
         SecurityError: The name cannot stand in the file, or there is no scope.
     """
     token = _PREFIX + secrets.token_urlsafe(32)
-    line = f"{name} {','.join(dict.fromkeys(scopes))} sha256:{_digest(token)}"
+    line = f"{name} {','.join(dict.fromkeys(scopes))} sha256:{_digest(token)} {quota}".rstrip()
     if not _LINE.match(line):
         raise SecurityError(
             "a token's name has 1 to 64 letters, digits, dots, dashes and underscores, and it has a scope"
@@ -76,7 +105,7 @@ def _digest(token: str) -> str:
 
 
 def parse_tokens(text: str, place: str) -> tuple[Entry, ...]:
-    """The entries of a file: a line each, `NAME SCOPE,SCOPE sha256:DIGEST`; `#` begins a comment.
+    """The entries of a file: a line each, `NAME SCOPE,SCOPE sha256:DIGEST QUOTA=N ...`; `#` begins a comment.
 
     Raises:
         SecurityError: A line is none, or a name stands twice.
@@ -96,8 +125,26 @@ def parse_tokens(text: str, place: str) -> tuple[Entry, ...]:
         if match["name"] in found:
             raise SecurityError(f"{place}:{number}: '{match['name']}' stands there twice")
         scopes = frozenset(Scope(word) for word in match["scopes"].split(","))
-        found[match["name"]] = Entry(match["name"], scopes, match["digest"])
+        quota = _quota(match["quota"].split(), f"{place}:{number}")
+        found[match["name"]] = Entry(match["name"], scopes, match["digest"], quota)
     return tuple(found.values())
+
+
+def _quota(words: list[str], place: str) -> Quota:
+    amounts: dict[str, int] = {}
+    for word in words:
+        name, _, amount = word.partition("=")
+        # Not the word itself, as above.
+        if name not in _QUOTAS:
+            raise SecurityError(
+                f"{place}: after the digest there may be {', '.join(f'{known}=N' for known in _QUOTAS)}"
+            )
+        if not _AMOUNT.match(amount):
+            raise SecurityError(f"{place}: {name} is a whole number from 1 to 999999999")
+        if name in amounts:
+            raise SecurityError(f"{place}: {name} stands there twice")
+        amounts[name] = int(amount)
+    return Quota(**amounts)
 
 
 class TokenFile:
@@ -128,6 +175,10 @@ class TokenFile:
             if hmac.compare_digest(entry.digest, digest):
                 found = entry
         return found if len(token) <= MAXIMUM_TOKEN else None
+
+    def named(self, name: str) -> Entry | None:
+        """The token of somebody; None: there is none of that name."""
+        return next((entry for entry in self._current() if entry.name == name), None)
 
     def _current(self) -> tuple[Entry, ...]:
         with self._lock:

@@ -1,0 +1,53 @@
+"""How failures are told over gRPC, besides the status code: details in the form of google.rpc (AIP-193)."""
+
+from typing import Any
+
+import grpc
+from google.protobuf import any_pb2, duration_pb2
+from google.rpc import error_details_pb2, status_pb2
+from grpc_status import rpc_status
+
+DOMAIN = "robosc"
+"""Of google.rpc.ErrorInfo."""
+
+type Metadata = tuple[tuple[str, str | bytes], ...]
+
+
+def failure_metadata(
+    code: grpc.StatusCode, message: str, reason: str, retry_after_s: float | None = None, context: Any = None
+) -> Metadata:
+    """The trailing metadata of a call that ends without an answer.
+
+    Args:
+        code: Its status code.
+        message: One sentence for the caller.
+        reason: One word in capital letters, the same for the same cause.
+        retry_after_s: Seconds after which it may be worth another try; None: it is not, or nobody knows.
+        context: Of the call (of grpc.aio): what it was going to send stays; None: nothing.
+    """
+    details = [_packed(error_details_pb2.ErrorInfo(reason=reason, domain=DOMAIN))]
+    trailing: Metadata = () if context is None else tuple(context.trailing_metadata() or ())
+    if retry_after_s is not None:
+        delay = duration_pb2.Duration()
+        delay.FromNanoseconds(round(retry_after_s * 1e9))
+        details.append(_packed(error_details_pb2.RetryInfo(retry_delay=delay)))
+        trailing = (*trailing, ("retry-after", f"{retry_after_s:.3f}"))
+    status = rpc_status.to_status(status_pb2.Status(code=code.value[0], message=message, details=details))
+    return (*trailing, *status.trailing_metadata)
+
+
+def reason_of(metadata: Any) -> str:
+    """The reason in the trailing metadata of a call that has failed; empty: there is none."""
+    for key, value in metadata or ():
+        if key == "grpc-status-details-bin":
+            for detail in status_pb2.Status.FromString(value).details:
+                info = error_details_pb2.ErrorInfo()
+                if detail.Unpack(info):
+                    return str(info.reason)
+    return ""
+
+
+def _packed(message: Any) -> any_pb2.Any:
+    packed = any_pb2.Any()
+    packed.Pack(message)
+    return packed

@@ -1,0 +1,39 @@
+"""Who is behind the call under way."""
+
+from contextvars import ContextVar
+from typing import Any
+from urllib.parse import unquote
+
+from robosc_api.security.tokens import Entry, Scope
+
+CALLER: ContextVar[str] = ContextVar("caller", default="")
+"""Whose token the call under way came with; empty: none was asked for."""
+
+ENTRY: ContextVar[Entry | None] = ContextVar("entry", default=None)
+"""The token itself, as it stands in the file."""
+
+
+def caller_of(context: Any) -> str:
+    """By what a caller is told from others: its token's name, else its certificate's, else its host.
+
+    Args:
+        context: Of the call under way.
+    """
+    return CALLER.get() or _certificate_name(context) or host_of(context.peer())
+
+
+def is_admin() -> bool:
+    """Whether the call under way came with a token for the scope `admin`."""
+    entry = ENTRY.get()
+    return entry is not None and Scope.ADMIN in entry.scopes
+
+
+def host_of(peer: str) -> str:
+    """The host of a caller in gRPC's words (`ipv4:127.0.0.1:4711`, `ipv6:[::1]:4711`); `unix` for a socket's file."""
+    kind, _, rest = unquote(peer).partition(":")
+    return kind if kind.startswith("unix") else rest.rpartition(":")[0].strip("[]") or peer
+
+
+def _certificate_name(context: Any) -> str:
+    names = context.auth_context().get("x509_common_name") or ()
+    return names[0].decode(errors="replace") if names else ""

@@ -1,0 +1,20 @@
+"""Handlers of streams of grpc.aio, of either kind, behind something."""
+
+from collections.abc import AsyncIterator, Awaitable
+from contextlib import aclosing
+from typing import Any
+
+
+async def write_responses(made: Awaitable[Any] | AsyncIterator[Any], context: Any) -> None:
+    """Send what a handler makes: handlers of streams are generators, or coroutines that write by themselves.
+
+    Args:
+        made: What the handler gave when it was called. A generator is closed at once when the call ends before it.
+        context: Of the call.
+    """
+    if not hasattr(made, "__aiter__"):
+        await made
+        return
+    async with aclosing(made) as responses:  # type: ignore[type-var]  # generators of handlers can be closed
+        async for response in responses:
+            await context.write(response)

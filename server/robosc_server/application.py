@@ -1,0 +1,191 @@
+"""The parts of a server put together: what is kept, who works, who is served, and how it ends."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import AsyncExitStack, asynccontextmanager
+from functools import partial
+from typing import Any
+
+import grpc.aio
+from grpc_health.v1 import health as health_names
+from grpc_health.v1 import health_pb2_grpc
+from grpc_reflection.v1alpha import reflection
+
+from robosc import __version__
+from robosc_api.malformed import MalformedRequests
+from robosc_api.security import Guard, Rule, Scope, SecurityError, TokenFile, add_port
+from robosc_server.desk import Desk
+from robosc_server.jobs import (
+    JOB_METHODS,
+    JOB_SERVICE_NAME,
+    JobLimits,
+    JobManager,
+    JobService,
+    QueueLimits,
+    Results,
+    Scheduler,
+    add_job_service,
+)
+from robosc_server.operations.drain import drain
+from robosc_server.operations.health import Health
+from robosc_server.operations.interceptor import CallInterceptor
+from robosc_server.operations.metrics import Metrics, MetricsEndpoint
+from robosc_server.operations.observed import ObservedWorkers
+from robosc_server.operations.quotas import Quotas
+from robosc_server.operations.settings import Settings
+from robosc_server.operations.tracing import open_tracing
+from robosc_server.signing import SigningError, read_signing_key, signed
+from robosc_server.store import StoreError, open_store
+from robosc_server.synthesis_service import METHODS, SERVICE_NAME, SynthesisService
+from robosc_server.tasks.describe import server_limits, targets_response, version_response
+from robosc_server.tasks.requests import RequestLimits, accepted
+from robosc_server.tasks.task import Result, TaskKind
+from robosc_server.workers import Workers, WorkersError
+from robosc_server.workers.opening import open_workers
+
+_RULE = Rule(frozenset({Scope.SYNTHESIZE}))
+
+_IDLE_METHODS = frozenset({f"/{JOB_SERVICE_NAME}/WatchJob", "/grpc.health.v1.Health/Watch"})
+"""Calls that a server which ends need not wait for."""
+
+_OPTIONS = (
+    # Without this two servers could share a port and each get some of the requests.
+    ("grpc.so_reuseport", 0),
+    # Who has gone without a word is found out, so that nobody works for it.
+    ("grpc.keepalive_time_ms", 30_000),
+    ("grpc.keepalive_timeout_ms", 10_000),
+    ("grpc.http2.min_recv_ping_interval_without_data_ms", 10_000),
+)
+
+_MAXIMUM_CALLS = 10_000
+"""Calls under way at once, those that only watch included."""
+
+
+class StartError(Exception):
+    """The server cannot start as it is told to; one sentence for the operator."""
+
+
+@asynccontextmanager
+async def running_server(settings: Settings, workers: Workers | None = None) -> AsyncIterator[str]:
+    """A server that answers inside the context; yields `HOST:PORT`.
+
+    Args:
+        settings: How it is.
+        workers: Who does the tasks, not started yet; None: as the settings say.
+
+    Raises:
+        StartError: It cannot start as it is told to.
+    """
+    try:
+        async with AsyncExitStack() as stack:
+            yield await _start(settings, workers, stack)
+    except (SecurityError, SigningError, StoreError, WorkersError) as error:
+        raise StartError(str(error)) from error
+
+
+async def _start(settings: Settings, given_workers: Workers | None, stack: AsyncExitStack) -> str:
+    """Put the parts together; the stack takes them apart, the last one first."""
+    tokens = None if settings.tokens is None else TokenFile(settings.tokens)
+    request_limits = RequestLimits(
+        bundle_bytes=settings.bundle_bytes, bundle_files=settings.bundle_files, nodes=settings.task_nodes
+    )
+    metrics = Metrics(__version__)
+    tracing = open_tracing(settings.tracing_endpoint, __version__)
+    stack.push_async_callback(asyncio.to_thread, tracing.close)
+    store = await asyncio.to_thread(open_store, settings.state_dir, settings.database_url)
+    stack.push_async_callback(asyncio.to_thread, store.close)
+    workers: Any = given_workers or open_workers(settings.workers, settings.worker_processes)
+    await stack.enter_async_context(workers)
+    observed = ObservedWorkers(workers, metrics, tracing)
+    scheduler = Scheduler(observed, QueueLimits(settings.waiting_tasks, settings.waiting_tasks_per_caller))
+    results = await stack.enter_async_context(Results(store, settings.memory_cache_bytes, _finish(settings)))
+    manager = await stack.enter_async_context(
+        JobManager(
+            store,
+            scheduler,
+            observed,
+            results,
+            settings.task_limits,
+            JobLimits(retention_s=settings.retention_seconds, results_bytes=settings.results_bytes),
+        )
+    )
+    quotas = Quotas(tokens)
+    targets, version = await asyncio.to_thread(_descriptions, settings, request_limits)
+    synthesis = SynthesisService(
+        Desk(results, scheduler, quotas, settings.task_limits, metrics), request_limits, targets, version
+    )
+    jobs = JobService(manager, lambda kind, request: accepted(kind, request, request_limits), admit=quotas.admit)
+
+    calls = CallInterceptor(metrics, tracing)
+    services = {SERVICE_NAME: METHODS, JOB_SERVICE_NAME: JOB_METHODS}
+    guard = Guard(
+        {f"/{service}/{name}": _RULE for service, names in services.items() for name in names},
+        tokens,
+        has_client_certificates=settings.client_ca is not None,
+    )
+    server = grpc.aio.server(
+        interceptors=[calls, guard, MalformedRequests(JOB_SERVICE_NAME)],
+        options=[*_OPTIONS, ("grpc.max_receive_message_length", request_limits.request_bytes)],
+        maximum_concurrent_rpcs=_MAXIMUM_CALLS,
+    )
+    server.add_generic_rpc_handlers((synthesis.handler(),))
+    add_job_service(jobs, server)
+    health = Health({SERVICE_NAME: ("workers",), JOB_SERVICE_NAME: ("store", "workers")})
+    health_pb2_grpc.add_HealthServicer_to_server(health, server)
+    reflection.enable_server_reflection((*services, health_names.SERVICE_NAME, reflection.SERVICE_NAME), server)
+    metrics.follow(
+        waiting=lambda: scheduler.waiting,
+        running=lambda: scheduler.running,
+        jobs=lambda: {str(state): count for state, count in manager.counts.items()},
+    )
+    address = add_port(server, settings.address, settings.security)
+    await stack.enter_async_context(
+        health.following(
+            {
+                "store": partial(_is_true, lambda: store.is_available),
+                "workers": partial(_is_true, lambda: workers.capacity > 0),
+            }
+        )
+    )
+    if settings.metrics_address:
+        await stack.enter_async_context(
+            MetricsEndpoint(metrics, settings.metrics_address, beyond_loopback=settings.metrics_beyond_loopback)
+        )
+
+    async def end() -> None:
+        scheduler.close()
+        await asyncio.gather(
+            manager.drain(settings.drain_seconds), drain(server, health, calls, settings.drain_seconds, _IDLE_METHODS)
+        )
+
+    await server.start()
+    stack.push_async_callback(end)
+    return address
+
+
+async def _is_true(condition: Any) -> bool:
+    return bool(condition())
+
+
+def _finish(settings: Settings) -> Callable[[TaskKind, Result], Result]:
+    """What is done to a result before it is sent.
+
+    Raises:
+        SigningError: The key cannot be used.
+    """
+    if settings.signing_key is None:
+        return lambda kind, result: result
+    key = read_signing_key(settings.signing_key)
+    return lambda kind, result: signed(kind, result, key)
+
+
+def _descriptions(settings: Settings, request_limits: RequestLimits) -> tuple[bytes, bytes]:
+    """The answers of ListTargets and GetVersion; making them takes a while."""
+    limits = server_limits(
+        request_limits,
+        settings.task_limits,
+        waiting_tasks=settings.waiting_tasks,
+        waiting_tasks_per_caller=settings.waiting_tasks_per_caller,
+        retention_seconds=settings.retention_seconds,
+    )
+    return targets_response().SerializeToString(), version_response(limits).SerializeToString()

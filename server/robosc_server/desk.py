@@ -1,0 +1,53 @@
+"""Where an accepted task gets its result: one that is kept, or what a worker makes of it."""
+
+from robosc_server.failures import refused
+from robosc_server.jobs import Results, Scheduler
+from robosc_server.operations.metrics import Metrics
+from robosc_server.operations.quotas import Quotas
+from robosc_server.tasks.task import Failure, Result, Task, TaskLimits
+from robosc_server.workers import OnReport
+
+
+class Desk:
+    """Sees to the tasks of calls, which end with their call.
+
+    Args:
+        results: What is kept.
+        scheduler: Whose turn it is.
+        quotas: What each caller may ask for.
+        limits: What one task may take.
+        metrics: Told what was kept and what was not.
+    """
+
+    def __init__(
+        self, results: Results, scheduler: Scheduler, quotas: Quotas, limits: TaskLimits, metrics: Metrics
+    ) -> None:
+        self._results = results
+        self._scheduler = scheduler
+        self._quotas = quotas
+        self._limits = limits
+        self._metrics = metrics
+
+    def kept(self, key: str) -> Result | None:
+        """The result of an equal task, if it is in memory."""
+        result = self._results.at_hand(key)
+        if result is not None:
+            self._metrics.cache_hit("memory")
+        return result
+
+    async def result(self, task: Task, caller: str, on_report: OnReport) -> Result:
+        """The result of a task; cancelling this ends the work.
+
+        Raises:
+            RefusedError: There is none.
+        """
+        found = await self._results.find(task.key)
+        if found is not None:
+            self._metrics.cache_hit("store")
+            return found
+        self._metrics.cache_miss()
+        self._quotas.admit(caller)
+        outcome = await self._scheduler.run(task, caller, self._limits, on_report)
+        if isinstance(outcome, Failure):
+            raise refused(outcome)
+        return self._results.keep(task.key, task.kind, outcome)

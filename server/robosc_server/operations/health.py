@@ -1,0 +1,140 @@
+"""Whether each service is well, as gRPC's health checks ask: it follows what the service needs."""
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from contextlib import asynccontextmanager
+from typing import Any
+
+import grpc
+import structlog
+from grpc_health.v1 import health_pb2, health_pb2_grpc
+
+from robosc_api.failures import failure_metadata
+from robosc_server.failures import RefusedError, abort
+from robosc_server.tasks.task import Reason
+
+type Probe = Callable[[], Awaitable[bool]]
+
+_WATCHERS = 200
+_PROBE_LIMIT_S = 5.0
+
+_Response = health_pb2.HealthCheckResponse
+
+
+class Health(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # untyped
+    """The health service. To be used on one event loop.
+
+    Args:
+        services: By full name, the conditions that it needs; none holds before it is set. The name `""` stands for the
+            server as a whole, which is well if every service is.
+    """
+
+    def __init__(self, services: Mapping[str, tuple[str, ...]]) -> None:
+        self._services = dict(services)
+        self._conditions = dict.fromkeys((name for needed in services.values() for name in needed), False)
+        self._is_draining = False
+        self._changed = asyncio.Event()
+        self._watchers = 0
+
+    def conditions(self) -> dict[str, bool]:
+        """What the services need, and whether it is there; and whether the server takes calls at all."""
+        return {**self._conditions, "accepting": not self._is_draining}
+
+    def is_serving(self, service: str) -> bool | None:
+        """Whether a service is well; None: there is no such service."""
+        if service == "":
+            return not self._is_draining and all(self._conditions.values())
+        needed = self._services.get(service)
+        if needed is None:
+            return None
+        return not self._is_draining and all(self._conditions[name] for name in needed)
+
+    def set_condition(self, name: str, holds: bool) -> None:
+        """Note that something is there, or not; the log tells changes.
+
+        Args:
+            name: One that a service needs.
+            holds: Whether it is.
+
+        Raises:
+            KeyError: No service needs it.
+        """
+        if self._conditions[name] != holds:
+            log = structlog.get_logger()
+            if holds:
+                log.info("condition holds", condition=name)
+            else:
+                log.warning("condition does not hold", condition=name)
+            self._conditions[name] = holds
+            self._tell()
+
+    def drain(self) -> None:
+        """From now on nothing is well: whoever hands calls to servers chooses another one."""
+        self._is_draining = True
+        self._tell()
+
+    @asynccontextmanager
+    async def following(self, probes: Mapping[str, Probe], every_s: float = 2.0) -> AsyncIterator[None]:
+        """Ask again and again whether conditions hold; each was asked once before the context begins.
+
+        Args:
+            probes: By condition, who knows; one that raises or takes long says no.
+            every_s: Seconds between the end of a question and the next.
+        """
+        await asyncio.gather(*(self._ask(name, probe) for name, probe in probes.items()))
+        async with asyncio.TaskGroup() as group:
+            tasks = [group.create_task(self._follow(name, probe, every_s)) for name, probe in probes.items()]
+            try:
+                yield
+            finally:
+                for task in tasks:
+                    task.cancel()
+
+    async def _follow(self, name: str, probe: Probe, every_s: float) -> None:
+        while True:
+            await asyncio.sleep(every_s)
+            await self._ask(name, probe)
+
+    async def _ask(self, name: str, probe: Probe) -> None:
+        try:
+            async with asyncio.timeout(_PROBE_LIMIT_S):
+                holds = await probe()
+        except Exception as error:
+            structlog.get_logger().debug("condition cannot be asked", condition=name, exc_info=error)
+            holds = False
+        self.set_condition(name, holds)
+
+    def _tell(self) -> None:
+        self._changed.set()
+        self._changed = asyncio.Event()
+
+    async def Check(self, request: Any, context: Any) -> Any:  # noqa: N802  # named by the .proto file
+        """How a service is."""
+        is_serving = self.is_serving(request.service)
+        if is_serving is None:
+            code, message = grpc.StatusCode.NOT_FOUND, "there is no such service here"
+            await context.abort(code, message, failure_metadata(code, message, "NO_SUCH_SERVICE", context=context))
+        return _Response(status=_status(is_serving))
+
+    async def Watch(self, request: Any, context: Any) -> None:  # noqa: N802
+        """How a service is, and how it becomes."""
+        if self._watchers >= _WATCHERS:
+            await abort(context, RefusedError(Reason.SERVER_BUSY, "too many watch the server's health", 10.0))
+        self._watchers += 1
+        try:
+            last = None
+            while True:
+                changed = self._changed
+                now = _status(self.is_serving(request.service))
+                if now != last:
+                    last = now
+                    await context.write(_Response(status=now))
+                await changed.wait()
+        finally:
+            self._watchers -= 1
+
+
+def _status(is_serving: bool | None) -> Any:
+    if is_serving is None:
+        return _Response.SERVICE_UNKNOWN
+    return _Response.SERVING if is_serving else _Response.NOT_SERVING

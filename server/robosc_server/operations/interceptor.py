@@ -1,0 +1,184 @@
+"""What is done around every call: a request id, a line in the log, metrics, a span; and failures told in one way.
+
+One interceptor for all of it, since each costs every call some microseconds.
+"""
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import grpc
+import grpc.aio
+import structlog
+
+from robosc_api.failures import reason_of
+from robosc_api.security import CALLER
+from robosc_api.streams import write_responses
+from robosc_server.failures import RefusedError, abort, code_of, fault_words
+from robosc_server.operations.logs import tell_fault
+from robosc_server.operations.metrics import MethodMetrics, Metrics
+from robosc_server.operations.request_ids import HEADER, REQUEST_ID, request_id_of
+from robosc_server.operations.tracing import NO_TRACING, Tracing
+from robosc_server.tasks.task import Reason
+
+_HEALTH = "/grpc.health."
+_REFUSED_RETRY_S = 1.0
+
+
+class CallInterceptor(grpc.aio.ServerInterceptor):
+    """Stands first among the interceptors, so that it sees what others refuse.
+
+    Handlers may raise `RefusedError`, and need not care for other exceptions: the caller is told the id of a fault.
+
+    Args:
+        metrics: Where calls are counted.
+        tracing: Where spans go.
+    """
+
+    def __init__(self, metrics: Metrics, tracing: Tracing = NO_TRACING) -> None:
+        self._metrics = metrics
+        self._tracing = tracing
+        self._is_refusing = False
+        # By method: the handler that was there, and the one with everything around, made once and not for each call.
+        self._made: dict[str, tuple[Any, Any]] = {}
+        self._log = structlog.get_logger().bind()
+
+    def refuse_new(self) -> None:
+        """From now on calls are refused, health checks aside; those under way go on."""
+        self._is_refusing = True
+
+    def under_way(self, idle_methods: frozenset[str] = frozenset()) -> int:
+        """Calls that have begun and not ended, health checks aside.
+
+        Args:
+            idle_methods: Methods that do not count.
+        """
+        return sum(
+            self._metrics.method(name).under_way
+            for name in self._made
+            if name not in idle_methods and not name.startswith(_HEALTH)
+        )
+
+    async def intercept_service(self, continuation: Callable[[Any], Awaitable[Any]], handler_call_details: Any) -> Any:
+        """The method's handler, with everything around it."""
+        # The handler runs in the same task, and so sees what is set here.
+        REQUEST_ID.set(request_id_of(handler_call_details.invocation_metadata))
+        handler = await continuation(handler_call_details)
+        if handler is None:
+            self._metrics.unknown_method()
+            return None
+        method: str = handler_call_details.method
+        made = self._made.get(method)
+        if made is None or made[0] is not handler:
+            made = self._made[method] = handler, self._around(handler, method)
+        return made[1]
+
+    def _around(self, handler: Any, method: str) -> Any:
+        wrap = {
+            (False, False): (grpc.unary_unary_rpc_method_handler, self._answer),
+            (False, True): (grpc.unary_stream_rpc_method_handler, self._stream),
+            (True, False): (grpc.stream_unary_rpc_method_handler, self._answer),
+            (True, True): (grpc.stream_stream_rpc_method_handler, self._stream),
+        }
+        make, around = wrap[handler.request_streaming, handler.response_streaming]
+        inner = handler.unary_unary or handler.unary_stream or handler.stream_unary or handler.stream_stream
+        observed = around(inner, method, self._metrics.method(method))
+        return make(observed, handler.request_deserializer, handler.response_serializer)
+
+    def _answer(self, inner: Any, method: str, metrics: MethodMetrics) -> Any:
+        if self._tracing.is_on:
+            inner = self._traced(inner, method)
+
+        async def observed(request: Any, context: Any) -> Any:
+            begun_s = time.perf_counter()
+            metrics.under_way += 1
+            code = grpc.StatusCode.OK
+            try:
+                context.set_trailing_metadata(((HEADER, REQUEST_ID.get()),))
+                if self._is_refusing:
+                    _refuse(method)
+                answer = await inner(request, context)
+                code = _code_of(context)
+                return answer
+            except grpc.aio.AbortError:
+                code = _code_of(context)
+                raise
+            except RefusedError as error:
+                code = code_of(error.reason)
+                await abort(context, error)
+            except asyncio.CancelledError:
+                code = _DEADLINE_EXCEEDED if context.time_remaining() == 0 else _CANCELLED
+                raise
+            except grpc.aio.InternalError:
+                # gRPC's way to say that nobody is there to be written to.
+                code = _CANCELLED
+                raise
+            except Exception as error:
+                code = grpc.StatusCode.INTERNAL
+                await abort(context, fault_of(error))
+            finally:
+                metrics.under_way -= 1
+                self._ended(method, metrics, context, code, time.perf_counter() - begun_s)
+
+        return observed
+
+    def _stream(self, inner: Any, method: str, metrics: MethodMetrics) -> Any:
+        async def answer(request: Any, context: Any) -> None:
+            await write_responses(inner(request, context), context)
+
+        return self._answer(answer, method, metrics)
+
+    def _traced(self, inner: Any, method: str) -> Any:
+        async def traced(request: Any, context: Any) -> Any:
+            with self._tracing.call_span(method, context.invocation_metadata()) as span:
+                span.set_attribute("request.id", REQUEST_ID.get())
+                try:
+                    return await inner(request, context)
+                finally:
+                    span.set_attribute("enduser.id", CALLER.get())
+
+        return traced
+
+    def _ended(self, method: str, metrics: MethodMetrics, context: Any, code: grpc.StatusCode, seconds: float) -> None:
+        reason = "" if code in _WITHOUT_REASON else reason_of(context.trailing_metadata())
+        metrics.ended(code, reason, seconds)
+        words: dict[str, Any] = {"method": method, "code": code.name, "seconds": round(seconds, 6)}
+        if reason:
+            words["reason"] = reason
+        if caller := CALLER.get():
+            words["caller"] = caller
+        if method.startswith(_HEALTH):
+            self._log.debug("call", **words, peer=context.peer())
+        elif code in _FAULTS:
+            self._log.warning("call", **words, peer=context.peer())
+        else:
+            self._log.info("call", **words, peer=context.peer())
+
+
+_CANCELLED, _DEADLINE_EXCEEDED = grpc.StatusCode.CANCELLED, grpc.StatusCode.DEADLINE_EXCEEDED
+_WITHOUT_REASON = frozenset({grpc.StatusCode.OK, _CANCELLED})
+_FAULTS = frozenset({grpc.StatusCode.INTERNAL, grpc.StatusCode.UNKNOWN, grpc.StatusCode.DATA_LOSS})
+_CODES = {code.value[0]: code for code in grpc.StatusCode}
+
+
+def _code_of(context: Any) -> grpc.StatusCode:
+    """What the handler has said, as a number or by name; OK if it has said nothing."""
+    code = context.code()
+    if isinstance(code, int):
+        return _CODES.get(code, grpc.StatusCode.UNKNOWN)
+    return grpc.StatusCode.OK if code is None else code
+
+
+def _refuse(method: str) -> None:
+    if not method.startswith(_HEALTH):
+        raise RefusedError(Reason.SHUTTING_DOWN, "the server ends; another one may answer", _REFUSED_RETRY_S)
+
+
+def fault_of(fault: BaseException | str) -> RefusedError:
+    """What a caller is told of a fault of ours, which the log has from now on.
+
+    Args:
+        fault: It, or a traceback of it from another process.
+    """
+    return RefusedError(Reason.INTERNAL_FAULT, fault_words(tell_fault(fault)))

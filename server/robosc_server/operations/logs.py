@@ -1,0 +1,179 @@
+"""The log: a line for each event, with the id of the request, as text or as JSON.
+
+Nothing of a model is written above the level debug. That is why exceptions are told by their kind and place there, and
+not by their message, which may quote what a caller sent.
+"""
+
+import json
+import logging
+import re
+import secrets
+import sys
+import time
+import traceback
+from collections.abc import MutableMapping
+from types import TracebackType
+from typing import Any, TextIO
+
+import msgspec
+import structlog
+
+from robosc_server.operations.request_ids import REQUEST_ID
+from robosc_server.operations.settings import LogFormat, LogLevel
+
+_LEVELS = {
+    LogLevel.DEBUG: logging.DEBUG,
+    LogLevel.INFO: logging.INFO,
+    LogLevel.WARNING: logging.WARNING,
+    LogLevel.ERROR: logging.ERROR,
+}
+# They tell at the level info what helps their developers alone.
+_TALKATIVE = ("asyncio", "distributed", "opentelemetry", "sqlalchemy")
+_FRAMES = 12
+_PLAIN = re.compile(r"[A-Za-z0-9._:/+@,%'()\[\]-]+\Z")
+_FRAME = re.compile(r'^\s*File "([^"\n]{1,400})", line (\d{1,9}), in (\S{1,100})', re.MULTILINE)
+_ERROR_KIND = re.compile(r"^([A-Za-z_][A-Za-z0-9_.]{0,100})(?::|$)", re.MULTILINE)
+
+type _Line = MutableMapping[str, Any]
+
+
+def set_up_logs(log_format: LogFormat, log_level: LogLevel, stream: TextIO | None = None) -> None:
+    """Send what is logged here, and through the standard library by others, to one place in one form.
+
+    Args:
+        log_format: Text or JSON.
+        log_level: From which on.
+        stream: Where to; None: standard error.
+    """
+    target = sys.stderr if stream is None else stream
+    level = _LEVELS[log_level]
+    renderer = _json if log_format is LogFormat.JSON else _text
+    exceptions = _exception_in_full if log_level is LogLevel.DEBUG else _exception_without_words
+    common = [_time_and_request, exceptions]
+    structlog.configure(
+        processors=[structlog.processors.add_log_level, *common, renderer],
+        wrapper_class=structlog.make_filtering_bound_logger(level),
+        logger_factory=structlog.WriteLoggerFactory(target),
+        cache_logger_on_first_use=False,
+    )
+    handler = logging.StreamHandler(target)
+    handler.setFormatter(
+        structlog.stdlib.ProcessorFormatter(
+            foreign_pre_chain=[structlog.stdlib.add_log_level, structlog.stdlib.add_logger_name, *common],
+            processors=[structlog.stdlib.ProcessorFormatter.remove_processors_meta, renderer],
+            keep_exc_info=False,
+            # What `exceptions` above has not taken is nobody's.
+            use_get_message=True,
+        )
+    )
+    root = logging.getLogger()
+    for old in tuple(root.handlers):
+        if isinstance(old.formatter, structlog.stdlib.ProcessorFormatter):
+            root.removeHandler(old)
+    root.addHandler(handler)
+    root.setLevel(level)
+    for name in _TALKATIVE:
+        logging.getLogger(name).setLevel(max(level, logging.WARNING))
+
+
+def tell_fault(fault: BaseException | str) -> str:
+    """Log a fault of ours; returns its id, which is all that a caller is told of it.
+
+    Args:
+        fault: It, or a traceback of it from another process. Its words are logged at the level debug alone.
+    """
+    identity = secrets.token_hex(4)
+    log = structlog.get_logger()
+    if isinstance(fault, str):
+        kinds = _ERROR_KIND.findall(fault)
+        kind = kinds[-1] if kinds else "unknown"
+        places = [f"{file}:{line} {name}" for file, line, name in _FRAME.findall(fault)][-_FRAMES:]
+        words = fault
+    else:
+        kind, places = type(fault).__qualname__, _places(fault.__traceback__)
+        words = "".join(traceback.format_exception(fault))
+    log.error("fault", fault=identity, error=kind, places=places)
+    log.debug("fault in words", fault=identity, traceback=words)
+    return identity
+
+
+def _places(begin: TracebackType | None) -> list[str]:
+    frames = traceback.extract_tb(begin)[-_FRAMES:]
+    return [f"{frame.filename}:{frame.lineno} {frame.name}" for frame in frames]
+
+
+def _time_and_request(logger: Any, name: str, line: _Line) -> _Line:
+    now_ns = time.time_ns()
+    line["time"] = f"{_second(now_ns // 1_000_000_000)}.{now_ns // 1_000_000 % 1000:03d}Z"
+    request = REQUEST_ID.get()
+    if request and "request" not in line:
+        line["request"] = request
+    return line
+
+
+_last_second = (0, "")
+
+
+def _second(second: int) -> str:
+    """It as ISO 8601 has it; the last one is kept, since many lines fall into one second."""
+    global _last_second
+    known, text = _last_second
+    if known != second:
+        text = time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime(second))
+        _last_second = second, text
+    return text
+
+
+def _error_of(line: _Line) -> BaseException | None:
+    given = line.pop("exc_info", None)
+    if given is True:
+        given = sys.exc_info()[1]
+    if isinstance(given, tuple):
+        given = given[1]
+    return given if isinstance(given, BaseException) else None
+
+
+def _exception_without_words(logger: Any, name: str, line: _Line) -> _Line:
+    error = _error_of(line)
+    if error is not None:
+        line["error"] = type(error).__qualname__
+        if isinstance(error, OSError) and error.strerror:
+            line["cause"] = error.strerror
+        line["places"] = _places(error.__traceback__)
+    return line
+
+
+def _exception_in_full(logger: Any, name: str, line: _Line) -> _Line:
+    error = _error_of(line)
+    if error is not None:
+        line["traceback"] = "".join(traceback.format_exception(error))
+    return line
+
+
+_encode = msgspec.json.Encoder(enc_hook=str).encode
+
+
+def _json(logger: Any, name: str, line: _Line) -> str:
+    first = {"time": line.pop("time"), "level": line.pop("level"), "event": line.pop("event")}
+    try:
+        return _encode(first | dict(line)).decode()
+    except (UnicodeEncodeError, TypeError):  # Half a pair of UTF-16, which a name of a file may hold; keys of a dict.
+        return json.dumps(first | dict(line), default=str, skipkeys=True)
+
+
+def _text(logger: Any, name: str, line: _Line) -> str:
+    head = f"{line.pop('time')} {line.pop('level'):<7} {_quoted(line.pop('event'))[1:-1]}"
+    return " ".join((head, *(f"{key}={_shown(value)}" for key, value in line.items())))
+
+
+def _shown(value: Any) -> str:
+    """In one line, whatever it is: nobody else's text can look like a line of ours."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_shown, value))}]"
+    text = str(value)
+    return text if _PLAIN.match(text) else _quoted(text)
+
+
+def _quoted(value: Any) -> str:
+    text = json.dumps(str(value), ensure_ascii=False)
+    return text if text.isprintable() else json.dumps(str(value))

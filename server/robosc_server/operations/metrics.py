@@ -1,0 +1,321 @@
+"""What the server counts, for Prometheus: in a registry of its own, asked for over HTTP at /metrics."""
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Iterable, Mapping
+from types import TracebackType
+from typing import Any, Self
+
+import grpc
+from prometheus_client import (
+    CollectorRegistry,
+    Counter,
+    Gauge,
+    GCCollector,
+    Histogram,
+    Info,
+    PlatformCollector,
+    ProcessCollector,
+    generate_latest,
+)
+from prometheus_client.core import GaugeMetricFamily, Metric
+from prometheus_client.exposition import CONTENT_TYPE_LATEST
+
+from robosc_api.security import SecurityError, is_loopback_host, joined
+from robosc_api.security.addresses import split
+from robosc_server.tasks.task import Failure, Outcome, TaskKind
+
+_CALL_SECONDS = (0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 300, 600)
+_TASK_SECONDS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 120, 300, 600)
+
+_HEAD_BYTES = 8192
+_HEAD_SECONDS = 5.0
+_CONNECTIONS = 16
+
+
+class MethodMetrics:
+    """Of one method, looked up once and not for each call.
+
+    Attributes:
+        under_way: Calls that have begun and not ended.
+    """
+
+    __slots__ = ("_calls", "_method", "_ok", "_refusals", "_seconds", "under_way")
+
+    def __init__(self, method: str, calls: Counter, refusals: Counter, seconds: Histogram) -> None:
+        self._method, self._calls, self._refusals = method, calls, refusals
+        self._ok = calls.labels(method, "OK")
+        self._seconds = seconds.labels(method)
+        self.under_way = 0
+
+    def ended(self, code: grpc.StatusCode, reason: str, seconds: float) -> None:
+        """Count a call.
+
+        Args:
+            code: How it ended.
+            reason: Why it has failed, as in google.rpc.ErrorInfo; empty: nothing is known.
+            seconds: How long it took.
+        """
+        if code is grpc.StatusCode.OK:
+            self._ok.inc()
+        else:
+            self._calls.labels(self._method, code.name).inc()
+            if reason:
+                self._refusals.labels(reason).inc()
+        self._seconds.observe(seconds)
+
+
+class Metrics:
+    """Everything that is counted.
+
+    Args:
+        version: Of RoboSC.
+    """
+
+    def __init__(self, version: str) -> None:
+        registry = self._registry = CollectorRegistry()
+        ProcessCollector(registry=registry)
+        PlatformCollector(registry=registry)
+        GCCollector(registry=registry)
+        Info("robosc_server", "Which server this is.", registry=registry).info({"version": version})
+        self._calls = Counter("robosc_server_calls", "Calls that have ended.", ("method", "code"), registry=registry)
+        self._refusals = Counter(
+            "robosc_server_failures", "Calls without an answer, by reason (ErrorInfo).", ("reason",), registry=registry
+        )
+        self._seconds = Histogram(
+            "robosc_server_call_seconds",
+            "How long calls took.",
+            ("method",),
+            buckets=_CALL_SECONDS,
+            registry=registry,
+        )
+        self._outcomes = Counter(
+            "robosc_server_tasks", "Tasks that workers have ended, by outcome.", ("kind", "outcome"), registry=registry
+        )
+        self._task_seconds = Histogram(
+            "robosc_server_task_seconds",
+            "How long workers were at tasks.",
+            ("kind",),
+            buckets=_TASK_SECONDS,
+            registry=registry,
+        )
+        self._lookups = Counter(
+            "robosc_server_result_lookups",
+            "Requests by where their result was found: memory, store, or none (a worker is needed).",
+            ("found",),
+            registry=registry,
+        )
+        for where in ("memory", "store", "none"):
+            self._lookups.labels(where)
+        self._restarts = Counter(
+            "robosc_server_worker_restarts", "Worker processes that had to be replaced.", registry=registry
+        )
+        Gauge("robosc_server_calls_under_way", "Calls that have begun and not ended.", registry=registry).set_function(
+            lambda: self.calls_under_way
+        )
+        self._waiting: Callable[[], int] = _nothing
+        self._running: Callable[[], int] = _nothing
+        self._jobs: Callable[[], Mapping[str, int]] = dict
+        self._conditions: Callable[[], Mapping[str, bool]] = dict
+        Gauge("robosc_server_tasks_waiting", "Tasks that wait for a worker.", registry=registry).set_function(
+            lambda: self._waiting()
+        )
+        Gauge("robosc_server_tasks_running", "Tasks that workers are at.", registry=registry).set_function(
+            lambda: self._running()
+        )
+        registry.register(_Asked(self))
+        self._methods: dict[str, MethodMetrics] = {}
+
+    def method(self, name: str) -> MethodMetrics:
+        """Of one method; only for methods that there are, since each stays."""
+        found = self._methods.get(name)
+        if found is None:
+            found = self._methods[name] = MethodMetrics(name, self._calls, self._refusals, self._seconds)
+        return found
+
+    def unknown_method(self) -> None:
+        """Count a call of a method that there is not; its name is the caller's, and kept nowhere."""
+        self._calls.labels("unknown", grpc.StatusCode.UNIMPLEMENTED.name).inc()
+
+    @property
+    def calls_under_way(self) -> int:
+        """Calls that have begun and not ended."""
+        return sum(method.under_way for method in tuple(self._methods.values()))
+
+    def task_ended(self, kind: TaskKind, outcome: Outcome | None, seconds: float) -> None:
+        """Count a task that a worker was at.
+
+        Args:
+            kind: What it was.
+            outcome: How it ended; None: nobody waits for it any more.
+            seconds: By the clock, while a worker was at it.
+        """
+        match outcome:
+            case None:
+                word = "CANCELLED"
+            case Failure(reason=reason):
+                word = reason.value
+            case _:
+                word = "RESULT"
+        self._outcomes.labels(kind.value, word).inc()
+        self._task_seconds.labels(kind.value).observe(seconds)
+
+    def cache_hit(self, where: str) -> None:
+        """Count a request whose result was there.
+
+        Args:
+            where: `memory` or `store`.
+        """
+        self._lookups.labels(where).inc()
+
+    def cache_miss(self) -> None:
+        """Count a request whose result was not there."""
+        self._lookups.labels("none").inc()
+
+    def worker_restarted(self) -> None:
+        """Count a worker process that had to be replaced."""
+        self._restarts.inc()
+
+    def follow(
+        self,
+        *,
+        waiting: Callable[[], int] | None = None,
+        running: Callable[[], int] | None = None,
+        jobs: Callable[[], Mapping[str, int]] | None = None,
+        conditions: Callable[[], Mapping[str, bool]] | None = None,
+    ) -> None:
+        """Who is asked each time that somebody wants the metrics, on the event loop: it must be quick.
+
+        Args:
+            waiting: How many tasks wait.
+            running: How many tasks workers are at.
+            jobs: How many jobs there are, by state.
+            conditions: What the service needs, and whether it is there.
+        """
+        self._waiting = waiting or self._waiting
+        self._running = running or self._running
+        self._jobs = jobs or self._jobs
+        self._conditions = conditions or self._conditions
+
+    def followed(self) -> Iterable[Metric]:
+        """What is asked for, and has labels."""
+        jobs = GaugeMetricFamily("robosc_server_jobs", "Jobs that are kept, by state.", labels=("state",))
+        for state, number in sorted(self._jobs().items()):
+            jobs.add_metric((state,), number)
+        conditions = GaugeMetricFamily(
+            "robosc_server_condition", "Whether what the service needs is there: 1 or 0.", labels=("name",)
+        )
+        for name, holds in sorted(self._conditions().items()):
+            conditions.add_metric((name,), float(holds))
+        return jobs, conditions
+
+    def text(self) -> bytes:
+        """All of it, in the text format of Prometheus."""
+        return generate_latest(self._registry)
+
+
+def _nothing() -> int:
+    return 0
+
+
+class _Asked:
+    def __init__(self, metrics: Metrics) -> None:
+        self._metrics = metrics
+
+    def collect(self) -> Iterable[Metric]:
+        return self._metrics.followed()
+
+
+class MetricsEndpoint:
+    """Answers Prometheus over HTTP/1.1: one GET of /metrics for each connection. An asynchronous context.
+
+    Args:
+        metrics: What it shows.
+        address: `HOST:PORT`; port 0 picks a free one.
+        beyond_loopback: Whether other machines may reach it.
+
+    Attributes:
+        address: `HOST:PORT` with the port that it got, once it is entered.
+    """
+
+    def __init__(self, metrics: Metrics, address: str, *, beyond_loopback: bool = False) -> None:
+        self._metrics = metrics
+        self._beyond_loopback = beyond_loopback
+        self._server: asyncio.Server | None = None
+        self._connections: set[asyncio.StreamWriter] = set()
+        self.address = address
+
+    async def __aenter__(self) -> Self:
+        """Listen.
+
+        Raises:
+            SecurityError: It may not listen there, or cannot.
+        """
+        check_metrics_address(self.address, beyond_loopback=self._beyond_loopback)
+        host, port = split(self.address)
+        try:
+            self._server = await asyncio.start_server(self._answer, host, port, limit=_HEAD_BYTES)
+        except OSError as error:
+            raise SecurityError(f"cannot listen on {self.address} for metrics: {error.strerror or error}") from error
+        self.address = joined(host, self._server.sockets[0].getsockname()[1])
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._server is not None:
+            self._server.close()
+            for writer in tuple(self._connections):
+                writer.transport.abort()
+            await self._server.wait_closed()
+
+    async def _answer(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        if len(self._connections) >= _CONNECTIONS:
+            writer.transport.abort()
+            return
+        self._connections.add(writer)
+        try:
+            async with asyncio.timeout(_HEAD_SECONDS):
+                head = await reader.readuntil(b"\r\n\r\n")
+                writer.write(self._response(head.split(b"\r\n", 1)[0].split(b" ")))
+                await writer.drain()
+        except (OSError, TimeoutError, asyncio.IncompleteReadError, asyncio.LimitOverrunError):
+            writer.transport.abort()
+        finally:
+            self._connections.discard(writer)
+            writer.close()
+            with contextlib.suppress(OSError):
+                await writer.wait_closed()
+
+    def _response(self, words: list[bytes]) -> bytes:
+        if len(words) != 3 or not words[2].startswith(b"HTTP/1."):
+            return _http("400 Bad Request", b"")
+        if words[1].partition(b"?")[0] != b"/metrics":
+            return _http("404 Not Found", b"metrics are at /metrics\n")
+        if words[0] not in (b"GET", b"HEAD"):
+            return _http("405 Method Not Allowed", b"")
+        return _http("200 OK", self._metrics.text(), CONTENT_TYPE_LATEST, is_head=words[0] == b"HEAD")
+
+
+def _http(status: str, body: bytes, content: str = "text/plain", *, is_head: bool = False) -> bytes:
+    head = f"HTTP/1.1 {status}\r\nContent-Type: {content}\r\nContent-Length: {len(body)}\r\nConnection: close\r\n\r\n"
+    return head.encode() + (b"" if is_head else body)
+
+
+def check_metrics_address(address: str, *, beyond_loopback: bool) -> None:
+    """What can be known before it listens.
+
+    Raises:
+        SecurityError: It may not listen there.
+    """
+    if not beyond_loopback and not is_loopback_host(split(address)[0]):
+        raise SecurityError(
+            f"{address} can be reached from other machines, and metrics are for everybody who reaches them: say that "
+            "they may be there (metrics_beyond_loopback), or give an address of this machine alone"
+        )
+
+
+def metric_names() -> frozenset[str]:
+    """Every name that stands in the answer, for whoever draws or watches them."""
+    found: Any = Metrics("")._registry.collect()
+    return frozenset(metric.name for metric in found)

@@ -1,0 +1,62 @@
+"""Workers that are watched: their tasks are counted, and each run is a span."""
+
+import time
+from types import TracebackType
+from typing import Any, Self
+
+from robosc_server.operations.metrics import Metrics
+from robosc_server.operations.tracing import NO_TRACING, Tracing
+from robosc_server.tasks.task import Failure, Outcome, Task, TaskLimits
+from robosc_server.workers import OnReport, Workers
+
+
+class ObservedWorkers:
+    """Some workers, watched.
+
+    Args:
+        workers: Who does the work; entered and left with this.
+        metrics: Where tasks are counted.
+        tracing: Where spans go.
+    """
+
+    def __init__(self, workers: Workers, metrics: Metrics, tracing: Tracing = NO_TRACING) -> None:
+        self._workers = workers
+        self._metrics = metrics
+        self._tracing = tracing
+        self._running = 0
+
+    async def __aenter__(self) -> Self:
+        """Start the workers."""
+        entered: Any = self._workers
+        await entered.__aenter__()
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        entered: Any = self._workers
+        await entered.__aexit__(kind, error, trace)
+
+    @property
+    def capacity(self) -> int:
+        """How many tasks they can be at, at once."""
+        return self._workers.capacity
+
+    @property
+    def running(self) -> int:
+        """How many tasks they are at."""
+        return self._running
+
+    async def run(self, task: Task, limits: TaskLimits, on_report: OnReport) -> Outcome:
+        """The outcome of a task, as `Workers.run`."""
+        outcome: Outcome | None = None
+        begun_s = time.monotonic()
+        self._running += 1
+        try:
+            with self._tracing.span("worker run", {"task.kind": task.kind.value}) as span:
+                outcome = await self._workers.run(task, limits, on_report)
+                span.set_attribute("task.outcome", outcome.reason if isinstance(outcome, Failure) else "RESULT")
+            return outcome
+        finally:
+            self._running -= 1
+            self._metrics.task_ended(task.kind, outcome, time.monotonic() - begun_s)

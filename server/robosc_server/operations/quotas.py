@@ -1,0 +1,124 @@
+"""How much each token may ask for: a bucket that fills steadily, from which each task takes.
+
+Token buckets: J. Turner, New directions in communications, IEEE Communications Magazine 24(10), 1986, pp. 8-15. Each
+server counts by itself, in memory: after a restart the buckets are full.
+"""
+
+import time
+from collections.abc import Callable
+
+from robosc_api.security import Quota, TokenFile
+from robosc_server.failures import RefusedError
+from robosc_server.tasks.task import Reason
+
+_MINUTE_S = 60.0
+_HOUR_S = 3600.0
+
+
+class Bucket:
+    """Holds at most so much, and that much flows in within a time; it may be overdrawn.
+
+    Args:
+        size: How much it holds; it is full at first.
+        filled_in_s: Seconds within which an empty one is full.
+        now_s: Of a monotonic clock.
+    """
+
+    def __init__(self, size: int, filled_in_s: float, now_s: float) -> None:
+        self.size = size
+        self._rate = size / filled_in_s
+        self._level = float(size)
+        self._at_s = now_s
+
+    def take(self, amount: float, now_s: float) -> None:
+        """Take something, whether it is there or not."""
+        self._level = self._level_at(now_s) - amount
+        self._at_s = max(self._at_s, now_s)
+
+    def seconds_until(self, amount: float, now_s: float) -> float:
+        """Seconds until so much is there; 0: it is."""
+        return max(0.0, (amount - self._level_at(now_s)) / self._rate)
+
+    def _level_at(self, now_s: float) -> float:
+        return min(float(self.size), self._level + max(0.0, now_s - self._at_s) * self._rate)
+
+
+class _Account:
+    """The buckets of one token, for the quota that it has now."""
+
+    def __init__(self, quota: Quota, now_s: float) -> None:
+        self.quota = quota
+        self.tasks = None if quota.per_minute is None else Bucket(quota.per_minute, _MINUTE_S, now_s)
+        seconds = quota.cpu_seconds_per_hour
+        self.seconds = None if seconds is None else Bucket(seconds, _HOUR_S, now_s)
+
+
+class Quotas:
+    """What each token has left. Not for several threads.
+
+    Args:
+        tokens: Where the quotas stand; None: there are no tokens, and no quotas.
+        clock: Seconds of a monotonic clock.
+    """
+
+    def __init__(self, tokens: TokenFile | None, clock: Callable[[], float] = time.monotonic) -> None:
+        self._tokens = tokens
+        self._clock = clock
+        self._accounts: dict[str, _Account] = {}
+
+    def admit(self, caller: str) -> None:
+        """Count a task that somebody asks for.
+
+        Args:
+            caller: Name of the token.
+
+        Raises:
+            RefusedError: It has asked for too much; nothing is counted.
+        """
+        account = self._account(caller)
+        if account is None:
+            return
+        now_s = self._clock()
+        # A task's time is known when it has ended: one may begin as long as anything is left.
+        if account.seconds is not None and (wait_s := account.seconds.seconds_until(0.0, now_s)) > 0:
+            size = account.seconds.size
+            raise _exceeded(f"the token's tasks may take {size} seconds of a processor's time in an hour", wait_s)
+        if account.tasks is not None:
+            if (wait_s := account.tasks.seconds_until(1.0, now_s)) > 0:
+                raise _exceeded(f"the token may ask for {account.tasks.size} tasks in a minute", wait_s)
+            account.tasks.take(1.0, now_s)
+
+    def spent(self, caller: str, cpu_s: float) -> None:
+        """Count what a task has taken.
+
+        Args:
+            caller: Name of the token that it was for.
+            cpu_s: Seconds of a processor's time.
+        """
+        account = self._account(caller)
+        if account is not None and account.seconds is not None:
+            account.seconds.take(cpu_s, self._clock())
+
+    def waiting(self, caller: str) -> int | None:
+        """How many tasks of a token may wait; None: as many as anybody's."""
+        quota = self._quota(caller)
+        return None if quota is None else quota.waiting
+
+    def _quota(self, caller: str) -> Quota | None:
+        entry = None if self._tokens is None else self._tokens.named(caller)
+        return None if entry is None else entry.quota
+
+    def _account(self, caller: str) -> _Account | None:
+        quota = self._quota(caller)
+        if quota is None or (quota.per_minute is None and quota.cpu_seconds_per_hour is None):
+            self._accounts.pop(caller, None)
+            return None
+        account = self._accounts.get(caller)
+        if account is None or account.quota != quota:
+            # No more of them than lines of the file, but for tokens that were withdrawn and never come again.
+            account = self._accounts[caller] = _Account(quota, self._clock())
+        return account
+
+
+def _exceeded(message: str, wait_s: float) -> RefusedError:
+    return RefusedError(Reason.QUOTA_EXCEEDED, message, wait_s)

@@ -1,0 +1,522 @@
+"""What an operator may set: one definition, from which the flags, the file, the environment and the manual follow.
+
+A flag goes before the environment, the environment before the file, the file before the default.
+"""
+
+import argparse
+import os
+import re
+import sys
+import tomllib
+from collections.abc import Mapping, Sequence
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic_core import PydanticCustomError, PydanticUndefined
+from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
+
+from robosc import __version__
+from robosc_api.security import ServerSecurity, joined
+from robosc_api.security.addresses import split
+from robosc_server.tasks.task import TaskLimits
+
+ENVIRONMENT_PREFIX = "ROBOSC_SERVER_"
+CONFIG_VARIABLE = ENVIRONMENT_PREFIX + "CONFIG"
+MAXIMUM_FILE_BYTES = 256 * 1024
+
+_SIZE = re.compile(r"([0-9]{1,18})\s*(B|KiB|MiB|GiB|TiB)?\Z")
+_UNITS = {None: 1, "B": 1, "KiB": 2**10, "MiB": 2**20, "GiB": 2**30, "TiB": 2**40}
+
+
+class LogFormat(StrEnum):
+    """How lines of the log look."""
+
+    TEXT = "text"
+    JSON = "json"
+
+
+class LogLevel(StrEnum):
+    """From which level on lines are written."""
+
+    DEBUG = "debug"
+    INFO = "info"
+    WARNING = "warning"
+    ERROR = "error"
+
+
+def _bytes(value: object) -> object:
+    """A number of bytes, also with a unit."""
+    if isinstance(value, str):
+        match = _SIZE.match(value.strip())
+        if match is None:
+            raise PydanticCustomError("size", "a number of bytes such as 1048576 or 1MiB is needed")
+        return int(match[1]) * _UNITS[match[2]]
+    return value
+
+
+def _whole(value: object) -> object:
+    """Not true and false, which Python takes for 1 and 0, nor 2.0."""
+    if isinstance(value, bool | float):
+        raise PydanticCustomError("whole", "a whole number is needed")
+    return value
+
+
+def _host_and_port(text: str) -> str:
+    try:
+        split(text)
+    except ValueError as error:
+        raise PydanticCustomError("address", "HOST:PORT is needed") from error
+    return text
+
+
+def _workers(text: str) -> str:
+    kind, _, address = text.partition("://")
+    if text == "local":
+        return text
+    if kind != "dask":
+        raise PydanticCustomError("workers", "'local' or 'dask://HOST:PORT' is needed")
+    try:
+        split(address)
+    except ValueError as error:
+        raise PydanticCustomError("workers", "after dask:// there is HOST:PORT") from error
+    return text
+
+
+def _database(text: str) -> str:
+    if text.partition(":")[0].partition("+")[0] not in ("sqlite", "postgresql") or "://" not in text:
+        raise PydanticCustomError("database", "a URL with sqlite:// or postgresql:// is needed")
+    return text
+
+
+def _endpoint(text: str) -> str:
+    scheme, _, address = text.partition("://")
+    try:
+        if scheme not in ("http", "https"):
+            raise ValueError
+        split(address.rstrip("/"))
+    except ValueError as error:
+        raise PydanticCustomError("endpoint", "http://HOST:PORT or https://HOST:PORT is needed") from error
+    return text
+
+
+def _host(text: str) -> str:
+    if not text or any(character.isspace() or not character.isprintable() for character in text):
+        raise PydanticCustomError("host", "a name or address is needed")
+    return text
+
+
+type _Bytes = Annotated[int, BeforeValidator(_bytes), BeforeValidator(_whole), Field(ge=1, le=2**50)]
+type _Count = Annotated[int, BeforeValidator(_whole), Field(ge=1, le=1_000_000_000)]
+type _Seconds = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False)]
+
+
+def _processors() -> int:
+    return max(1, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)
+
+
+def _state_folder() -> Path:
+    try:
+        return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state") / "robosc-server"
+    except RuntimeError:  # A user without a home, as in many containers.
+        return Path("/var/lib/robosc-server")
+
+
+def _setting(default: Any, words: str, group: str, **more: Any) -> Any:
+    """A field: its default (or what makes it, with the words for that), what the manual says, its group there."""
+    extra = {"group": group, "default": more.pop("told", None), "metavar": more.pop("metavar", None)}
+    if callable(default):
+        return Field(default_factory=default, description=words, json_schema_extra=extra, **more)
+    return Field(default=default, description=words, json_schema_extra=extra, **more)
+
+
+_LISTENING, _SECURITY, _LIMITS, _QUEUE = "listening", "security", "limits of one task", "queue"
+_KEEPING, _WORKING, _WATCHING = "jobs and results", "workers", "operations"
+
+
+class Settings(BaseModel):
+    """Settings of one server; each field's description is what the manual says about it.
+
+    Made from its fields alone it looks at neither file nor environment: `load_settings` does.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", hide_input_in_errors=True)
+
+    host: Annotated[str, AfterValidator(_host)] = _setting("127.0.0.1", "address to listen on", _LISTENING)
+    port: Annotated[int, BeforeValidator(_whole)] = _setting(
+        50051, "TCP port; 0 picks a free one", _LISTENING, ge=0, le=65535
+    )
+    drain_seconds: Annotated[float, Field(ge=0, le=86400, allow_inf_nan=False)] = _setting(
+        30.0, "seconds that calls under way are given when the server is told to end", _LISTENING
+    )
+
+    tls_certificate: Path | None = _setting(
+        None, "certificate chain (PEM): listen with TLS", _SECURITY, metavar="FILE", told="no TLS"
+    )
+    tls_key: Path | None = _setting(None, "its private key (PEM)", _SECURITY, metavar="FILE")
+    client_ca: Path | None = _setting(
+        None,
+        "callers need a certificate that one of these (PEM) has signed",
+        _SECURITY,
+        metavar="FILE",
+        told="callers need no certificate",
+    )
+    tokens: Path | None = _setting(
+        None,
+        "callers need a token of this file (see `robosc-server token`)",
+        _SECURITY,
+        metavar="FILE",
+        told="callers need no token",
+    )
+    insecure_beyond_loopback: bool = _setting(
+        False, "listen without TLS where other machines reach it, on a network that you trust", _SECURITY
+    )
+    signing_key: Path | None = _setting(
+        None,
+        "Ed25519 private key (PEM) that supervisors are signed with",
+        _SECURITY,
+        metavar="FILE",
+        told="supervisors are not signed",
+    )
+
+    bundle_bytes: _Bytes = _setting(2**20, "largest model with its libraries: all names and texts", _LIMITS)
+    bundle_files: _Count = _setting(1000, "most files of a model with its libraries", _LIMITS)
+    task_seconds: _Seconds = _setting(600.0, "longest time for one task by the clock, whatever its deadline", _LIMITS)
+    task_cpu_seconds: _Seconds = _setting(600.0, "most of a processor's time for one task, in seconds", _LIMITS)
+    task_memory_bytes: Annotated[_Bytes, Field(ge=256 * 2**20)] = _setting(
+        2 * 2**30, "largest address space of the process of one task, its programs included", _LIMITS
+    )
+    task_nodes: _Count = _setting(20_000_000, "most nodes of decision diagrams of one task", _LIMITS)
+    result_bytes: _Bytes = _setting(64 * 2**20, "largest result of one task", _LIMITS)
+
+    waiting_tasks: _Count = _setting(1000, "tasks that may wait, of all callers together", _QUEUE)
+    waiting_tasks_per_caller: _Count = _setting(
+        100, "tasks of one caller that may wait, unless its token says otherwise", _QUEUE
+    )
+
+    workers: Annotated[str, AfterValidator(_workers)] = _setting(
+        "local", "who works: `local` processes, or a Dask cluster, `dask://HOST:PORT`", _WORKING, metavar="WHERE"
+    )
+    worker_processes: Annotated[_Count, Field(le=1024)] = _setting(
+        _processors,
+        "local tasks worked on at once, each in its own process",
+        _WORKING,
+        told="the number of processors",
+    )
+
+    state_dir: Path = _setting(
+        _state_folder,
+        "folder for jobs and results, unless there is a database_url",
+        _KEEPING,
+        metavar="FOLDER",
+        told="$XDG_STATE_HOME/robosc-server, or ~/.local/state/robosc-server",
+    )
+    database_url: Annotated[str, AfterValidator(_database)] | None = _setting(
+        None,
+        "database for jobs and results, as SQLAlchemy writes it, such as postgresql+psycopg://USER:PASSWORD@HOST/NAME;"
+        " several servers may share one in PostgreSQL",
+        _KEEPING,
+        metavar="URL",
+        told="SQLite in state_dir",
+        repr=False,
+    )
+    retention_seconds: _Seconds = _setting(
+        7 * 86400.0, "seconds that a job and its result are kept after its end", _KEEPING
+    )
+    results_bytes: _Bytes = _setting(
+        2 * 2**30, "results kept for repeated requests, in the database; the longest unused go first", _KEEPING
+    )
+    memory_cache_bytes: Annotated[int, BeforeValidator(_bytes), BeforeValidator(_whole), Field(ge=0, le=2**50)] = (
+        _setting(64 * 2**20, "results kept in memory as well; 0: none", _KEEPING)
+    )
+
+    log_format: LogFormat = _setting(LogFormat.TEXT, "how lines of the log look: text or json", _WATCHING)
+    log_level: LogLevel = _setting(
+        LogLevel.INFO, "debug, info, warning or error; nothing of a model is logged above debug", _WATCHING
+    )
+    metrics_address: Annotated[str, AfterValidator(_host_and_port)] | None = _setting(
+        None, "where Prometheus finds metrics, over HTTP at /metrics", _WATCHING, metavar="HOST:PORT", told="nowhere"
+    )
+    metrics_beyond_loopback: bool = _setting(
+        False, "metrics may be where other machines reach them; they are in the clear and for everybody", _WATCHING
+    )
+    tracing_endpoint: Annotated[str, AfterValidator(_endpoint)] | None = _setting(
+        None,
+        "where traces are sent, with OTLP over gRPC, such as http://127.0.0.1:4317",
+        _WATCHING,
+        metavar="URL",
+        told="nowhere",
+    )
+
+    @property
+    def address(self) -> str:
+        """`HOST:PORT` to listen on."""
+        return joined(self.host, self.port)
+
+    @property
+    def security(self) -> ServerSecurity:
+        """How the service is secured."""
+        return ServerSecurity(
+            certificate=self.tls_certificate,
+            key=self.tls_key,
+            client_ca=self.client_ca,
+            tokens=self.tokens,
+            insecure_beyond_loopback=self.insecure_beyond_loopback,
+        )
+
+    @property
+    def task_limits(self) -> TaskLimits:
+        """What one task may take."""
+        return TaskLimits(
+            seconds=self.task_seconds,
+            cpu_seconds=self.task_cpu_seconds,
+            memory_bytes=self.task_memory_bytes,
+            nodes=self.task_nodes,
+            result_bytes=self.result_bytes,
+        )
+
+    @property
+    def database(self) -> str:
+        """The database's URL."""
+        return self.database_url or f"sqlite:///{self.state_dir.absolute() / 'jobs.sqlite'}"
+
+
+class SettingsError(Exception):
+    """Settings that cannot be used.
+
+    Attributes:
+        problems: A sentence for each, with the place.
+    """
+
+    def __init__(self, problems: Sequence[str]) -> None:
+        super().__init__("\n".join(problems))
+        self.problems = tuple(problems)
+
+
+class _Given(BaseSettings, Settings):
+    """The same from all sources."""
+
+    model_config = SettingsConfigDict(
+        frozen=True,
+        extra="forbid",
+        hide_input_in_errors=True,
+        env_prefix=ENVIRONMENT_PREFIX,
+        env_ignore_empty=True,
+        validate_default=False,
+    )
+
+    from_file: ClassVar[Mapping[str, Any]] = {}
+
+    @classmethod
+    def settings_customise_sources(
+        cls,
+        settings_cls: type[BaseSettings],
+        init_settings: PydanticBaseSettingsSource,
+        env_settings: PydanticBaseSettingsSource,
+        dotenv_settings: PydanticBaseSettingsSource,
+        file_secret_settings: PydanticBaseSettingsSource,
+    ) -> tuple[Any, ...]:
+        """What goes first stands first."""
+        return init_settings, env_settings, lambda: dict(cls.from_file)
+
+
+def settings_from(flags: Mapping[str, Any], config: Path | None) -> Settings:
+    """The settings of flags, environment and file together.
+
+    Args:
+        flags: By name of the field.
+        config: File in TOML; None: none.
+
+    Raises:
+        SettingsError: The file cannot be read, something in it is unknown, or a value is wrong; every problem at once.
+    """
+    content = {} if config is None else read_file(config)
+
+    class Given(_Given):
+        from_file = content
+
+    try:
+        given = Given(**flags)
+    except ValidationError as error:
+        problems = []
+        for problem in error.errors(include_url=False, include_context=False):
+            place = source_of(str(problem["loc"][0]), flags, config)
+            problems.append(f"{place}: {_sentence(problem['type'], problem['msg'])}")
+        raise SettingsError(problems) from None
+    return Settings.model_construct(given.model_fields_set, **dict(given))
+
+
+def source_of(name: str, flags: Mapping[str, Any], config: Path | None) -> str:
+    """Where the value of a setting comes from that somebody has set, in words."""
+    if name in flags:
+        return flag_of(name)
+    variable = variable_of(name)
+    # Environment variables that are no settings are nobody's mistake: others may begin like ours.
+    if name in Settings.model_fields and os.environ.get(variable):
+        return f"${variable}"
+    return f"{config}: {name}"
+
+
+_SENTENCES = {
+    "extra_forbidden": "there is no such setting; `robosc-server example-config` prints all",
+    "int_parsing": "a whole number is needed",
+    "int_type": "a whole number is needed",
+    "float_parsing": "a number is needed",
+    "float_type": "a number is needed",
+    "bool_parsing": "true or false is needed",
+    "bool_type": "true or false is needed",
+    "string_type": "a text is needed",
+    "path_type": "a text is needed",
+}
+
+
+def _sentence(kind: str, message: str) -> str:
+    return _SENTENCES.get(kind) or message.replace("Input should be", "it should be")
+
+
+def read_file(path: Path) -> dict[str, Any]:
+    """What stands in a file of settings.
+
+    Raises:
+        SettingsError: It cannot be read, is too large, or is not TOML.
+    """
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(MAXIMUM_FILE_BYTES + 1)
+    except OSError as error:
+        raise SettingsError([f"{path}: {error.strerror}"]) from error
+    if len(data) > MAXIMUM_FILE_BYTES:
+        raise SettingsError([f"{path}: larger than {MAXIMUM_FILE_BYTES} bytes"])
+    try:
+        return tomllib.loads(data.decode())
+    except (UnicodeDecodeError, RecursionError) as error:
+        raise SettingsError([f"{path}: not TOML"]) from error
+    except tomllib.TOMLDecodeError as error:
+        # Only where: a line may hold a password.
+        place = re.search(r"\(at (?:line \d+, column \d+|end of document)\)", str(error))
+        raise SettingsError([f"{path}: not TOML {place[0] if place else ''}".rstrip()]) from None
+
+
+def flag_of(name: str) -> str:
+    """The flag of a setting."""
+    return "--" + name.replace("_", "-")
+
+
+def variable_of(name: str) -> str:
+    """The environment variable of a setting."""
+    return ENVIRONMENT_PREFIX + name.upper()
+
+
+def default_text(name: str) -> str:
+    """What a setting is where nobody sets it, in words."""
+    field = Settings.model_fields[name]
+    extra: Any = field.json_schema_extra
+    if extra["default"] is not None:
+        return str(extra["default"])
+    if field.default is None or field.default is PydanticUndefined:
+        return "none"
+    return str(field.default).lower() if isinstance(field.default, bool) else shown(name, field.default)
+
+
+def shown(name: str, value: Any) -> str:
+    """A value as the manual and a file have it: bytes with a unit, seconds without needless digits."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if name.endswith("_bytes"):
+        for unit in ("GiB", "MiB", "KiB"):
+            if value and value % _UNITS[unit] == 0:
+                return f"{value // _UNITS[unit]}{unit}"
+    return f"{value:.15g}" if isinstance(value, float) else str(value)
+
+
+def group_of(name: str) -> str:
+    """Under which heading a setting stands."""
+    extra: Any = Settings.model_fields[name].json_schema_extra
+    return str(extra["group"])
+
+
+def words_of(name: str) -> str:
+    """What a setting is."""
+    return Settings.model_fields[name].description or ""
+
+
+_EPILOG = f"""\
+commands:
+  robosc-server token NAME       make a token for a caller
+  robosc-server check-config     look whether the server could start with such settings
+  robosc-server example-config   print a file with every setting and its default
+
+Each setting is also a line of the file (state_dir = "/var/lib/robosc-server") and an environment variable
+({ENVIRONMENT_PREFIX}STATE_DIR). A flag goes before the environment, the environment before the file. Sizes may have
+a unit: 64MiB. Where other machines reach it, it listens with TLS only. SIGTERM and SIGINT end it gracefully.
+
+exit status:
+  0  stopped by a signal
+  1  the address, a certificate, the tokens, the database or the workers cannot be used
+  2  wrong use, or wrong settings
+"""
+
+
+def add_settings_arguments(parser: argparse.ArgumentParser) -> None:
+    """A flag for each setting, and `--config`."""
+    parser.add_argument(
+        "--config", type=Path, metavar="FILE", help=f"file of settings in TOML (default: ${CONFIG_VARIABLE})"
+    )
+    groups: dict[str, Any] = {}
+    for name, field in Settings.model_fields.items():
+        group = groups.setdefault(group_of(name), None) or parser.add_argument_group(group_of(name))
+        groups[group_of(name)] = group
+        extra: Any = field.json_schema_extra
+        words = f"{words_of(name)} (default: {default_text(name)})".replace("%", "%%")
+        if field.annotation is bool:
+            group.add_argument(
+                flag_of(name), dest=name, action=argparse.BooleanOptionalAction, default=argparse.SUPPRESS, help=words
+            )
+        else:
+            metavar = extra["metavar"] or _metavar(name)
+            group.add_argument(flag_of(name), dest=name, default=argparse.SUPPRESS, metavar=metavar, help=words)
+
+
+def _metavar(name: str) -> str:
+    annotation = Settings.model_fields[name].annotation
+    if isinstance(annotation, type) and issubclass(annotation, StrEnum):
+        return "|".join(annotation)
+    return {"host": "HOST", "port": "PORT"}.get(name, "SECONDS" if name.endswith("_seconds") else "N")
+
+
+def settings_of(arguments: argparse.Namespace) -> Settings:
+    """The settings that flags, environment and file say.
+
+    Raises:
+        SettingsError: They cannot be used.
+    """
+    flags = {name: value for name, value in vars(arguments).items() if name in Settings.model_fields}
+    return settings_from(flags, config_file_of(arguments))
+
+
+def config_file_of(arguments: argparse.Namespace) -> Path | None:
+    """The file of settings; None: there is none."""
+    if arguments.config is not None:
+        return Path(arguments.config)
+    variable = os.environ.get(CONFIG_VARIABLE)
+    return Path(variable) if variable else None
+
+
+def load_settings(argv: Sequence[str] | None = None) -> Settings:
+    """The settings of a command line; leaves the program with status 2 where they are wrong."""
+    parser = argparse.ArgumentParser(
+        prog="robosc-server",
+        description="Check models, synthesize supervisors and generate packages over gRPC.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="version", version=f"robosc-server {__version__}")
+    add_settings_arguments(parser)
+    try:
+        return settings_of(parser.parse_args(argv))
+    except SettingsError as error:
+        for problem in error.problems:
+            sys.stderr.write(f"robosc-server: {problem}\n")
+        raise SystemExit(2) from None

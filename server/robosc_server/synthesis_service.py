@@ -1,0 +1,179 @@
+"""The SynthesisService: bytes come in and go out; what is refused is raised, and told by what stands around every call.
+
+Requests and responses stay serialized here: a request is looked at once (`tasks.requests`), workers make the responses,
+and one that is kept is sent as it is. What the generated bindings would do in between costs more than all of that.
+"""
+
+import asyncio
+from collections import deque
+from collections.abc import Awaitable, Callable
+from typing import Any, Protocol, Self
+
+import grpc
+import grpc.aio
+from google.protobuf.message import DecodeError
+
+from robosc_api.security import caller_of
+from robosc_api.v1 import synthesis_pb2 as pb
+from robosc_server.failures import RefusedError
+from robosc_server.tasks.requests import NOT_A_MESSAGE, RequestLimits, accepted
+from robosc_server.tasks.task import Reason, Report, Result, Task, TaskKind
+
+_SERVICE = pb.DESCRIPTOR.services_by_name["SynthesisService"]
+SERVICE_NAME = _SERVICE.full_name
+METHODS = tuple(method.name for method in _SERVICE.methods)
+
+SEND_TIMEOUT_S = 60.0
+"""How long a caller may leave one message of a result unread."""
+
+WAITING_REPORTS = 64
+"""Reports of progress that wait for a caller to read them."""
+
+type Context = grpc.aio.ServicerContext[Any, Any]
+type OnReport = Callable[[Report], Awaitable[None]]
+
+_UNARY = {"Check": TaskKind.CHECK, "Format": TaskKind.FORMAT}
+_STREAMS = {
+    "Synthesize": TaskKind.SYNTHESIZE,
+    "Generate": TaskKind.GENERATE,
+    "Explore": TaskKind.EXPLORE,
+    "Verify": TaskKind.VERIFY,
+}
+
+
+class Desk(Protocol):
+    """Where an accepted task gets its result."""
+
+    def kept(self, key: str) -> Result | None:
+        """The result of an equal task, if it is in memory."""
+
+    async def result(self, task: Task, caller: str, on_report: OnReport) -> Result:
+        """The result: one that is kept, or what a worker makes; cancelling this ends the work.
+
+        Raises:
+            RefusedError: There is none.
+        """
+
+
+class SynthesisService:
+    """Answers the calls of the service.
+
+    Args:
+        desk: Who has tasks done.
+        limits: What a request may be.
+        targets: The answer of ListTargets, serialized.
+        version: The answer of GetVersion, serialized.
+    """
+
+    def __init__(self, desk: Desk, limits: RequestLimits, targets: bytes, version: bytes) -> None:
+        self._desk = desk
+        self._limits = limits
+        self._fixed = {"ListTargets": (pb.ListTargetsRequest, targets), "GetVersion": (pb.GetVersionRequest, version)}
+
+    def handler(self) -> grpc.GenericRpcHandler:
+        """What a server is given; messages are bytes on both sides."""
+        methods = {name: grpc.unary_unary_rpc_method_handler(self._unary(kind)) for name, kind in _UNARY.items()}
+        for name, kind in _STREAMS.items():
+            methods[name] = grpc.unary_stream_rpc_method_handler(self._stream(kind))
+        for name, (message, answer) in self._fixed.items():
+            methods[name] = grpc.unary_unary_rpc_method_handler(_answering(message, answer))
+        return grpc.method_handlers_generic_handler(SERVICE_NAME, methods)
+
+    def _unary(self, kind: TaskKind) -> Any:
+        async def answer(request: bytes, context: Context) -> bytes:
+            task = accepted(kind, request, self._limits)
+            result = self._desk.kept(task.key)
+            if result is None:
+                result = await self._desk.result(task, caller_of(context), _drop)
+            return result.messages[0]
+
+        return answer
+
+    def _stream(self, kind: TaskKind) -> Any:
+        async def answer(request: bytes, context: Context) -> None:
+            task = accepted(kind, request, self._limits)
+            result = self._desk.kept(task.key)
+            if result is None:
+                async with _Progress(context) as progress:
+                    result = await self._desk.result(task, caller_of(context), progress.tell)
+            await send(context, result.messages)
+
+        return answer
+
+
+def _answering(request_type: Any, answer: bytes) -> Any:
+    async def fixed(request: bytes, context: Context) -> bytes:
+        try:
+            request_type.FromString(request)
+        except DecodeError as error:
+            raise RefusedError(Reason.MALFORMED_REQUEST, NOT_A_MESSAGE) from error
+        return answer
+
+    return fixed
+
+
+async def send(context: Context, messages: tuple[bytes, ...]) -> None:
+    """Send a result, to a caller who reads it.
+
+    Raises:
+        RefusedError: The caller leaves it unread.
+    """
+    for message in messages:
+        try:
+            async with asyncio.timeout(SEND_TIMEOUT_S):
+                await context.write(message)
+        except TimeoutError:
+            raise _unread() from None
+
+
+class _Progress:
+    """Tells a caller where the work is; one who reads slowly misses the oldest reports, and holds no worker up."""
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        self._reports: deque[Report] = deque(maxlen=WAITING_REPORTS)
+        self._is_new = asyncio.Event()
+        self._is_over = False
+
+    async def __aenter__(self) -> Self:
+        self._writer = asyncio.create_task(self._write())
+        return self
+
+    async def __aexit__(self, kind: type[BaseException] | None, *details: object) -> None:
+        self._is_over = True
+        self._is_new.set()
+        if kind is not None and issubclass(kind, asyncio.CancelledError):
+            self._writer.cancel()  # Nobody is there to read it.
+            await asyncio.gather(self._writer, return_exceptions=True)
+            return
+        try:
+            # A message that is on its way cannot be taken back: the next one has to wait for it.
+            async with asyncio.timeout(SEND_TIMEOUT_S):
+                await self._writer
+        except TimeoutError:
+            raise _unread() from None
+
+    async def tell(self, report: Report) -> None:
+        """Tell it soon."""
+        self._reports.append(report)
+        self._is_new.set()
+
+    async def _write(self) -> None:
+        while self._reports or not self._is_over:
+            await self._is_new.wait()
+            self._is_new.clear()
+            while self._reports:
+                await self._context.write(progress_message(self._reports.popleft()))
+
+
+def _unread() -> RefusedError:
+    return RefusedError(Reason.TIME_LIMIT, f"nothing was read for {SEND_TIMEOUT_S:g} seconds")
+
+
+def progress_message(report: Report) -> bytes:
+    """The message that tells where the work is: the same bytes in the response of each streaming method."""
+    return pb.SynthesizeResponse(progress=pb.Progress(stage=report.stage, message=report.message)).SerializeToString()
+
+
+async def _drop(report: Report) -> None:
+    """Progress of a call whose response has no place for it."""

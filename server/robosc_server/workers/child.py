@@ -1,0 +1,104 @@
+"""A worker: a fork of the template that waits for one task, does it, answers and ends."""
+
+import faulthandler
+import gc
+import os
+import signal
+import socket
+import traceback
+from collections.abc import Callable
+
+from robosc_server.tasks.task import Failure, Outcome, Reason, Report, TaskKind, TaskLimits
+from robosc_server.workers import confinement
+from robosc_server.workers.frames import (
+    HEADER,
+    MESSAGES_LIMIT,
+    Tag,
+    failure_frame,
+    frame,
+    report_frame,
+    task_of,
+    too_large,
+)
+
+type TaskFunction = Callable[[TaskKind, bytes, TaskLimits, Callable[[Report], None]], Outcome]
+
+OUT_OF_MEMORY = "the work took more memory than a task may have"
+
+
+def work(connection: socket.socket, last_words: int, function: TaskFunction) -> None:
+    """Wait for a task, do it, send its outcome.
+
+    Args:
+        connection: To the server; where it ends before a task came, nobody needs this process.
+        last_words: Descriptor to which the interpreter writes where it was when it crashed.
+        function: Does the task.
+    """
+    faulthandler.enable(last_words)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    confinement.no_core()
+    confinement.give_up_rights()
+    try:
+        task, limits = task_of(_receive(connection), _receive(connection))
+        _answer(connection, task.kind, task.request, limits, function)
+    except (EOFError, ConnectionError):
+        return
+
+
+def _answer(
+    connection: socket.socket, kind: TaskKind, request: bytes, limits: TaskLimits, function: TaskFunction
+) -> None:
+    confinement.confine(limits)
+    gc.enable()
+    try:
+        outcome = function(kind, request, limits, lambda report: connection.sendall(report_frame(report)))
+    except ConnectionError:
+        raise  # Nobody waits any more.
+    except MemoryError:
+        outcome = Failure(Reason.MEMORY_LIMIT, OUT_OF_MEMORY)
+    except BaseException:  # The worker's border: whatever it was, the server logs it and lives on.
+        confinement.make_room()
+        outcome = Failure(Reason.INTERNAL_FAULT, "the server is at fault", traceback.format_exc())
+    confinement.make_room()
+    _send(connection, outcome, limits)
+
+
+def _send(connection: socket.socket, outcome: Outcome, limits: TaskLimits) -> None:
+    if not isinstance(outcome, Failure):
+        messages = outcome.messages
+        if sum(map(len, messages)) <= limits.result_bytes and len(messages) <= MESSAGES_LIMIT:
+            for message in messages:
+                # In two, not put together: that would take the memory of a large message once more.
+                connection.sendall(HEADER.pack(Tag.MESSAGE.value, len(message)))
+                connection.sendall(message)
+            connection.sendall(frame(Tag.RESULT, b""))
+            return
+        outcome = too_large(limits)
+    connection.sendall(failure_frame(outcome))
+
+
+def _receive(connection: socket.socket) -> bytes:
+    """The payload of the next frame of the server, which is believed."""
+    _, length = HEADER.unpack(_receive_exactly(connection, HEADER.size))
+    return _receive_exactly(connection, length)
+
+
+def _receive_exactly(connection: socket.socket, length: int) -> bytes:
+    content = bytearray(length)
+    view = memoryview(content)
+    got = 0
+    while got < length:
+        count = connection.recv_into(view[got:])
+        if not count:
+            raise EOFError
+        got += count
+    return bytes(content)
+
+
+def silence() -> None:
+    """Have standard input, output and error lead nowhere: libraries that print disturb nobody, and tell nothing."""
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for descriptor in range(3):
+        os.dup2(nowhere, descriptor)
+    if nowhere > 2:
+        os.close(nowhere)

@@ -1,0 +1,79 @@
+"""What a worker's process may take, held by the kernel; and that it does not outlive who started it."""
+
+import ctypes
+import math
+import os
+import resource
+import signal
+from contextlib import suppress
+from pathlib import Path
+
+from robosc_server.tasks.task import TaskLimits
+
+# prctl(2)
+_SET_PARENT_DEATH_SIGNAL = 1
+_SET_NO_NEW_PRIVILEGES = 38
+
+_FILES_LIMIT = 64
+_LEAST_ROOM_BYTES = 64 * 2**20
+_FAREWELL_BYTES = 64 * 2**20
+_FAREWELL_S = 2
+
+_PRCTL = getattr(ctypes.CDLL(None, use_errno=True), "prctl", None)
+
+
+def die_with(parent: int) -> None:
+    """Have the kernel kill this process when its parent dies; where that one is dead already, end at once."""
+    if _PRCTL is not None:
+        _PRCTL(_SET_PARENT_DEATH_SIGNAL, int(signal.SIGKILL), 0, 0, 0)
+    if os.getppid() != parent:
+        os._exit(1)
+
+
+def give_up_rights() -> None:
+    """No program that this process starts gains rights; and it is the first to go where the machine's memory ends."""
+    if _PRCTL is not None:
+        _PRCTL(_SET_NO_NEW_PRIVILEGES, 1, 0, 0, 0)
+    with suppress(OSError):
+        Path("/proc/self/oom_score_adj").write_text("900")
+
+
+def confine(limits: TaskLimits) -> None:
+    """Set the limits of the task that this process is about to do.
+
+    The address space counts what the process has already; at least 64 MiB more are left to it, since less than that is
+    too little for any task. Processor time counts from here on, in whole seconds. No byte can be
+    written to a file.
+    """
+    memory_bytes = max(limits.memory_bytes, _address_space_bytes() + _LEAST_ROOM_BYTES)
+    _set(resource.RLIMIT_AS, memory_bytes, memory_bytes + _FAREWELL_BYTES)
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    cpu_s = max(1, math.ceil(limits.cpu_seconds)) + round(used.ru_utime + used.ru_stime)
+    _set(resource.RLIMIT_CPU, cpu_s, cpu_s + _FAREWELL_S)
+    _set(resource.RLIMIT_FSIZE, 0, 0)
+    _set(resource.RLIMIT_NOFILE, _FILES_LIMIT, _FILES_LIMIT)
+
+
+def make_room() -> None:
+    """Let go of the memory limit by as much as it takes to say farewell."""
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    with suppress(OSError, ValueError):
+        resource.setrlimit(resource.RLIMIT_AS, (hard, hard))
+
+
+def no_core() -> None:
+    """Leave no image of the memory, in which a model would stand, behind on a disk."""
+    _set(resource.RLIMIT_CORE, 0, 0)
+
+
+def _set(kind: int, soft: int, hard: int) -> None:
+    """Set a limit, within what the process may have already."""
+    _, allowed = resource.getrlimit(kind)
+    if allowed != resource.RLIM_INFINITY:
+        soft, hard = min(soft, allowed), min(hard, allowed)
+    resource.setrlimit(kind, (soft, hard))
+
+
+def _address_space_bytes() -> int:
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    return pages * resource.getpagesize()

@@ -1,0 +1,71 @@
+"""Why a worker's process ended without an answer, told honestly from what the kernel says of it."""
+
+import signal
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from robosc_server.tasks.task import Failure, Reason, TaskLimits
+from robosc_server.workers.child import OUT_OF_MEMORY
+
+OUT_OF_PROCESSOR = "the work took more of a processor's time than a task may have"
+OUT_OF_TIME = "the work took longer than a task may take"
+
+_NEAR_THE_LIMIT = 0.75
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """How a worker's process ended.
+
+    Attributes:
+        exit_code: Its status, or the signal that ended it, negative.
+        cpu_s: Time of a processor that it took.
+        peak_bytes: Most memory that was resident at once.
+    """
+
+    exit_code: int
+    cpu_s: float
+    peak_bytes: int
+
+
+def failure_of(ending: Ending, limits: TaskLimits, last_words: str, was_memory_short: bool) -> Failure:
+    """What is told of a task whose worker ended without an answer, and was not killed by the server.
+
+    Args:
+        ending: How it ended.
+        limits: What the task was allowed.
+        last_words: What the interpreter wrote when it crashed.
+        was_memory_short: Whether the kernel killed some process for want of memory meanwhile.
+    """
+    facts = (
+        f"{_told(ending.exit_code)} after {ending.cpu_s:.2f} s of a processor's time, "
+        f"with at most {ending.peak_bytes} bytes resident"
+    )
+    details = f"{facts}\n{last_words}".rstrip()
+    out_of_processor = ending.cpu_s >= limits.cpu_seconds
+    if ending.exit_code == -signal.SIGXCPU or (ending.exit_code == -signal.SIGKILL and out_of_processor):
+        return Failure(Reason.CPU_LIMIT, OUT_OF_PROCESSOR, details)
+    if ending.exit_code == -signal.SIGKILL and was_memory_short:
+        return Failure(Reason.MEMORY_LIMIT, "the machine ran out of memory, and ended the work", details)
+    if ending.exit_code < 0 and ending.peak_bytes >= _NEAR_THE_LIMIT * limits.memory_bytes:
+        # Libraries in C end the process where memory is refused to them.
+        return Failure(Reason.MEMORY_LIMIT, OUT_OF_MEMORY, details)
+    return Failure(Reason.WORKER_DIED, f"the worker process {_told(ending.exit_code)}", details)
+
+
+def kills_for_memory() -> int:
+    """How often this machine's kernel has killed a process for want of memory; 0 where that is not told."""
+    with suppress(OSError, ValueError):
+        for line in Path("/proc/vmstat").read_text().splitlines():
+            if line.startswith("oom_kill "):
+                return int(line.split()[1])
+    return 0
+
+
+def _told(exit_code: int) -> str:
+    if exit_code >= 0:
+        return f"ended with status {exit_code} and no answer"
+    with suppress(ValueError):
+        return f"was ended by {signal.Signals(-exit_code).name}"
+    return f"was ended by signal {-exit_code}"

@@ -1,0 +1,190 @@
+"""What a worker and the server say to each other: frames of a tag byte, a length of 8 bytes and a payload.
+
+Nothing here builds objects other than bytes, numbers and text: what has handled a stranger's model could say anything,
+and must not run code in the server by it. A payload is read only after its length was found to be allowed.
+
+    server to worker   T  JSON: the kind and the limits        Q  the request's message
+    worker to server   P  JSON: a report                       M  one message of the result
+                       R  empty: the result is whole           F  JSON: a failure
+"""
+
+import json
+import struct
+from enum import Enum
+from typing import Any
+
+from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, Task, TaskKind, TaskLimits
+
+HEADER = struct.Struct(">cQ")
+"""Tag and length of a payload."""
+
+MESSAGES_LIMIT = 100_000
+"""Messages of one result; many small ones would take far more memory than their bytes."""
+
+_SMALL_LIMIT = 2**20
+_TEXT_LIMIT = 4_000
+_DETAILS_LIMIT = 60_000
+
+_TOLD_BY_WORKERS = frozenset(
+    {
+        Reason.MALFORMED_REQUEST,
+        Reason.REQUEST_TOO_LARGE,
+        Reason.CPU_LIMIT,
+        Reason.MEMORY_LIMIT,
+        Reason.NODE_LIMIT,
+        Reason.RESULT_TOO_LARGE,
+        Reason.TIME_LIMIT,
+        Reason.INTERNAL_FAULT,
+    }
+)
+
+
+class Tag(Enum):
+    """What a frame holds."""
+
+    TASK = b"T"
+    REQUEST = b"Q"
+    REPORT = b"P"
+    MESSAGE = b"M"
+    RESULT = b"R"
+    FAILURE = b"F"
+
+
+class FrameError(Exception):
+    """What came is no answer of a worker."""
+
+
+def frame(tag: Tag, payload: bytes) -> bytes:
+    """A frame."""
+    return HEADER.pack(tag.value, len(payload)) + payload
+
+
+def task_frames(task: Task, limits: TaskLimits) -> bytes:
+    """What a worker is told."""
+    head = {
+        "kind": str(task.kind),
+        "key": task.key,
+        "main_file": task.main_file,
+        "limits": {
+            "seconds": limits.seconds,
+            "cpu_seconds": limits.cpu_seconds,
+            "memory_bytes": limits.memory_bytes,
+            "nodes": limits.nodes,
+            "result_bytes": limits.result_bytes,
+        },
+    }
+    return frame(Tag.TASK, json.dumps(head).encode()) + frame(Tag.REQUEST, task.request)
+
+
+def task_of(head: bytes, request: bytes) -> tuple[Task, TaskLimits]:
+    """What the server's frames tell."""
+    values = json.loads(head)
+    task = Task(TaskKind(values["kind"]), request, values["key"], values["main_file"])
+    return task, TaskLimits(**values["limits"])
+
+
+def report_frame(report: Report) -> bytes:
+    """A report, cut to what is read of it."""
+    return _json_frame(Tag.REPORT, {"stage": report.stage[:_TEXT_LIMIT], "message": report.message[:_TEXT_LIMIT]})
+
+
+def failure_frame(failure: Failure) -> bytes:
+    """A failure, cut to what is read of it: of the details the end, where a traceback has the fault."""
+    values = {
+        "reason": str(failure.reason),
+        "message": failure.message[:_TEXT_LIMIT],
+        "details": failure.details[-_DETAILS_LIMIT:],
+    }
+    return _json_frame(Tag.FAILURE, values)
+
+
+def too_large(limits: TaskLimits) -> Failure:
+    """The failure of a task whose result is larger than it may be."""
+    return Failure(
+        Reason.RESULT_TOO_LARGE, f"the result is larger than {limits.result_bytes} bytes, which is as much as may be"
+    )
+
+
+class AnswerReader:
+    """Puts the frames of one answer together, in two steps for each: may it be read, and what does it say."""
+
+    def __init__(self, limits: TaskLimits) -> None:
+        self._limits = limits
+        self._messages: list[bytes] = []
+        self._bytes = 0
+
+    def announced(self, header: bytes) -> tuple[Tag, int] | Failure:
+        """Tag and length of the payload that comes next, or why the answer must not be read on.
+
+        Raises:
+            FrameError: It is no frame of a worker.
+        """
+        mark, length = HEADER.unpack(header)
+        try:
+            tag = Tag(mark)
+        except ValueError:
+            raise FrameError(f"a frame with the tag {mark!r}") from None
+        match tag:
+            case Tag.MESSAGE:
+                self._bytes += length
+                if self._bytes > self._limits.result_bytes or len(self._messages) >= MESSAGES_LIMIT:
+                    return too_large(self._limits)
+            case Tag.REPORT | Tag.FAILURE:
+                if length > _SMALL_LIMIT:
+                    raise FrameError(f"a {tag.name.lower()} of {length} bytes")
+            case Tag.RESULT:
+                if length:
+                    raise FrameError(f"an end of the result with {length} bytes")
+            case Tag.TASK | Tag.REQUEST:
+                raise FrameError(f"a frame with the tag {mark!r}")
+        return tag, length
+
+    def read(self, tag: Tag, payload: bytes) -> Report | Outcome | None:
+        """What a frame says; None: more of the result is to come.
+
+        Raises:
+            FrameError: It says nothing that a worker may say.
+        """
+        match tag:
+            case Tag.MESSAGE:
+                self._messages.append(payload)
+                return None
+            case Tag.RESULT:
+                return Result(tuple(self._messages))
+            case Tag.REPORT:
+                values = _values(payload)
+                return Report(_text(values, "stage", _TEXT_LIMIT), _text(values, "message", _TEXT_LIMIT))
+            case _:
+                return _failure(_values(payload))
+
+
+def _failure(values: dict[str, Any]) -> Failure:
+    try:
+        reason = Reason(_text(values, "reason", _TEXT_LIMIT))
+    except ValueError:
+        raise FrameError("a failure of no known reason") from None
+    if reason not in _TOLD_BY_WORKERS:
+        raise FrameError(f"a failure whose reason {reason} is not for workers to tell")
+    return Failure(reason, _text(values, "message", _TEXT_LIMIT), _text(values, "details", _DETAILS_LIMIT))
+
+
+def _json_frame(tag: Tag, values: dict[str, str]) -> bytes:
+    return frame(tag, json.dumps(values).encode())
+
+
+def _values(payload: bytes) -> dict[str, Any]:
+    try:
+        values = json.loads(payload.decode("ascii"))
+    except (ValueError, RecursionError) as error:
+        raise FrameError("a payload that is no JSON") from error
+    if not isinstance(values, dict):
+        raise FrameError("a payload that is no object")
+    return values
+
+
+def _text(values: dict[str, Any], name: str, limit: int) -> str:
+    value = values.get(name)
+    if not isinstance(value, str):
+        raise FrameError(f"a payload without the text {name}")
+    # Half a surrogate pair has no place in what is sent on.
+    return value[:limit].encode("utf-8", "replace").decode("utf-8")

@@ -1,0 +1,83 @@
+"""Workers of this machine: each task in a process of its own, forked ahead."""
+
+import asyncio
+import contextlib
+from typing import Self
+
+from robosc_server.tasks.task import Failure, Outcome, Reason, Task, TaskLimits
+from robosc_server.workers import OnReport, WorkersError
+from robosc_server.workers.endings import OUT_OF_TIME
+from robosc_server.workers.process import TemplateLostError
+from robosc_server.workers.supply import Supply
+
+TASK_FUNCTION = "robosc_server.tasks.run:run_task"
+"""Does tasks; `package.module:name`."""
+
+_ATTEMPTS = 2
+_GONE_S = 5.0
+
+
+class LocalWorkers:
+    """At most so many processes at once; an asynchronous context that starts and ends them."""
+
+    def __init__(self, size: int, task_function: str = TASK_FUNCTION, spare: int | None = None) -> None:
+        """Plan.
+
+        Args:
+            size: Tasks under way at once.
+            task_function: What does them, `package.module:name`; imported by the processes alone.
+            spare: Processes that stand ready beside those at work; None: as many as `size`.
+        """
+        self._size = size
+        self._supply = Supply(task_function, size if spare is None else spare)
+
+    async def __aenter__(self) -> Self:
+        await self._supply.__aenter__()
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self._supply.__aexit__(None)
+
+    @property
+    def capacity(self) -> int:
+        """How many tasks can be under way."""
+        return self._size
+
+    @property
+    def pids(self) -> frozenset[int]:
+        """Numbers of all worker processes, ready and at work."""
+        return self._supply.pids
+
+    @property
+    def restarts(self) -> int:
+        """How often the process that starts workers ended and was started again."""
+        return self._supply.restarts
+
+    async def run(self, task: Task, limits: TaskLimits, on_report: OnReport) -> Outcome:
+        """The outcome of a task; see `Workers.run`.
+
+        Raises:
+            WorkersError: No process can be had.
+        """
+        limit = asyncio.timeout(limits.seconds)
+        try:
+            async with limit:
+                for _ in range(_ATTEMPTS):
+                    with contextlib.suppress(TemplateLostError):
+                        return await self._run_once(task, limits, on_report)
+        except TimeoutError:
+            if not limit.expired():
+                raise
+            return Failure(Reason.TIME_LIMIT, OUT_OF_TIME)
+        raise WorkersError("the process that starts workers ended twice under one task")
+
+    async def _run_once(self, task: Task, limits: TaskLimits, on_report: OnReport) -> Outcome:
+        worker = await self._supply.take()
+        try:
+            outcome = await worker.run(task, limits, on_report)
+        except BaseException:
+            burial = self._supply.bury(worker)
+            await asyncio.wait([burial], timeout=_GONE_S)
+            raise
+        self._supply.bury(worker)
+        return outcome

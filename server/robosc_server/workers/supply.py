@@ -1,0 +1,252 @@
+"""Workers that stand ready: a template process that forks them, started again where it ends, and their burial."""
+
+import asyncio
+import contextlib
+import json
+import logging
+import os
+import socket
+import sys
+import time
+from collections import deque
+from collections.abc import Coroutine
+from typing import Any, Self
+
+from robosc_server.workers import WorkersError
+from robosc_server.workers.endings import Ending
+from robosc_server.workers.process import WorkerProcess
+from robosc_server.workers.template import PACKET_BYTES
+
+_LOG = logging.getLogger(__name__)
+
+START_S = 60.0
+"""How long a template may take until its first worker stands ready."""
+
+_WAIT_S = 10.0
+_PAUSES_S = (0.0, 0.0, 0.2, 1.0, 5.0)
+_HOPELESS = 3
+_DEAD_SPARE_PAUSE_S = 0.2
+_SECRETS = "ROBOSC_SERVER_"
+
+
+class Supply:
+    """Has workers stand ready; an asynchronous context.
+
+    Attributes:
+        restarts: How many templates ended without being told to.
+    """
+
+    def __init__(self, task_function: str, spare: int) -> None:
+        """Plan for workers that do tasks with a function (`package.module:name`), `spare` of them ready."""
+        self.restarts = 0
+        self._task_function = task_function
+        self._spare = spare
+        self._ready: deque[WorkerProcess] = deque()
+        self._known: dict[int, WorkerProcess] = {}  # by pid, of the template that lives
+        self._line: socket.socket | None = None
+        self._fault = ""
+        self._failures = 0  # Templates that ended, one after the other, without a worker.
+        self._is_closed = False
+        self._changed = asyncio.Event()
+        self._keeper: asyncio.Task[None] | None = None
+        self._burials: set[asyncio.Task[None]] = set()
+
+    async def __aenter__(self) -> Self:
+        self._keeper = asyncio.create_task(self._keep())
+        try:
+            async with asyncio.timeout(START_S):
+                while not self._ready:
+                    if self._fault:
+                        raise WorkersError(self._fault)
+                    await self._change()
+        except TimeoutError:
+            await self._close()
+            raise WorkersError(f"no worker process stood ready within {START_S:.0f} s") from None
+        except BaseException:
+            await self._close()
+            raise
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self._close()
+
+    async def _close(self) -> None:
+        self._is_closed = True
+        if self._keeper is not None:
+            self._keeper.cancel()
+            await asyncio.gather(self._keeper, return_exceptions=True)
+        self._changed.set()
+        while self._burials:
+            await asyncio.gather(*self._burials, return_exceptions=True)
+
+    async def take(self) -> WorkerProcess:
+        """A worker for one task; `bury` it afterwards.
+
+        Raises:
+            WorkersError: None can be had.
+        """
+        end = time.monotonic() + _WAIT_S
+        while (worker := self._living()) is None:
+            if self._is_closed:
+                raise WorkersError("the server's workers have ended")
+            if self._failures >= _HOPELESS:
+                raise WorkersError(self._fault)
+            try:
+                async with asyncio.timeout(end - time.monotonic()):
+                    await self._change()
+            except TimeoutError:
+                raise WorkersError(self._fault or f"no worker process stood ready within {_WAIT_S:.0f} s") from None
+        self._ask_for(1)
+        return worker
+
+    def _living(self) -> WorkerProcess | None:
+        """The next worker that stands ready; one that has died is told of soon."""
+        while self._ready:
+            worker = self._ready.popleft()
+            if not worker.has_ended():
+                return worker
+            self._replace(worker)
+        return None
+
+    def _replace(self, worker: WorkerProcess) -> None:
+        """Bury a worker that died without a task, and have another one; if that goes on, a few times a second."""
+        _LOG.warning("a waiting worker process ended")
+        self.bury(worker)
+        asyncio.get_running_loop().call_later(_DEAD_SPARE_PAUSE_S, self._ask_for, 1)
+
+    def bury(self, worker: WorkerProcess) -> asyncio.Task[None]:
+        """End a worker now; what is returned ends when its process is gone."""
+        worker.kill()
+        return self._begin(self._bury(worker))
+
+    @property
+    def pids(self) -> frozenset[int]:
+        """Numbers of all processes of workers, ready and at work."""
+        return frozenset(self._known)
+
+    async def _bury(self, worker: WorkerProcess) -> None:
+        await worker.gone()
+        # The template tells how it ended; after that, its number may be another's.
+        await asyncio.shield(worker.ending)
+        worker.close()
+
+    def _begin(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        task = asyncio.create_task(work)
+        self._burials.add(task)
+        task.add_done_callback(self._burials.discard)
+        return task
+
+    async def _change(self) -> None:
+        self._changed.clear()
+        await self._changed.wait()
+
+    def _ask_for(self, count: int) -> None:
+        """Tell the template to fork; where it is gone, the next one is told."""
+        if self._line is not None:
+            with contextlib.suppress(OSError):
+                self._line.send(str(count).encode())
+
+    async def _keep(self) -> None:
+        """Have a template, always."""
+        while True:
+            status = await self._run_template()
+            self.restarts += 1
+            self._failures += 1
+            self._fault = self._fault or f"the process that starts workers ended with status {status}"
+            _LOG.error("%s; it is started again", self._fault)
+            self._changed.set()
+            await asyncio.sleep(_PAUSES_S[min(self._failures, len(_PAUSES_S) - 1)])
+
+    async def _run_template(self) -> int | None:
+        """Start a template and take what it makes, until it ends; its status."""
+        loop = asyncio.get_running_loop()
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        ours.setblocking(False)
+        process: asyncio.subprocess.Process | None = None
+        try:
+            with theirs:
+                process = await asyncio.create_subprocess_exec(
+                    *(sys.executable, "-P", "-m", "robosc_server.workers.template"),
+                    *(str(theirs.fileno()), self._task_function, str(os.getpid())),
+                    stdin=asyncio.subprocess.DEVNULL,
+                    stdout=asyncio.subprocess.DEVNULL,
+                    pass_fds=[theirs.fileno()],
+                    env=_environment(),
+                    # A terminal's signals reach the server alone.
+                    start_new_session=True,
+                )
+            self._line = ours
+            loop.add_reader(ours, self._hear, ours)
+            self._ask_for(self._spare)
+            return await process.wait()
+        except OSError as error:
+            self._fault = f"cannot start the process that starts workers: {error.strerror}"
+            return None
+        finally:
+            if process is not None and process.returncode is None:
+                process.kill()
+            self._line = None
+            self._hear_all(ours)
+            loop.remove_reader(ours)
+            ours.close()
+            # The kernel ends workers with their template; that they are gone is waited for.
+            for worker in self._ready:
+                self.bury(worker)
+            self._ready.clear()
+            for worker in self._known.values():
+                worker.kill()
+                worker.ending.set_result(None)
+            self._known.clear()
+            if process is not None:
+                await process.wait()
+
+    def _hear_all(self, line: socket.socket) -> None:
+        """What a template told before it ended."""
+        with contextlib.suppress(OSError):
+            while self._hear(line):
+                pass
+
+    def _hear(self, line: socket.socket) -> bool:
+        """Take one packet of the template's; whether there was one."""
+        try:
+            packet, descriptors, _, _ = socket.recv_fds(line, PACKET_BYTES, 3, socket.MSG_CMSG_CLOEXEC)
+        except BlockingIOError:
+            return False
+        except OSError:
+            packet, descriptors = b"", []
+        if not packet:
+            asyncio.get_running_loop().remove_reader(line)  # It ends: its status tells that.
+            return False
+        told = json.loads(packet)
+        match told["is"]:
+            case "worker":
+                connection, descriptor, last_words = descriptors
+                worker = WorkerProcess(told["pid"], socket.socket(fileno=connection), descriptor, last_words)
+                self._known[worker.pid] = worker
+                self._ready.append(worker)
+                self._fault, self._failures = "", 0
+            case "ended":
+                self._note_end(told["pid"], Ending(told["exit_code"], told["cpu_s"], told["peak_bytes"]))
+            case "fault":
+                if told["message"] != self._fault:
+                    self._fault = told["message"]
+                    _LOG.error("%s", self._fault)
+        self._changed.set()
+        return True
+
+    def _note_end(self, pid: int, ending: Ending) -> None:
+        worker = self._known.pop(pid)
+        worker.ending.set_result(ending)
+        if worker in self._ready:
+            self._ready.remove(worker)
+            self._replace(worker)
+
+
+def _environment() -> dict[str, str]:
+    """The server's environment, without its settings, some of which are secret; the same modules are found.
+
+    A copy: the environment itself may be changed by another thread in the middle of the start.
+    """
+    environment = {name: value for name, value in os.environ.copy().items() if not name.startswith(_SECRETS)}
+    environment["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
+    return environment

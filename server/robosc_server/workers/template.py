@@ -1,0 +1,162 @@
+"""The process that workers are forked from: it imports everything once, and holds no thread and no task.
+
+Started as a program with the descriptor of its line to the server and the name of the function that does tasks. On the
+line (packets) it is told how many workers are wanted, and tells: a worker that stands ready, with its connection, its
+process descriptor and the pipe of its last words; a worker that has ended, and how; that no process can be had.
+"""
+
+import contextlib
+import gc
+import importlib
+import json
+import os
+import pkgutil
+import select
+import signal
+import socket
+import sys
+import traceback
+from pathlib import Path
+
+from robosc_server.workers import child, confinement
+from robosc_server.workers.child import TaskFunction
+
+PACKET_BYTES = 4096
+"""Of one packet on the line."""
+
+_PRELOADED_PACKAGE = "robosc"
+# No task needs them, and what draws pictures starts threads.
+_NOT_PRELOADED = ("robosc.cli", "robosc.event_logs", "robosc.starter")
+_FORK_PAUSE_MS = 200
+
+
+class _Template:
+    """Forks workers when it is told to, and reaps them."""
+
+    def __init__(self, line: socket.socket, function: TaskFunction) -> None:
+        self._line = line
+        self._function = function
+        self._poll = select.poll()
+        self._poll.register(line, select.POLLIN)
+        self._pids: dict[int, int] = {}  # by process descriptor
+        self._wanted = 0
+
+    def run(self) -> None:
+        """Serve until the server is gone: then this process ends, and the kernel kills every worker with it."""
+        while True:
+            for descriptor, _ in self._poll.poll(_FORK_PAUSE_MS if self._wanted else None):
+                if descriptor in self._pids:
+                    self._reap(descriptor)
+                elif told := self._line.recv(PACKET_BYTES):
+                    self._wanted += int(told)
+                else:
+                    return
+            try:
+                while self._wanted:
+                    self._fork()
+                    self._wanted -= 1
+            except OSError as error:
+                self._tell({"is": "fault", "message": f"cannot start a worker process: {error.strerror}"})
+
+    def _fork(self) -> None:
+        with contextlib.ExitStack() as stack:
+            ours, theirs = socket.socketpair()
+            stack.enter_context(ours)
+            stack.enter_context(theirs)
+            words, last_words = os.pipe2(os.O_CLOEXEC | os.O_NONBLOCK)
+            stack.callback(os.close, words)
+            stack.callback(os.close, last_words)
+            template = os.getpid()
+            pid = os.fork()
+            if pid == 0:
+                self._become_worker(template, ours, theirs, words, last_words)
+            try:
+                descriptor = os.pidfd_open(pid)
+            except OSError:
+                os.kill(pid, signal.SIGKILL)
+                os.waitpid(pid, 0)
+                raise
+            self._pids[descriptor] = pid
+            self._poll.register(descriptor, select.POLLIN)
+            self._tell({"is": "worker", "pid": pid}, [ours.fileno(), descriptor, words])
+
+    def _become_worker(
+        self, template: int, ours: socket.socket, theirs: socket.socket, words: int, last_words: int
+    ) -> None:
+        """Do one task in the child, and end whatever happens."""
+        try:
+            confinement.die_with(template)
+            # What another process holds open tells nobody of its end.
+            self._line.close()
+            ours.close()
+            os.close(words)
+            for descriptor in self._pids:
+                os.close(descriptor)
+            child.work(theirs, last_words, self._function)
+        except BaseException:
+            with contextlib.suppress(BaseException):
+                os.write(last_words, traceback.format_exc().encode())
+            os._exit(1)
+        finally:
+            os._exit(0)
+
+    def _reap(self, descriptor: int) -> None:
+        pid = self._pids.pop(descriptor)
+        self._poll.unregister(descriptor)
+        os.close(descriptor)
+        _, status, usage = os.wait4(pid, 0)
+        self._tell(
+            {
+                "is": "ended",
+                "pid": pid,
+                "exit_code": os.waitstatus_to_exitcode(status),
+                "cpu_s": usage.ru_utime + usage.ru_stime,
+                "peak_bytes": usage.ru_maxrss * 1024,
+            }
+        )
+
+    def _tell(self, values: dict[str, object], descriptors: list[int] | None = None) -> None:
+        socket.send_fds(self._line, [json.dumps(values).encode()], descriptors or [])
+
+
+def _load(name: str) -> TaskFunction:
+    """The function that does tasks, after everything that it may need was imported."""
+    module_name, _, attribute = name.partition(":")
+    function: TaskFunction = getattr(importlib.import_module(module_name), attribute)
+    package = importlib.import_module(_PRELOADED_PACKAGE)
+    for module in pkgutil.walk_packages(package.__path__, f"{_PRELOADED_PACKAGE}."):
+        if not module.name.startswith(_NOT_PRELOADED) and not module.name.endswith("__main__"):
+            # What is copied into generated packages needs the middleware that those run on.
+            with contextlib.suppress(ImportError):
+                importlib.import_module(module.name)
+    return function
+
+
+def main() -> None:
+    """Import, freeze, serve."""
+    line = socket.socket(fileno=int(sys.argv[1]))
+    line.set_inheritable(False)
+    confinement.die_with(int(sys.argv[3]))
+    sys.dont_write_bytecode = True
+    try:
+        function = _load(sys.argv[2])
+        threads = len(list(Path("/proc/self/task").iterdir()))
+        if threads > 1:
+            raise RuntimeError(f"there are {threads} threads where workers are forked from")
+    except Exception as error:  # Whatever it was: the server tells it in one sentence.
+        message = f"cannot load {sys.argv[2]}: {type(error).__name__}: {error}"
+        line.send(json.dumps({"is": "fault", "message": message[:1000]}).encode())
+        sys.exit(1)
+    # Workers copy each page that they write to; a collection would write to all of them.
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    child.silence()
+    with contextlib.suppress(ConnectionError):
+        _Template(line, function).run()
+
+
+if __name__ == "__main__":
+    main()

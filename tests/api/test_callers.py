@@ -1,0 +1,54 @@
+"""By what callers are told apart."""
+
+from typing import Any
+
+import pytest
+
+from robosc_api.security import ENTRY, Entry, Scope, caller_of, is_admin
+from robosc_api.security.callers import CALLER, host_of
+
+
+class Context:
+    def __init__(self, peer: str, *names: bytes) -> None:
+        self._peer, self._names = peer, names
+
+    def peer(self) -> str:
+        return self._peer
+
+    def auth_context(self) -> dict[str, Any]:
+        return {"x509_common_name": list(self._names)} if self._names else {}
+
+
+@pytest.mark.parametrize(
+    ("peer", "host"),
+    [
+        ("ipv4:192.0.2.1:4711", "192.0.2.1"),
+        ("ipv6:[2001:db8::1]:4711", "2001:db8::1"),
+        ("ipv6:%5B::1%5D:4711", "::1"),
+        ("unix:/run/socket", "unix"),
+        ("unix-abstract:name", "unix-abstract"),
+        ("unknown", "unknown"),
+    ],
+)
+def test_the_host_of_a_peer(peer: str, host: str) -> None:
+    assert host_of(peer) == host
+
+
+def test_a_token_goes_before_a_certificate_and_that_before_a_host() -> None:
+    assert caller_of(Context("ipv4:192.0.2.1:4711")) == "192.0.2.1"
+    assert caller_of(Context("ipv4:192.0.2.1:4711", b"laptop")) == "laptop"
+    token = CALLER.set("named")
+    try:
+        assert caller_of(Context("ipv4:192.0.2.1:4711", b"laptop")) == "named"
+    finally:
+        CALLER.reset(token)
+
+
+def test_only_a_token_of_that_scope_makes_an_admin() -> None:
+    assert not is_admin()
+    for scopes, expected in (({Scope.SYNTHESIZE}, False), ({Scope.ADMIN}, True)):
+        token = ENTRY.set(Entry("a", frozenset(scopes), "0" * 64))
+        try:
+            assert is_admin() is expected
+        finally:
+            ENTRY.reset(token)

@@ -1,0 +1,152 @@
+"""Health that follows what services need, over a real server; and how a server ends."""
+
+import asyncio
+from typing import Any
+
+import grpc
+import pytest
+from grpc_health.v1 import health_pb2, health_pb2_grpc
+
+from robosc_server.operations.drain import drain
+from robosc_server.operations.health import Health
+from robosc_server.operations.interceptor import CallInterceptor
+from robosc_server.operations.metrics import Metrics
+from support.small_server import PATIENCE_S, SERVICE, call, logged, small_server
+
+SERVING, NOT_SERVING = health_pb2.HealthCheckResponse.SERVING, health_pb2.HealthCheckResponse.NOT_SERVING
+SERVICES = {"robosc.Works": ("workers",), "robosc.Keeps": ("store", "workers")}
+
+
+def with_health(health: Health) -> Any:
+    return lambda server: health_pb2_grpc.add_HealthServicer_to_server(health, server)
+
+
+async def status(channel: Any, service: str = "") -> Any:
+    request = health_pb2.HealthCheckRequest(service=service)
+    return (await health_pb2_grpc.HealthStub(channel).Check(request, timeout=PATIENCE_S)).status
+
+
+def limited(coroutine: Any) -> None:
+    asyncio.run(asyncio.wait_for(coroutine, PATIENCE_S))
+
+
+def test_each_service_follows_what_it_needs() -> None:
+    async def run() -> None:
+        health = Health(SERVICES)
+        async with small_server(setup=with_health(health)) as (channel, _):
+
+            async def all_of_them() -> list[Any]:
+                return [await status(channel, name) for name in ("robosc.Works", "robosc.Keeps", "")]
+
+            assert await all_of_them() == [NOT_SERVING] * 3
+            health.set_condition("workers", True)
+            assert await all_of_them() == [SERVING, NOT_SERVING, NOT_SERVING]
+            health.set_condition("store", True)
+            assert await all_of_them() == [SERVING] * 3
+            health.drain()
+            assert await all_of_them() == [NOT_SERVING] * 3
+            with pytest.raises(grpc.aio.AioRpcError) as caught:
+                await status(channel, "nobody")
+            assert caught.value.code() is grpc.StatusCode.NOT_FOUND
+
+    limited(run())
+
+
+def test_a_watcher_is_told_each_change_once() -> None:
+    async def run() -> None:
+        health = Health(SERVICES)
+        async with small_server(setup=with_health(health)) as (channel, _):
+            watch = health_pb2_grpc.HealthStub(channel).Watch(health_pb2.HealthCheckRequest(service="robosc.Keeps"))
+            assert (await watch.read()).status == NOT_SERVING
+            health.set_condition("workers", True)
+            health.set_condition("store", True)
+            assert (await watch.read()).status == SERVING
+            health.set_condition("store", False)
+            assert (await watch.read()).status == NOT_SERVING
+            other = health_pb2_grpc.HealthStub(channel).Watch(health_pb2.HealthCheckRequest(service="nobody"))
+            assert (await other.read()).status == health_pb2.HealthCheckResponse.SERVICE_UNKNOWN
+            for stream in (watch, other):
+                stream.cancel()
+
+    limited(run())
+
+
+def test_conditions_are_asked_for_again_and_again_and_who_raises_says_no() -> None:
+    is_there: dict[str, bool | Exception] = {"store": True, "workers": True}
+
+    async def run() -> None:
+        health = Health(SERVICES)
+
+        def probe(name: str) -> Any:
+            async def ask() -> bool:
+                answer = is_there[name]
+                if isinstance(answer, Exception):
+                    raise answer
+                return answer
+
+            return ask
+
+        async with health.following({name: probe(name) for name in is_there}, every_s=0.001):
+            assert health.is_serving("")
+            is_there["store"] = ConnectionError("away")
+            while health.is_serving("robosc.Keeps"):
+                await asyncio.sleep(0.001)
+            assert health.is_serving("robosc.Works")
+            assert health.conditions() == {"store": False, "workers": True, "accepting": True}
+            is_there["store"] = True
+            while not health.is_serving("robosc.Keeps"):
+                await asyncio.sleep(0.001)
+
+    with logged() as log:
+        limited(run())
+    assert [line["condition"] for line in log.lines("condition does not hold")] == ["store"]
+
+
+def test_draining_says_no_first_then_refuses_and_lets_calls_end() -> None:
+    async def run() -> None:
+        health, release, seen = Health({}), asyncio.Event(), asyncio.Event()
+
+        async def slow(request: bytes, context: Any) -> bytes:
+            seen.set()
+            await release.wait()
+            return b"done"
+
+        calls = CallInterceptor(Metrics("1"))
+        async with small_server(interceptors=[calls], unary=slow, setup=with_health(health)) as (channel, server):
+            under_way = asyncio.create_task(call(channel))
+            await seen.wait()
+            ending = asyncio.create_task(drain(server, health, calls, PATIENCE_S))
+            while await status(channel) == SERVING:
+                await asyncio.sleep(0.001)
+            refused = await call(channel)
+            assert (refused.code, refused.reason) == (grpc.StatusCode.UNAVAILABLE, "SHUTTING_DOWN")
+            assert not ending.done()
+            release.set()
+            assert (await under_way).answer == b"done"
+            await ending
+
+    limited(run())
+
+
+def test_what_does_not_end_is_cancelled_and_what_is_idle_is_not_waited_for() -> None:
+    async def run(seconds: float, idle: frozenset[str]) -> None:
+        cancelled = asyncio.Event()
+
+        async def stuck(request: bytes, context: Any) -> bytes:
+            try:
+                await asyncio.Event().wait()
+            finally:
+                cancelled.set()
+            return b""
+
+        calls, health = CallInterceptor(Metrics("1")), Health({})
+        async with small_server(interceptors=[calls], unary=stuck) as (channel, server):
+            under_way = asyncio.create_task(call(channel))
+            while not calls.under_way():
+                await asyncio.sleep(0.001)
+            await drain(server, health, calls, seconds, idle)
+            await cancelled.wait()
+            assert (await under_way).code is not grpc.StatusCode.OK
+
+    limited(run(0.1, frozenset()))
+    limited(run(10 * PATIENCE_S, frozenset({f"/{SERVICE}/Unary"})))

@@ -1,0 +1,282 @@
+"""The synthesis service over real sockets, with tasks that behave as their text says."""
+
+import signal
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+import grpc
+import pytest
+from google.rpc import error_details_pb2
+from grpc_health.v1 import health_pb2, health_pb2_grpc
+from grpc_reflection.v1alpha import reflection_pb2, reflection_pb2_grpc
+from grpc_status import rpc_status
+
+from robosc import __version__
+from robosc_api.v1 import synthesis_pb2 as pb
+from robosc_api.v1 import synthesis_pb2_grpc
+from robosc_server import synthesis_service
+from robosc_server.application import StartError
+from robosc_server.main import main
+from support.fake_tasks import TASK_FUNCTION as FAKE
+from support.service import PATIENCE_S, eventually, is_running, served, server_process
+
+STUB: Any = synthesis_pb2_grpc.SynthesisServiceStub
+
+
+def bundle(text: str = "", name: str = "robot.rscd") -> pb.Bundle:
+    return pb.Bundle(main=pb.SourceFile(name=name, text=text))
+
+
+def check(channel: Any, text: str, **more: Any) -> str:
+    """What an echo said."""
+    response = STUB(channel).Check(pb.CheckRequest(bundle=bundle(text)), **{"timeout": PATIENCE_S, **more})
+    return str(response.diagnostics[0].message)
+
+
+@pytest.fixture(scope="module")
+def fake() -> Iterator[Any]:
+    with served(FAKE, worker_processes=2, bundle_bytes=1000) as address, grpc.insecure_channel(address) as channel:
+        yield channel
+
+
+def has_ended(pid: int) -> bool:
+    return not is_running(pid)
+
+
+def refusal(call: Any, streams: bool = False) -> tuple[Any, str, Any]:
+    """Reason, sentence and error of a call that must fail."""
+    with pytest.raises(grpc.RpcError) as caught:
+        for _ in call() if streams else [call()]:
+            pass
+    error: Any = caught.value
+    assert "Traceback" not in error.details()
+    status = rpc_status.from_call(error)
+    assert status is not None
+    info = error_details_pb2.ErrorInfo()
+    assert status.details[0].Unpack(info)
+    assert info.domain == "robosc"
+    return info.reason, error.details(), error
+
+
+def stuck(channel: Any, text: str = "pid\nstuck", timeout: float | None = None) -> tuple[Any, int]:
+    """A synthesis that has begun and never ends, and its worker's process."""
+    call = STUB(channel).Synthesize(pb.SynthesizeRequest(bundle=bundle(text)), timeout=timeout)
+    return call, int(next(call).progress.message)
+
+
+class TestStandardServices:
+    @pytest.mark.parametrize("name", ["", "robosc_api.v1.SynthesisService", "robosc_api.v1.JobService"])
+    def test_health(self, fake: Any, name: str) -> None:
+        stub = health_pb2_grpc.HealthStub(fake)
+
+        def is_serving() -> bool:
+            answer = stub.Check(health_pb2.HealthCheckRequest(service=name), timeout=PATIENCE_S)
+            return bool(answer.status == health_pb2.HealthCheckResponse.SERVING)
+
+        assert eventually(is_serving)
+
+    def test_reflection_lists_the_services(self, fake: Any) -> None:
+        stub = reflection_pb2_grpc.ServerReflectionStub(fake)
+        requests = [reflection_pb2.ServerReflectionRequest(list_services="")]
+        (listing,) = stub.ServerReflectionInfo(iter(requests), timeout=PATIENCE_S)
+        assert {service.name for service in listing.list_services_response.service} == {
+            "robosc_api.v1.SynthesisService",
+            "robosc_api.v1.JobService",
+            "grpc.health.v1.Health",
+            "grpc.reflection.v1alpha.ServerReflection",
+        }
+
+    def test_what_the_server_is(self, fake: Any) -> None:
+        answer = STUB(fake).GetVersion(pb.GetVersionRequest(), timeout=PATIENCE_S)
+        assert answer.version == __version__
+        assert answer.limits.bundle_bytes == 1000
+        targets = STUB(fake).ListTargets(pb.ListTargetsRequest(), timeout=PATIENCE_S).targets
+        assert "ros2" in {target.name for target in targets}
+
+
+class TestRequests:
+    @pytest.mark.parametrize("name", ["Check", "Format", "ListTargets", "GetVersion"])
+    def test_bytes_that_are_no_message(self, fake: Any, name: str) -> None:
+        call = fake.unary_unary(f"/robosc_api.v1.SynthesisService/{name}")
+        reason, details, error = refusal(lambda: call(b"\xff", timeout=PATIENCE_S))
+        assert (reason, error.code()) == ("MALFORMED_REQUEST", grpc.StatusCode.INVALID_ARGUMENT)
+        assert details == "the request is no message of this service"
+
+    @pytest.mark.parametrize("name", ["Synthesize", "Generate", "Explore", "Verify"])
+    def test_bytes_that_are_no_message_of_a_stream(self, fake: Any, name: str) -> None:
+        call = fake.unary_stream(f"/robosc_api.v1.SynthesisService/{name}")
+        assert refusal(lambda: call(b"\xff", timeout=PATIENCE_S), streams=True)[0] == "MALFORMED_REQUEST"
+
+    def test_what_the_work_refuses(self, fake: Any) -> None:
+        reason, details, _ = refusal(partial(check, fake, "refuse there is no such thing"))
+        assert (reason, details) == ("MALFORMED_REQUEST", "there is no such thing")
+
+    @pytest.mark.parametrize("size", [991, 2**22])
+    def test_bundle_too_large(self, fake: Any, size: int) -> None:
+        with pytest.raises(grpc.RpcError) as caught:
+            check(fake, "x" * size)
+        assert caught.value.code() is grpc.StatusCode.RESOURCE_EXHAUSTED  # type: ignore[attr-defined]
+
+
+class TestWork:
+    def test_reports_come_in_order_and_one_result_ends_them(self, fake: Any) -> None:
+        request = pb.SynthesizeRequest(bundle=bundle("reports 20\necho because"))
+        responses = list(STUB(fake).Synthesize(request, timeout=PATIENCE_S))
+        told = [response.progress.message for response in responses[:-1]]
+        assert told == [f"step {number}" for number in range(20)]
+        assert responses[-1].result.reason == "because"
+
+    def test_an_equal_request_is_not_done_again(self, fake: Any) -> None:
+        request = pb.SynthesizeRequest(bundle=bundle("pid\necho once"))
+        first = list(STUB(fake).Synthesize(request, timeout=PATIENCE_S))
+        again = list(STUB(fake).Synthesize(request, timeout=PATIENCE_S))
+        assert [response.WhichOneof("event") for response in first] == ["progress", "result"]
+        assert again == first[1:]
+
+    def test_what_a_library_prints_does_not_disturb(self, fake: Any) -> None:
+        assert check(fake, "noise\necho said") == "said"
+
+    @pytest.mark.parametrize(
+        ("text", "reason"), [("raise", "INTERNAL_FAULT"), ("die 9", "WORKER_DIED"), ("exit 3", "WORKER_DIED")]
+    )
+    def test_a_fault_is_told_and_the_server_lives_on(self, fake: Any, text: str, reason: str) -> None:
+        found, details, _ = refusal(partial(check, fake, text))
+        assert found == reason
+        assert "on purpose" not in details
+        assert check(fake, f"echo after {text}") == f"after {text}"
+
+    def test_two_requests_at_once(self, fake: Any) -> None:
+        call, pid = stuck(fake)
+        assert check(fake, "echo beside") == "beside"
+        assert is_running(pid)
+        call.cancel()
+        assert eventually(partial(has_ended, pid))
+
+
+class TestEnding:
+    @pytest.mark.parametrize("text", ["pid\nstuck", "pid\nspin", "pid\nstop"])
+    def test_cancelling_kills_the_worker_and_frees_its_place(self, record_property: Any, text: str) -> None:
+        with served(FAKE) as address, grpc.insecure_channel(address) as channel:
+            for _ in range(3):
+                call, pid = stuck(channel, text)
+                begun = time.monotonic()
+                call.cancel()
+                assert eventually(partial(has_ended, pid))
+                record_property(f"worker gone after a cancel ({text.split()[1]})", f"{time.monotonic() - begun:.3f} s")
+            assert check(channel, "echo free") == "free"
+
+    def test_the_callers_deadline_kills_the_worker(self, fake: Any) -> None:
+        call, pid = stuck(fake, timeout=2.0)
+        with pytest.raises(grpc.RpcError) as caught:
+            next(call)
+        assert caught.value.code() is grpc.StatusCode.DEADLINE_EXCEEDED  # type: ignore[attr-defined]
+        assert eventually(partial(has_ended, pid))
+
+    def test_the_servers_own_limit(self) -> None:
+        with served(FAKE, task_seconds=1.0) as address, grpc.insecure_channel(address) as channel:
+            reason, _, error = refusal(partial(check, channel, "stuck"))
+            assert (reason, error.code()) == ("TIME_LIMIT", grpc.StatusCode.DEADLINE_EXCEEDED)
+
+    def test_too_many_that_wait_are_refused_and_told_when_to_come_again(self) -> None:
+        with (
+            served(FAKE, waiting_tasks=1) as address,
+            grpc.insecure_channel(address) as channel,
+        ):
+            call, _ = stuck(channel)
+            waiting = STUB(channel).Check.future(pb.CheckRequest(bundle=bundle("echo first")), timeout=PATIENCE_S)
+            refused: list[Any] = []
+
+            def is_refused() -> bool:
+                try:
+                    check(channel, "echo second", timeout=0.5)
+                except grpc.RpcError as error:
+                    refused.append(error)
+                return bool(refused) and refused[-1].code() is grpc.StatusCode.RESOURCE_EXHAUSTED
+
+            assert eventually(is_refused)
+            trailing = dict(refused[-1].trailing_metadata())
+            assert float(trailing["retry-after"]) > 0
+            call.cancel()
+            assert waiting.result().diagnostics[0].message == "first"
+
+    def test_who_does_not_read_holds_no_worker_up(self) -> None:
+        with served(FAKE) as address, grpc.insecure_channel(address) as channel:
+            # Far more than fits on the way; nobody reads it.
+            unread = STUB(channel).Synthesize(pb.SynthesizeRequest(bundle=bundle("reports 200000\necho done")))
+            assert check(channel, "echo others") == "others"
+            unread.cancel()
+
+    def test_a_result_that_nobody_reads_is_given_up(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(synthesis_service, "SEND_TIMEOUT_S", 0.2)
+        with (
+            served(FAKE) as address,
+            grpc.insecure_channel(
+                address, options=[("grpc.max_receive_message_length", 2**26), ("grpc.http2.lookahead_bytes", 0)]
+            ) as channel,
+        ):
+            call = channel.unary_stream("/robosc_api.v1.SynthesisService/Synthesize")
+            request = pb.SynthesizeRequest(bundle=bundle("size 30000000")).SerializeToString()
+            done = threading.Event()
+            stream: Any = call(request, timeout=PATIENCE_S)
+            stream.add_callback(done.set)
+            # The server's patience ends long before anybody reads; if the system had room for all, it is read.
+            done.wait(1.0)
+            with_result = 0
+            try:
+                for _ in stream:
+                    with_result += 1
+            except grpc.RpcError as error:
+                assert error.code() is grpc.StatusCode.DEADLINE_EXCEEDED  # type: ignore[attr-defined]
+            assert with_result <= 1
+            assert check(channel, "echo lives") == "lives"
+
+    def test_a_connection_of_a_stranger_disturbs_nobody(self, fake: Any) -> None:
+        # Not HTTP/2, and half of it.
+        target = fake._channel.target().decode().split(":///")[-1]
+        host, _, port = target.rpartition(":")
+        for content in (b"GET / HTTP/1.1\r\n\r\n", b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n", b"\0" * 100):
+            with socket.create_connection((host, int(port))) as connection:
+                connection.sendall(content)
+                assert check(fake, f"echo {len(content)}") == str(len(content))
+
+
+class TestStopping:
+    def test_a_call_under_way_is_finished_first(self) -> None:
+        with server_process("--drain-seconds", "30") as (process, address), grpc.insecure_channel(address) as channel:
+            call = STUB(channel).Check.future(pb.CheckRequest(bundle=bundle("robot R { component C { } }")))
+            call.result(timeout=PATIENCE_S)
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(PATIENCE_S) == 0
+
+    def test_new_calls_are_refused_while_it_ends(self) -> None:
+        pids: list[int] = []
+        with served(FAKE, worker_processes=2) as address, grpc.insecure_channel(address) as channel:
+            pids.append(stuck(channel)[1])
+        assert eventually(lambda: not any(map(is_running, pids)))
+
+
+class TestStart:
+    def test_port_in_use(self) -> None:
+        with served(FAKE) as address:
+            port = int(address.rsplit(":", 1)[1])
+            with pytest.raises(StartError, match=str(port)), served(FAKE, port=port):
+                pass
+
+    @pytest.mark.parametrize(
+        "arguments", [["--port", "65536"], ["--port", "x"], ["--worker-processes", "0"], ["--nonsense"]]
+    )
+    def test_wrong_use(self, arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+        with pytest.raises(SystemExit) as left:
+            main(arguments)
+        assert left.value.code == 2
+        assert capsys.readouterr().err
+
+    def test_no_thread_is_left(self) -> None:
+        before = set(threading.enumerate())
+        with served(FAKE):
+            pass
+        assert eventually(lambda: not {thread for thread in threading.enumerate() if not thread.daemon} - before)

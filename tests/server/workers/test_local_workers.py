@@ -1,0 +1,304 @@
+"""Processes of this machine: they do what they are told, die of what they may not, and are killed in time."""
+
+import asyncio
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Awaitable, Callable, Iterator
+from concurrent.futures import CancelledError, Future
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, TaskKind, TaskLimits
+from robosc_server.workers import Workers, WorkersError
+from robosc_server.workers.local import LocalWorkers
+from support.background import BackgroundLoop, eventually, is_running
+from support.fake_tasks import TASK_FUNCTION, fake_task, said
+
+LIMITS = TaskLimits(seconds=60, cpu_seconds=20, memory_bytes=512 * 2**20, result_bytes=10**6)
+KILLED_WITHIN_S = 0.2
+
+
+class Running:
+    """Workers that run in the background, and what their tasks report."""
+
+    def __init__(self, loop: BackgroundLoop, workers: LocalWorkers) -> None:
+        self.workers: Workers = workers
+        self.local = workers
+        self._loop = loop
+
+    def start(
+        self,
+        text: str,
+        limits: TaskLimits = LIMITS,
+        on_report: Callable[[Report], Awaitable[None]] | None = None,
+        kind: TaskKind = TaskKind.CHECK,
+    ) -> tuple[Future[Outcome], "list[Report]"]:
+        reports: list[Report] = []
+
+        async def note(report: Report) -> None:
+            reports.append(report)
+
+        return self._loop.start(self.workers.run(fake_task(text, kind), limits, on_report or note)), reports
+
+    def run(self, text: str, limits: TaskLimits = LIMITS) -> Outcome:
+        return self.start(text, limits)[0].result(60)
+
+    def failure(self, text: str, limits: TaskLimits = LIMITS) -> Failure:
+        outcome = self.run(text, limits)
+        assert isinstance(outcome, Failure), outcome
+        return outcome
+
+    def begun(self, text: str, limits: TaskLimits = LIMITS) -> tuple[Future[Outcome], int]:
+        """A task under way, and the number of its process."""
+        future, reports = self.start(f"pid\n{text}", limits)
+        assert eventually(lambda: bool(reports)), future
+        return future, int(reports[0].message)
+
+
+@pytest.fixture(scope="module")
+def running() -> Iterator[Running]:
+    with BackgroundLoop() as loop:
+        workers = LocalWorkers(2, TASK_FUNCTION)
+        loop.run(workers.__aenter__())
+        yield Running(loop, workers)
+        loop.run(workers.__aexit__())
+
+
+def parent_of(pid: int) -> int:
+    return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
+
+
+def cpu_ticks(pid: int) -> int:
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return int(fields[11]) + int(fields[12])
+
+
+class TestAnswers:
+    def test_a_task_is_answered_after_its_reports(self, running: Running) -> None:
+        future, reports = running.start("reports 3\necho hello")
+        assert said(future.result(60)) == "hello"
+        assert reports == [Report("synthesis", f"step {number}") for number in range(3)]
+
+    @pytest.mark.parametrize("kind", TaskKind)
+    def test_each_kind_reaches_the_function(self, running: Running, kind: TaskKind) -> None:
+        outcome = running.start("echo here", kind=kind)[0].result(60)
+        assert isinstance(outcome, Result)
+        assert b"here" in outcome.messages[0]
+
+    def test_each_task_has_a_process_of_its_own(self, running: Running) -> None:
+        pids = {running.begun("echo")[1] for _ in range(3)}
+        assert len(pids) == 3
+        assert os.getpid() not in pids
+
+    def test_as_many_as_the_capacity_are_under_way_at_once(self, running: Running) -> None:
+        assert running.workers.capacity == 2
+        tasks = [running.begun("stop") for _ in range(2)]
+        for future, pid in tasks:
+            os.kill(pid, signal.SIGCONT)
+            assert said(future.result(60)) == "done"
+
+    def test_noise_and_secrets_stay_out(self, running: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+        assert said(running.run("noise\necho quiet")) == "quiet"
+        assert said(running.run("environment")) == ""
+        assert said(running.run("modules")) == ""
+
+
+class TestLimits:
+    def test_the_kernel_is_told_the_limits(self, running: Running) -> None:
+        assert said(running.run("limits")) == f"{20} 0 0 {LIMITS.memory_bytes}"
+
+    def test_what_the_process_has_already_is_left_to_it(self, running: Running) -> None:
+        limits = replace(LIMITS, memory_bytes=1)
+        assert said(running.run("echo small", limits)) == "small"
+        assert running.failure("allocate", limits).reason is Reason.MEMORY_LIMIT
+
+    @pytest.mark.parametrize("text", ["allocate", "allocate in C"])
+    def test_memory(self, running: Running, text: str) -> None:
+        failure = running.failure(text)
+        assert failure.reason is Reason.MEMORY_LIMIT
+        assert failure.message == "the work took more memory than a task may have"
+
+    @pytest.mark.parametrize("text", ["spin", "stuck"])
+    def test_processor_time(self, running: Running, text: str) -> None:
+        failure = running.failure(text, replace(LIMITS, cpu_seconds=0.1))
+        assert failure.reason is Reason.CPU_LIMIT
+        assert failure.message == "the work took more of a processor's time than a task may have"
+
+    def test_waiting_costs_no_processor_time(self, running: Running) -> None:
+        assert said(running.run("sleep 1.2\nsleep 0", replace(LIMITS, cpu_seconds=1))) == "done"
+
+    @pytest.mark.parametrize("text", ["sleep 600", "stop", "stuck"])
+    def test_time_by_the_clock(self, running: Running, text: str) -> None:
+        begin = time.monotonic()
+        failure = running.failure(text, replace(LIMITS, seconds=0.2))
+        assert failure == Failure(Reason.TIME_LIMIT, "the work took longer than a task may take")
+        assert time.monotonic() - begin >= 0.2
+
+    def test_the_size_of_a_result(self, running: Running) -> None:
+        assert len(said(running.run("size 900000"))) == 900_000
+        assert running.failure("size 1000000").reason is Reason.RESULT_TOO_LARGE
+
+    def test_a_size_that_is_only_claimed_is_not_waited_for(self, running: Running) -> None:
+        assert running.failure("claim 1000001").reason is Reason.RESULT_TOO_LARGE
+        assert running.failure("claim 18446744073709551615").reason is Reason.RESULT_TOO_LARGE
+
+    def test_no_file_is_written(self, running: Running, tmp_path: Path) -> None:
+        failure = running.failure(f"write {tmp_path / 'file'}")
+        assert failure.reason is Reason.INTERNAL_FAULT
+        assert "File too large" in failure.details
+        assert (tmp_path / "file").read_text() == ""
+
+
+class TestDeaths:
+    @pytest.mark.parametrize(
+        ("text", "message"),
+        [
+            ("exit 3", "the worker process ended with status 3 and no answer"),
+            ("exit 0", "the worker process ended with status 0 and no answer"),
+            ("die 9", "the worker process was ended by SIGKILL"),
+            ("die 11", "the worker process was ended by SIGSEGV"),
+            ("garbage", "the worker process sent what is no answer"),
+        ],
+    )
+    def test_a_process_that_dies_ends_its_task_alone(self, running: Running, text: str, message: str) -> None:
+        other, pid = running.begun("stop\necho unharmed")
+        failure = running.failure(text)
+        assert (failure.reason, failure.message) == (Reason.WORKER_DIED, message)
+        os.kill(pid, signal.SIGCONT)
+        assert said(other.result(60)) == "unharmed"
+
+    def test_where_it_crashed_stands_in_the_details(self, running: Running) -> None:
+        assert "in _misbehave" in running.failure("die 11").details
+
+    def test_a_fault_is_told_with_its_traceback(self, running: Running) -> None:
+        failure = running.failure("raise")
+        assert failure.reason is Reason.INTERNAL_FAULT
+        assert failure.details.rstrip().endswith("ValueError: a fault, on purpose")
+        assert running.failure("refuse this") == Failure(Reason.MALFORMED_REQUEST, "this")
+
+    def test_a_waiting_process_that_dies_is_replaced(self, running: Running) -> None:
+        pids = running.local.pids
+        for pid in pids:
+            with contextlib.suppress(ProcessLookupError):  # It was that of the task before.
+                os.kill(pid, signal.SIGKILL)
+        assert eventually(lambda: not any(map(is_running, pids)))
+        assert said(running.run("echo again")) == "again"
+
+    def test_a_task_whose_template_dies_is_begun_again_once(self, running: Running) -> None:
+        restarts = running.local.restarts
+        future, pid = running.begun("sleep 0.3\necho twice")
+        os.kill(parent_of(pid), signal.SIGKILL)
+        assert said(future.result(60)) == "twice"
+        assert running.local.restarts == restarts + 1
+        assert eventually(lambda: not is_running(pid))
+
+        future, reports = running.start("pid\nsleep 600")
+        for count in (1, 2):
+            assert eventually(lambda count=count: len(reports) == count)  # type: ignore[misc]
+            os.kill(parent_of(int(reports[-1].message)), signal.SIGKILL)
+        with pytest.raises(WorkersError, match="ended twice under one task"):
+            future.result(60)
+        assert said(running.run("echo again")) == "again"
+
+    def test_a_template_that_cannot_load_is_told_in_one_sentence(self) -> None:
+        told = r"^cannot load no\.such:thing: ModuleNotFoundError: No module named"
+        with BackgroundLoop() as loop, pytest.raises(WorkersError, match=told):
+            loop.run(LocalWorkers(1, "no.such:thing").__aenter__())
+
+    def test_ended_workers_take_no_task(self) -> None:
+        with BackgroundLoop() as loop:
+            workers = LocalWorkers(1, TASK_FUNCTION)
+            loop.run(workers.__aenter__())
+            running = Running(loop, workers)
+            future, pid = running.begun("stuck")
+            template = parent_of(pid)
+            loop.run(workers.__aexit__())
+            assert eventually(lambda: not is_running(pid) and not is_running(template))
+            with pytest.raises(WorkersError, match="have ended"):
+                future.result(60)
+            with pytest.raises(WorkersError, match="have ended"):
+                running.run("echo")
+
+
+class TestKills:
+    @pytest.mark.real_time
+    @pytest.mark.parametrize("text", ["spin", "stuck", "stop", "sleep 600", "allocate\nstuck"])
+    def test_a_cancelled_task_is_gone_in_time(self, running: Running, text: str) -> None:
+        future, pid = running.begun(text)
+        begin = time.monotonic()
+        future.cancel()
+        assert eventually(lambda: not is_running(pid))
+        assert time.monotonic() - begin < KILLED_WITHIN_S
+        with pytest.raises(CancelledError):
+            future.result(60)
+
+    def test_nothing_outlives_a_server_that_is_killed(self, tmp_path: Path) -> None:
+        program = tmp_path / "program.py"
+        program.write_text(
+            "import asyncio\n"
+            "from robosc_server.tasks.task import TaskLimits\n"
+            "from robosc_server.workers.local import LocalWorkers\n"
+            "from support.fake_tasks import TASK_FUNCTION, fake_task\n"
+            "async def tell(report):\n"
+            "    print(report.message, flush=True)\n"
+            "async def main():\n"
+            "    async with LocalWorkers(2, TASK_FUNCTION) as workers:\n"
+            "        tasks = map(fake_task, ('pid\\nstuck', 'pid\\nstop'))\n"
+            "        await asyncio.gather(*(workers.run(task, TaskLimits(), tell) for task in tasks))\n"
+            "asyncio.run(main())\n"
+        )
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+        with subprocess.Popen([sys.executable, program], stdout=subprocess.PIPE, text=True, env=environment) as server:
+            assert server.stdout is not None
+            pids = [int(server.stdout.readline()) for _ in range(2)]
+            template = parent_of(pids[0])
+            children = Path(f"/proc/{template}/task/{template}/children")
+            pids += [template, *map(int, children.read_text().split())]
+            server.kill()
+        assert len(set(pids)) >= 3
+        assert eventually(lambda: not any(map(is_running, pids)))
+
+    def test_nothing_is_left_after_many_tasks(self, running: Running) -> None:
+        def descriptors() -> int:
+            return len(list(Path("/proc/self/fd").iterdir()))
+
+        running.run("echo")
+        assert eventually(lambda: len(running.local.pids) == 2)
+        before = descriptors()
+        for text in ("echo", "exit 1", "die 11", "garbage", "raise") * 4:
+            running.run(text)
+        assert eventually(lambda: len(running.local.pids) == 2)
+        assert eventually(lambda: descriptors() == before)
+
+    def test_a_worker_that_reports_too_much_has_to_wait(self, running: Running) -> None:
+        reports: list[Report] = []
+        may_go_on = threading.Event()
+
+        async def slow(report: Report) -> None:
+            reports.append(report)
+            while len(reports) > 1 and not may_go_on.is_set():
+                await asyncio.sleep(0.01)
+
+        future, _ = running.start("pid\nreports 30000", on_report=slow)
+        assert eventually(lambda: len(reports) == 2)
+        pid = int(reports[0].message)
+        seen: list[int] = []
+
+        def rests() -> bool:
+            time.sleep(0.02)
+            seen.append(cpu_ticks(pid))
+            return len(seen) > 15 and len(set(seen[-15:])) == 1
+
+        assert eventually(rests)
+        assert is_running(pid)
+        assert len(reports) == 2
+        may_go_on.set()
+        assert said(future.result(60)) == "done"
+        assert len(reports) == 30_001

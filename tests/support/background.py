@@ -1,0 +1,56 @@
+"""An event loop in a thread of its own, for tests that are written one step after the other; and what they wait for."""
+
+import asyncio
+import os
+import threading
+import time
+from collections.abc import Callable, Coroutine
+from concurrent.futures import Future
+from types import TracebackType
+from typing import Any, Self
+
+_PATIENCE_S = 60.0
+
+
+class BackgroundLoop:
+    """Runs coroutines while the test does something else; a context."""
+
+    def __enter__(self) -> Self:
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._loop.run_forever)
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join(_PATIENCE_S)
+        self._loop.close()
+
+    def start[T](self, work: Coroutine[Any, Any, T]) -> Future[T]:
+        """Begin a piece of work; cancelling what is returned cancels it."""
+        return asyncio.run_coroutine_threadsafe(work, self._loop)
+
+    def run[T](self, work: Coroutine[Any, Any, T]) -> T:
+        """What a piece of work gives."""
+        return self.start(work).result(_PATIENCE_S)
+
+
+def eventually(condition: Callable[[], bool]) -> bool:
+    """Whether a condition becomes true; asks often, and long enough for a slow machine."""
+    end = time.monotonic() + _PATIENCE_S
+    while time.monotonic() < end:
+        if condition():
+            return True
+        time.sleep(0.005)
+    return False
+
+
+def is_running(pid: int) -> bool:
+    """Whether there is a process of that number."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True

@@ -1,4 +1,4 @@
-"""Supervisors that a server makes, signed with its own key (semantics 3.12): who trusts the key need not verify again."""
+"""Signs supervisors with the server's own key (semantics 3.12): who trusts the key need not verify them again."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING

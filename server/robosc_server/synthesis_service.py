@@ -13,8 +13,8 @@ import grpc
 import grpc.aio
 from google.protobuf.message import DecodeError
 
-from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_api.security import caller_of
+from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.failures import RefusedError
 from robosc_server.tasks.requests import NOT_A_MESSAGE, RequestLimits, accepted
 from robosc_server.tasks.task import Reason, Report, Result, Task, TaskKind

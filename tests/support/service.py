@@ -14,11 +14,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from robosc_server.operations.settings import Settings
-from robosc_server.workers.local import TASK_FUNCTION, LocalWorkers
-
 from robosc.source import Bundle, SourceFile
 from robosc_server.application import running_server
+from robosc_server.operations.settings import Settings
+from robosc_server.workers.local import TASK_FUNCTION, LocalWorkers
 
 PATIENCE_S = 60.0
 """How long a test waits for what must happen; only a failing test waits so long."""

@@ -10,6 +10,11 @@ def entry() -> NoReturn:
 
     if sys.argv[1:2] and sys.argv[1] in commands.NAMES:
         sys.exit(commands.main())
+    if sys.argv[1:2] == ["health"]:
+        # Asked again and again beside a robot that is driving.
+        from robosc_bridge import health_check
+
+        sys.exit(health_check.main())
     from robosc_bridge.main import main
 
     sys.exit(main())

@@ -39,6 +39,7 @@ from robosc_bridge.daemon.supervisors import (
 )
 from robosc_bridge.drivers import Kind, available_drivers
 from robosc_bridge.errors import BridgeError
+from robosc_bridge.health_check import add_command as add_health_command
 from robosc_bridge.terminal.commands import add_commands
 from robosc_bridge.view.settings import ADDRESS as VIEW_ADDRESS
 
@@ -117,6 +118,7 @@ def _parser() -> argparse.ArgumentParser:
     drivers = commands.add_parser("drivers", help="list the drivers of drive bases and range scanners")
     drivers.add_argument("--json", action="store_true", help="for programs")
     drivers.set_defaults(run=_drivers)
+    add_health_command(commands)
     add_commands(commands)
     return parser
 

@@ -1,0 +1,48 @@
+# The synthesis server; also the scheduler and the workers of a Dask cluster for it, which are other commands of the same
+# image. Built from the top of the repository:
+#
+#   docker build -f deploy/images/server.Dockerfile -t robosc-server .
+#
+# A digest pins the base: --build-arg PYTHON_IMAGE=docker.io/library/python:3.12.12-slim-bookworm@sha256:...
+ARG PYTHON_IMAGE=docker.io/library/python:3.12.12-slim-bookworm
+
+FROM ${PYTHON_IMAGE} AS build
+ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1 PIP_NO_INPUT=1
+WORKDIR /build
+COPY deploy/requirements-build.txt deploy/requirements-server.txt ./
+# Everything that is installed is locked by its hash, what builds it, too.
+RUN python -m venv /build/venv \
+    && /build/venv/bin/pip install --require-hashes -r requirements-build.txt \
+    && /build/venv/bin/pip wheel --no-build-isolation --require-hashes -r requirements-server.txt -w wheels \
+    && python -m venv --without-pip /opt/robosc \
+    && /build/venv/bin/pip --python /opt/robosc/bin/python install --no-index --no-deps wheels/*.whl
+COPY pyproject.toml README.md LICENSE ./
+COPY robosc robosc
+COPY proto/robosc_api proto/robosc_api
+COPY server server
+COPY client client
+COPY bridge bridge
+RUN /build/venv/bin/pip wheel --no-build-isolation --no-deps -w own . \
+    && /build/venv/bin/pip --python /opt/robosc/bin/python install --no-index --no-deps own/*.whl
+
+FROM ${PYTHON_IMAGE}
+LABEL org.opencontainers.image.title="RoboSC synthesis server" \
+    org.opencontainers.image.licenses="MIT"
+RUN install -d -o 10001 -g 10001 -m 0700 /var/lib/robosc
+COPY --from=build /opt/robosc /opt/robosc
+# Where other machines reach it, it wants TLS: ROBOSC_SERVER_TLS_CERTIFICATE and ROBOSC_SERVER_TLS_KEY, or the word that
+# the network is trusted.
+ENV PATH=/opt/robosc/bin:$PATH \
+    PYTHONDONTWRITEBYTECODE=1 \
+    ROBOSC_SERVER_HOST=0.0.0.0 \
+    ROBOSC_SERVER_LOG_FORMAT=json \
+    ROBOSC_SERVER_STATE_DIR=/var/lib/robosc
+# A number, since Kubernetes can tell from no name that it is not root.
+USER 10001:10001
+WORKDIR /var/lib/robosc
+# All that is ever written: the root may be read-only.
+VOLUME ["/var/lib/robosc"]
+EXPOSE 50051 9464
+STOPSIGNAL SIGTERM
+HEALTHCHECK --interval=30s --timeout=6s --start-period=20s --retries=3 CMD ["robosc-server", "health"]
+ENTRYPOINT ["robosc-server"]

@@ -24,6 +24,10 @@ _ID_CHARACTERS = 64
 type Context = grpc.aio.ServicerContext[Any, Any]
 
 
+def _anybody(caller: str) -> None:
+    """Let each caller ask for as much as it likes."""
+
+
 class JobService(convert.JobServiceServicer):
     """Submits, tells about and cancels jobs.
 
@@ -31,6 +35,7 @@ class JobService(convert.JobServiceServicer):
         manager: Who has the jobs.
         accept: Looks at a request and makes a task of it, or raises RefusedError.
         identify: Who calls.
+        admit: Counts a job that somebody asks for, or raises RefusedError; is given the caller's name.
     """
 
     def __init__(
@@ -38,20 +43,22 @@ class JobService(convert.JobServiceServicer):
         manager: JobManager,
         accept: Callable[[TaskKind, bytes], Task],
         identify: Callable[[Context], Caller] = caller_of,
+        admit: Callable[[str], None] = _anybody,
     ) -> None:
-        self._manager, self._accept, self._identify = manager, accept, identify
+        self._manager, self._accept, self._identify, self._admit = manager, accept, identify, admit
 
     async def SubmitJob(  # noqa: N802  # named by the .proto file
         self, request: pb.SubmitJobRequest, context: Context
     ) -> pb.SubmitJobResponse:
         """Accept a task."""
         async with _translated(context):
+            idempotency_key = convert.checked_idempotency_key(request.idempotency_key)
+            label, retention_s = convert.checked_label(request.label), convert.retention_s_of(request)
+            task = self._accept(*convert.kind_and_request(request.task))
+            caller = self._identify(context)
+            self._admit(caller.name)
             record, existed = await self._manager.submit(
-                self._accept(*convert.kind_and_request(request.task)),
-                self._identify(context),
-                idempotency_key=convert.checked_idempotency_key(request.idempotency_key),
-                label=convert.checked_label(request.label),
-                retention_s=convert.retention_s_of(request),
+                task, caller, idempotency_key=idempotency_key, label=label, retention_s=retention_s
             )
             return pb.SubmitJobResponse(job=self._job(record), existed=existed)
         raise AssertionError("unreachable: a failed request is aborted")

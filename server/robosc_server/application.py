@@ -121,7 +121,12 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
     synthesis = SynthesisService(
         Desk(results, scheduler, quotas, settings.task_limits, metrics), outgoing, request_limits, targets, version
     )
-    jobs = JobService(manager, lambda kind, request: accepted(kind, request, request_limits), admit=quotas.admit)
+    jobs = JobService(
+        manager,
+        lambda kind, request: accepted(kind, request, request_limits),
+        admit=quotas.admit,
+        send=outgoing.send_one,
+    )
 
     calls = CallInterceptor(metrics, tracing)
     services = {SERVICE_NAME: METHODS, JOB_SERVICE_NAME: JOB_METHODS}

@@ -88,7 +88,7 @@ def explore(
     return Graph(
         name=model.name,
         initial=0,
-        columns=tuple(_columns(system, model)),
+        columns=graph_columns(system, model),
         states=_states(system, model, graph),
         transitions=tuple(
             (number, event, target)
@@ -121,6 +121,11 @@ def _states(system: System, model: Model, graph: ControlledGraph) -> tuple[Graph
         graph_state(state, tuple(event for event, _ in steps))
         for state, steps in zip(graph.states, graph.steps, strict=True)
     )
+
+
+def graph_columns(system: System, model: Model) -> tuple[str, ...]:
+    """What a table calls the parts of a state."""
+    return tuple(_columns(system, model))
 
 
 def _columns(system: System, model: Model) -> Iterator[str]:

@@ -50,7 +50,12 @@ _IN_REAL_TIME = (
 )
 
 # Their files build packages, or start servers or a browser, once for all tests of a file.
-_BY_FILE = ("tests/bridge/view/test_page_", "tests/end_to_end/", "tests/robosc/targets/cpp/")
+_BY_FILE = (
+    "tests/bridge/view/test_page_",
+    "tests/end_to_end/",
+    "tests/robosc/targets/cpp/",
+    "tests/server/workers/",
+)
 
 
 class _Scheduling(LoadScopeScheduling):  # type: ignore[misc]

@@ -5,7 +5,7 @@ import codecs
 import difflib
 import os
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -14,6 +14,9 @@ from robosc.cli.output import ExitCode, UsageError, print_diagnostics, print_jso
 from robosc.errors import Diagnostic, LanguageError, Severity
 from robosc.json_documents import diagnostics_json
 from robosc.source import Bundle, Location, SourceFile
+
+type FormatText = Callable[[str, str], str]
+"""Text and name to canonical text; raises LanguageError for syntax errors."""
 
 _STANDARD_INPUT = "-"
 _STANDARD_INPUT_NAME = "<stdin>"
@@ -79,15 +82,22 @@ class _Outcome:
 
 def run(arguments: argparse.Namespace) -> int:
     """Format the files; 0 if all could be, and with `--check` none would change."""
+    from robosc.formatting import format_text
+
+    return run_with(arguments, format_text)
+
+
+def run_with(arguments: argparse.Namespace, format_text: FormatText) -> int:
+    """Format the files by something that formats a text of a name, or raises LanguageError; as `run`."""
     only_looks = arguments.check or arguments.diff
     if _STANDARD_INPUT in arguments.files:
         if len(arguments.files) > 1:
             raise UsageError("- is standard input: it cannot be formatted together with files")
         if arguments.json and not only_looks:
             raise UsageError("with - the text goes to standard output: --json needs --check or --diff then")
-        outcomes = [_format_standard_input(writes=not only_looks)]
+        outcomes = [_format_standard_input(format_text, writes=not only_looks)]
     else:
-        outcomes = [_format_file(path, writes=not only_looks) for path in _paths(arguments.files)]
+        outcomes = [_format_file(path, format_text, writes=not only_looks) for path in _paths(arguments.files)]
     _report(arguments, outcomes)
     return _exit_status(outcomes, check=arguments.check)
 
@@ -136,7 +146,7 @@ def _files(path: Path) -> Sequence[Path]:
     return [path]
 
 
-def _format_file(path: Path, *, writes: bool) -> _Outcome:
+def _format_file(path: Path, format_text: FormatText, *, writes: bool) -> _Outcome:
     from robosc.language.bundle import MAXIMUM_BYTES
 
     name = _shown(path)
@@ -145,7 +155,7 @@ def _format_file(path: Path, *, writes: bool) -> _Outcome:
             content = file.read(MAXIMUM_BYTES + 1)
     except OSError as error:
         return _Outcome(name, _Status.INACCESSIBLE, fault=f"cannot read {name}: {error.strerror or error}")
-    outcome = _formatted(content, name)
+    outcome = _formatted(content, name, format_text)
     if writes and outcome.status is _Status.CHANGED:
         try:
             write_bytes(path, outcome.after)
@@ -154,20 +164,19 @@ def _format_file(path: Path, *, writes: bool) -> _Outcome:
     return outcome
 
 
-def _format_standard_input(*, writes: bool) -> _Outcome:
+def _format_standard_input(format_text: FormatText, *, writes: bool) -> _Outcome:
     from robosc.language.bundle import MAXIMUM_BYTES
 
     if sys.stdin is None:
         raise UsageError("standard input is closed")
-    outcome = _formatted(sys.stdin.buffer.read(MAXIMUM_BYTES + 1), _STANDARD_INPUT_NAME)
+    outcome = _formatted(sys.stdin.buffer.read(MAXIMUM_BYTES + 1), _STANDARD_INPUT_NAME, format_text)
     if writes and outcome.status is not _Status.BROKEN:
         _print_bytes(outcome.after)
     return outcome
 
 
-def _formatted(content: bytes, name: str) -> _Outcome:
+def _formatted(content: bytes, name: str, format_text: FormatText) -> _Outcome:
     """The canonical content of a file; a byte order mark stays."""
-    from robosc.formatting import format_text
     from robosc.language import decode_source
     from robosc.language.bundle import MAXIMUM_BYTES
 

@@ -63,11 +63,15 @@ def prepare_streams() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
+_ESCAPED = {code: f"\\u{code:04x}" for code in (*range(0x7F, 0xA0), 0x200E, 0x200F, *range(0x202A, 0x202F))}
+"""What JSON lets stand in its strings, and what would move a terminal's cursor or turn its text round."""
+
+
 def print_json(document: Mapping[str, object]) -> None:
     """One JSON document on standard output, keys in the order given."""
     # What cannot be encoded is escaped, and in JSON by JSON's own rules.
     is_unicode = codecs.lookup(sys.stdout.encoding or "ascii").name.startswith("utf")
-    sys.stdout.write(json_text(document, is_ascii=not is_unicode))
+    sys.stdout.write(json_text(document, is_ascii=not is_unicode).translate(_ESCAPED))
 
 
 def print_diagnostics(diagnostics: Sequence[Diagnostic], bundle: Bundle | None) -> None:

@@ -82,20 +82,26 @@ def run(arguments: argparse.Namespace) -> int:
 def verify(arguments: argparse.Namespace, supervisor: "Supervisor") -> int:
     """Verify the properties that the arguments name in a supervisor's controlled system, and print the verdicts."""
     from robosc.automata import to_automata
-    from robosc.model_checking import verdict_text, verdicts_json
 
     properties = read_properties(arguments, supervisor.model)
     if properties is None:
         return ExitCode.USAGE
     system = to_automata(supervisor.model, supervisor.deployment)
-    verdicts = _verdicts(arguments, system, supervisor, properties)
-    holds = all(verdict.holds for verdict in verdicts)
+    return report_verdicts(arguments, _verdicts(arguments, system, supervisor, properties), system, supervisor.model)
+
+
+def report_verdicts(
+    arguments: argparse.Namespace, verdicts: "Sequence[Verdict]", system: "System", model: "Model"
+) -> ExitCode:
+    """Print verdicts as asked, and return the exit status."""
+    from robosc.model_checking import verdict_text, verdicts_json
+
     if arguments.json:
-        print_json(verdicts_json(verdicts, system, supervisor.model))
+        print_json(verdicts_json(verdicts, system, model))
     else:
         for verdict in (item for item in verdicts if not (arguments.quiet and item.holds)):
-            sys.stdout.write(verdict_text(verdict, system, supervisor.model))
-    return ExitCode.OK if holds else ExitCode.FAILED
+            sys.stdout.write(verdict_text(verdict, system, model))
+    return ExitCode.OK if all(verdict.holds for verdict in verdicts) else ExitCode.FAILED
 
 
 def read_properties(arguments: argparse.Namespace, model: "Model") -> "tuple[Property, ...] | None":
@@ -109,7 +115,7 @@ def read_properties(arguments: argparse.Namespace, model: "Model") -> "tuple[Pro
     texts = [SourceFile(f"property {number}", text) for number, text in enumerate(arguments.property, start=1)]
     listings: list[SourceFile] = []
     try:
-        listings += [_listing(path) for path in arguments.properties]
+        listings += [property_file(path) for path in arguments.properties]
         properties = properties_of(model, texts, listings)
     except LanguageError as error:
         _report_faults(arguments, error, [*texts, *listings])
@@ -119,7 +125,7 @@ def read_properties(arguments: argparse.Namespace, model: "Model") -> "tuple[Pro
     return properties
 
 
-def _listing(path: Path) -> SourceFile:
+def property_file(path: Path) -> SourceFile:
     """A file of properties.
 
     Raises:

@@ -2,22 +2,21 @@
 
 import argparse
 import sys
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from robosc.cli import properties
 from robosc.cli.arguments import add_engine_options, add_model_arguments, add_verify_limit_argument, read_bundle
 from robosc.cli.output import ExitCode, ProgressLine, UsageError, print_diagnostics, print_json
 from robosc.cli.sign import read_supervisor, signer_of
-from robosc.errors import InvalidSupervisorError
+from robosc.errors import Diagnostic, InvalidSupervisorError
 from robosc.model.structure import Deployment
 from robosc.signatures import SignatureError
-from robosc.source import visible
+from robosc.source import Bundle, visible
 
 if TYPE_CHECKING:
     from robosc.signatures import PublicKey
-    from robosc.supervisor.recheck import Fault, Recheck
-    from robosc.supervisor.structure import Supervisor
 
 FOREIGN_STATES = 1_000_000
 """States up to which a foreign supervisor is searched one by one: a minute or so at most."""
@@ -77,6 +76,24 @@ def run(arguments: argparse.Namespace) -> int:
     Raises:
         UsageError: A file is not there or cannot be read, or there is nothing to check.
     """
+    return run_with(arguments, _verify_supervisor, properties.run)
+
+
+def run_with(
+    arguments: argparse.Namespace,
+    verify_supervisor: Callable[[argparse.Namespace], int],
+    verify_properties: Callable[[argparse.Namespace], int],
+) -> int:
+    """Find out what is to be checked, and have it checked.
+
+    Args:
+        arguments: Of the command.
+        verify_supervisor: Checks a supervisor file, and properties if it passes.
+        verify_properties: Checks properties of a model's robot.
+
+    Raises:
+        UsageError: As `run`.
+    """
     has_properties = bool(arguments.property or arguments.properties)
     if arguments.supervisor is None and arguments.model.suffix == ".rsup":
         if arguments.signed_by and not has_properties:
@@ -85,7 +102,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.supervisor is not None:
         if not has_properties and (arguments.reorder or arguments.max_nodes):
             raise UsageError("--reorder and --max-nodes are for properties: they need --property or --properties")
-        return _verify_supervisor(arguments)
+        return verify_supervisor(arguments)
     if not has_properties:
         raise UsageError(
             "verify needs a supervisor file and its model (robosc verify FILE.rsup MODEL), "
@@ -94,7 +111,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.strict or arguments.limit != FOREIGN_STATES or arguments.signed_by:
         raise UsageError("--limit, --strict and --signed-by say how to check a supervisor file: they need FILE.rsup")
     arguments.deployment = arguments.deployment or str(Deployment.CONTROLLER)
-    return properties.run(arguments)
+    return verify_properties(arguments)
 
 
 def _verify_supervisor(arguments: argparse.Namespace) -> int:
@@ -109,10 +126,10 @@ def _verify_supervisor(arguments: argparse.Namespace) -> int:
     bundle = read_bundle(arguments)
     try:
         if arguments.signed_by:
-            _tell_signer(arguments, signer_of(arguments.supervisor, content, arguments.signed_by))
+            tell_signer(arguments, signer_of(arguments.supervisor, content, arguments.signed_by))
         supervisor = decode(content)
     except (InvalidSupervisorError, SignatureError) as error:
-        return _report_malformed(arguments, error)
+        return report_malformed(arguments, error)
     progress = ProgressLine()
     try:
         found = recheck(
@@ -129,15 +146,34 @@ def _verify_supervisor(arguments: argparse.Namespace) -> int:
     if is_right and (arguments.property or arguments.properties):
         # Of a supervisor that passed only the verdicts are asked for.
         return properties.verify(arguments, supervisor)
+    return report_recheck(
+        arguments, recheck_json(found, supervisor, is_strict=arguments.strict), found.diagnostics, bundle
+    )
+
+
+def report_recheck(
+    arguments: argparse.Namespace,
+    document: Mapping[str, Any],
+    diagnostics: Sequence[Diagnostic],
+    bundle: Bundle,
+) -> ExitCode:
+    """Print what was found about a supervisor as asked, and return the exit status.
+
+    Args:
+        arguments: Of the command.
+        document: As `recheck_json` makes it.
+        diagnostics: Why the texts hold no model that the supervisor could be for.
+        bundle: The texts.
+    """
     if arguments.json:
-        print_json(recheck_json(found, supervisor, is_strict=arguments.strict))
+        print_json(document)
     else:
-        print_diagnostics(found.diagnostics, bundle)
-        if found.diagnostics or found.judgement or found.faults:
-            _print_report(arguments, found, supervisor, is_right=is_right)
+        print_diagnostics(diagnostics, bundle)
+        if diagnostics or document["method"] is not None or document["faults"]:
+            _print_report(arguments, document)
         else:
             sys.stderr.write(f"{arguments.model}: a library has no robot that a supervisor could be for\n")
-    return ExitCode.OK if is_right else ExitCode.FAILED
+    return ExitCode.OK if document["status"] == "passed" else ExitCode.FAILED
 
 
 def _verify_signature(arguments: argparse.Namespace) -> int:
@@ -152,21 +188,23 @@ def _verify_signature(arguments: argparse.Namespace) -> int:
         if arguments.deployment not in (None, str(supervisor.deployment)):
             raise SignatureError(f"made for the deployment {supervisor.deployment}, not {arguments.deployment}")
     except (InvalidSupervisorError, SignatureError) as error:
-        return _report_malformed(arguments, error)
+        return report_malformed(arguments, error)
     if arguments.json:
         print_json({"status": "signed", "model": supervisor.model.name, "deployment": str(supervisor.deployment),
                     "signed_by": key.fingerprint})  # fmt: skip
     else:
-        _tell_signer(arguments, key)
+        tell_signer(arguments, key)
     return ExitCode.OK
 
 
-def _tell_signer(arguments: argparse.Namespace, key: "PublicKey") -> None:
+def tell_signer(arguments: argparse.Namespace, key: "PublicKey") -> None:
+    """Print whose signature it is, for people who are not to be left in peace."""
     if not arguments.quiet and not arguments.json:
         sys.stdout.write(visible(f"{arguments.supervisor}: signed by {key}") + "\n")
 
 
-def _report_malformed(arguments: argparse.Namespace, error: InvalidSupervisorError | SignatureError) -> ExitCode:
+def report_malformed(arguments: argparse.Namespace, error: InvalidSupervisorError | SignatureError) -> ExitCode:
+    """Print that a file is no supervisor, or not signed as it must be, and return the exit status."""
     from robosc.supervisor.recheck_report import malformed_json
 
     if arguments.json:
@@ -176,41 +214,43 @@ def _report_malformed(arguments: argparse.Namespace, error: InvalidSupervisorErr
     return ExitCode.FAILED
 
 
-def _print_report(arguments: argparse.Namespace, found: "Recheck", supervisor: "Supervisor", *, is_right: bool) -> None:
+def _print_report(arguments: argparse.Namespace, document: Mapping[str, Any]) -> None:
+    from robosc.verification import Outcome
+
     lines: list[str] = []
-    unchecked = [name.replace("_", " ") for name in found.unchecked()]
-    if found.diagnostics:
+    checks, is_right = document["checks"], document["status"] == "passed"
+    if document["diagnostics"]:
         lines.append(f"{arguments.supervisor}: failed: the texts hold no model that it could be for")
-    elif found.faults:
+    elif document["faults"]:
         lines.append(f"{arguments.supervisor}: failed: no right supervisor of {arguments.model}")
     elif not is_right:
+        unchecked = [name.replace("_", " ") for name, outcome in checks.items() if outcome == Outcome.NOT_CHECKED]
         lines.append(f"{arguments.supervisor}: not checked: {', '.join(unchecked)}")
     else:
         lines.append(f"{arguments.supervisor}: passed: a right supervisor of {arguments.model}")
-    if not found.diagnostics and not arguments.quiet:
-        lines += [f"  {name.replace('_', ' '):<21} {outcome}" for name, outcome in found.outcomes().items()]
-        judgement = found.judgement
-        if judgement is not None:
-            counted = judgement.verification
-            figures = [] if counted.states is None else [f"{counted.states} states"]
-            figures += [] if counted.transitions is None else [f"{counted.transitions} transitions"]
-            lines += [f"  {'controlled':<21} {', '.join(figures) or 'not counted'} ({supervisor.deployment})"]
-            lines.append(f"  {'method':<21} {judgement.method}")
-    for fault in found.faults:
+    if not document["diagnostics"] and not arguments.quiet:
+        lines += [f"  {name.replace('_', ' '):<21} {outcome}" for name, outcome in checks.items()]
+        if document["method"] is not None:
+            figures = [f"{document[name]} {name}" for name in ("states", "transitions") if document[name] is not None]
+            lines += [f"  {'controlled':<21} {', '.join(figures) or 'not counted'} ({document['deployment']})"]
+            lines.append(f"  {'method':<21} {document['method']}")
+    for fault in document["faults"]:
         lines += _fault_lines(fault)
     if not arguments.quiet:
-        lines += [f"note: {note}" for note in found.notes]
+        lines += [f"note: {note}" for note in document["remarks"]]
     if not (is_right and arguments.quiet):
         sys.stdout.write("".join(f"{visible(line)}\n" for line in lines))
 
 
-def _fault_lines(fault: "Fault") -> list[str]:
-    name = fault.check.replace("_", " ")
-    if fault.trace is None or fault.state is None:
-        return [f"{name}: {fault.message}"]
-    run = "after" if fault.is_shortest else "after (there may be shorter runs)"
+def _fault_lines(fault: Mapping[str, Any]) -> list[str]:
+    from robosc.supervisor.recheck import StateInWords
+
+    name = fault["check"].replace("_", " ")
+    if "trace" not in fault:
+        return [f"{name}: {fault['message']}"]
+    run = "after" if fault["shortest"] else "after (there may be shorter runs)"
     return [
-        f"not {name}: {fault.message}",
-        f"  {run}: {', '.join(fault.trace) or 'nothing: it is so at the start'}",
-        f"  in: {fault.state.text()}",
+        f"not {name}: {fault['message']}",
+        f"  {run}: {', '.join(fault['trace']) or 'nothing: it is so at the start'}",
+        f"  in: {StateInWords(**fault['state']).text()}",
     ]

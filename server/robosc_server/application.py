@@ -34,6 +34,7 @@ from robosc_server.operations.observed import ObservedWorkers
 from robosc_server.operations.quotas import Quotas
 from robosc_server.operations.settings import Settings
 from robosc_server.operations.tracing import open_tracing
+from robosc_server.outgoing import Outgoing
 from robosc_server.signing import SigningError, read_signing_key, signed
 from robosc_server.store import StoreError, open_store
 from robosc_server.synthesis_service import METHODS, SERVICE_NAME, SynthesisService
@@ -56,6 +57,9 @@ _OPTIONS = (
     ("grpc.keepalive_timeout_ms", 10_000),
     ("grpc.http2.min_recv_ping_interval_without_data_ms", 10_000),
 )
+
+_UNREAD_RESULTS = 8
+"""Results of the greatest size that may be on their way to their readers."""
 
 _MAXIMUM_CALLS = 10_000
 """Calls under way at once, those that only watch included."""
@@ -110,9 +114,10 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         )
     )
     quotas = Quotas(tokens)
+    outgoing = Outgoing(2 * settings.result_bytes, _UNREAD_RESULTS * settings.result_bytes)
     targets, version = await asyncio.to_thread(_descriptions, settings, request_limits)
     synthesis = SynthesisService(
-        Desk(results, scheduler, quotas, settings.task_limits, metrics), request_limits, targets, version
+        Desk(results, scheduler, quotas, settings.task_limits, metrics), outgoing, request_limits, targets, version
     )
     jobs = JobService(manager, lambda kind, request: accepted(kind, request, request_limits), admit=quotas.admit)
 

@@ -67,7 +67,9 @@ def refused(failure: Failure) -> RefusedError:
     """How a task that ended without a result is told to its caller; what only the log should know goes there."""
     if not failure.details:
         return RefusedError(failure.reason, failure.message)
-    return RefusedError(failure.reason, f"{failure.message}; {fault_words(tell_fault(failure.details))}")
+    # How a worker died is the kernel's to tell; an exception in it may quote the model.
+    fault = tell_fault(failure.details, failure.reason, is_ours=failure.reason is Reason.WORKER_DIED)
+    return RefusedError(failure.reason, f"{failure.message}; {fault_words(fault)}")
 
 
 def fault_words(identity: str) -> str:

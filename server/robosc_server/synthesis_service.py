@@ -16,15 +16,13 @@ from google.protobuf.message import DecodeError
 from robosc_api.security import caller_of
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.failures import RefusedError
+from robosc_server.outgoing import Outgoing
 from robosc_server.tasks.requests import NOT_A_MESSAGE, RequestLimits, accepted
 from robosc_server.tasks.task import Reason, Report, Result, Task, TaskKind
 
 _SERVICE = pb.DESCRIPTOR.services_by_name["SynthesisService"]
 SERVICE_NAME = _SERVICE.full_name
 METHODS = tuple(method.name for method in _SERVICE.methods)
-
-SEND_TIMEOUT_S = 60.0
-"""How long a caller may leave one message of a result unread."""
 
 WAITING_REPORTS = 64
 """Reports of progress that wait for a caller to read them."""
@@ -60,13 +58,15 @@ class SynthesisService:
 
     Args:
         desk: Who has tasks done.
+        outgoing: Sends results.
         limits: What a request may be.
         targets: The answer of ListTargets, serialized.
         version: The answer of GetVersion, serialized.
     """
 
-    def __init__(self, desk: Desk, limits: RequestLimits, targets: bytes, version: bytes) -> None:
+    def __init__(self, desk: Desk, outgoing: Outgoing, limits: RequestLimits, targets: bytes, version: bytes) -> None:
         self._desk = desk
+        self._outgoing = outgoing
         self._limits = limits
         self._fixed = {"ListTargets": (pb.ListTargetsRequest, targets), "GetVersion": (pb.GetVersionRequest, version)}
 
@@ -96,7 +96,7 @@ class SynthesisService:
             if result is None:
                 async with _Progress(context) as progress:
                     result = await self._desk.result(task, caller_of(context), progress.tell)
-            await send(context, result.messages)
+            await self._outgoing.send(context, result.messages)
 
         return answer
 
@@ -110,20 +110,6 @@ def _answering(request_type: Any, answer: bytes) -> Any:
         return answer
 
     return fixed
-
-
-async def send(context: Context, messages: tuple[bytes, ...]) -> None:
-    """Send a result, to a caller who reads it.
-
-    Raises:
-        RefusedError: The caller leaves it unread.
-    """
-    for message in messages:
-        try:
-            async with asyncio.timeout(SEND_TIMEOUT_S):
-                await context.write(message)
-        except TimeoutError:
-            raise _unread() from None
 
 
 class _Progress:
@@ -146,12 +132,8 @@ class _Progress:
             self._writer.cancel()  # Nobody is there to read it.
             await asyncio.gather(self._writer, return_exceptions=True)
             return
-        try:
-            # A message that is on its way cannot be taken back: the next one has to wait for it.
-            async with asyncio.timeout(SEND_TIMEOUT_S):
-                await self._writer
-        except TimeoutError:
-            raise _unread() from None
+        # A message that is on its way cannot be taken back: the next one has to wait for it.
+        await self._writer
 
     async def tell(self, report: Report) -> None:
         """Tell it soon."""
@@ -164,10 +146,6 @@ class _Progress:
             self._is_new.clear()
             while self._reports:
                 await self._context.write(progress_message(self._reports.popleft()))
-
-
-def _unread() -> RefusedError:
-    return RefusedError(Reason.TIME_LIMIT, f"nothing was read for {SEND_TIMEOUT_S:g} seconds")
 
 
 def progress_message(report: Report) -> bytes:

@@ -275,7 +275,14 @@ class TestOthers:
 
     def test_format(self) -> None:
         assert assembled(format_assembly("a  b"), [pb.FormatResponse(text="a\nb\n")]).text == "a\nb\n"
-        refused(format_assembly("a b"), [pb.FormatResponse(text="a c")], "more than its layout")
+        for before, after in (
+            ("a b", "a c"),
+            ("a b", "ab"),
+            ("a // x\nb", "a // x b"),
+            ("a // x", "a"),
+            ("'a'", "' a'"),
+        ):
+            refused(format_assembly(before), [pb.FormatResponse(text=after)], "more than its layout")
         broken = pb.FormatResponse(diagnostics=[pb.Diagnostic(severity=pb.SEVERITY_ERROR)])
         assert assembled(format_assembly("a b"), [broken]).text is None
 

@@ -18,7 +18,6 @@ from grpc_status import rpc_status
 from robosc import __version__
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_api.v1 import synthesis_pb2_grpc
-from robosc_server import synthesis_service
 from robosc_server.application import StartError
 from robosc_server.main import main
 from support.fake_tasks import TASK_FUNCTION as FAKE
@@ -210,29 +209,26 @@ class TestEnding:
             assert check(channel, "echo others") == "others"
             unread.cancel()
 
-    def test_a_result_that_nobody_reads_is_given_up(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(synthesis_service, "SEND_TIMEOUT_S", 0.2)
-        with (
-            served(FAKE) as address,
-            grpc.insecure_channel(
-                address, options=[("grpc.max_receive_message_length", 2**26), ("grpc.http2.lookahead_bytes", 0)]
-            ) as channel,
-        ):
-            call = channel.unary_stream("/robosc_api.v1.SynthesisService/Synthesize")
-            request = pb.SynthesizeRequest(bundle=bundle("size 30000000")).SerializeToString()
-            done = threading.Event()
-            stream: Any = call(request, timeout=PATIENCE_S)
-            stream.add_callback(done.set)
-            # The server's patience ends long before anybody reads; if the system had room for all, it is read.
-            done.wait(1.0)
-            with_result = 0
-            try:
-                for _ in stream:
-                    with_result += 1
-            except grpc.RpcError as error:
-                assert error.code() is grpc.StatusCode.DEADLINE_EXCEEDED  # type: ignore[attr-defined]
-            assert with_result <= 1
-            assert check(channel, "echo lives") == "lives"
+    def test_who_reads_no_results_gets_no_more_of_them(self) -> None:
+        # Frames that nobody takes stop the server's end of the connection at this much.
+        options = [("grpc.http2.lookahead_bytes", 65535)]
+        with served(FAKE, result_bytes=3_000_000) as address, grpc.insecure_channel(address, options) as channel:
+            request = pb.SynthesizeRequest(bundle=bundle("size 2900000")).SerializeToString()
+            synthesize: Any = channel.unary_stream("/robosc_api.v1.SynthesisService/Synthesize")
+            calls = [synthesize(request, timeout=PATIENCE_S) for _ in range(6)]
+            refused: list[Any] = []
+            read = 0
+            # The last one first: when it is at its turn, those before it are done and unread.
+            for call in reversed(calls):
+                try:
+                    read += sum(1 for _ in call)
+                except grpc.RpcError as error:
+                    refused.append(error)
+            assert read + len(refused) == 6
+            assert 1 <= len(refused) <= 4
+            assert all(error.code() is grpc.StatusCode.RESOURCE_EXHAUSTED for error in refused)
+            # They are read: there is room again.
+            assert len(list(synthesize(request, timeout=PATIENCE_S))) == 1
 
     def test_a_connection_of_a_stranger_disturbs_nobody(self, fake: Any) -> None:
         # Not HTTP/2, and half of it.

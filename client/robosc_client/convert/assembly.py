@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import msgspec
 
 from robosc.errors import Diagnostic
+from robosc.language.tokens import tokenize
 from robosc.signatures import MAXIMUM_SIGNATURE_BYTES
 from robosc.targets import GeneratedFiles
 from robosc_api.v1 import jobs_pb2
@@ -334,15 +335,19 @@ def format_assembly(before: str | None) -> Whole[pb.FormatResponse, Formatted]:
     def convert(message: pb.FormatResponse) -> Formatted:
         diagnostics = diagnostics_of(message.diagnostics)
         text = None if diagnostics else message.text
-        if text is not None and before is not None and _letters(text) != _letters(before):
+        if text is not None and before is not None and not _differ_in_layout_alone(before, text):
             raise malformed("the text differs in more than its layout")
         return Formatted(text, diagnostics)
 
     return Whole(convert)
 
 
-def _letters(text: str) -> str:
-    return "".join(text.split())
+def _differ_in_layout_alone(before: str, after: str) -> bool:
+    """Whether two texts have the same tokens and the same comments, but for blanks."""
+    if "".join(before.split()) != "".join(after.split()):
+        return False
+    # A comment that ends a line later would swallow what was behind it.
+    return tokenize(before).texts == tokenize(after).texts
 
 
 class JobResultAssembly:

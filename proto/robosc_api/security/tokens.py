@@ -180,6 +180,11 @@ class TokenFile:
         """The token of somebody; None: there is none of that name."""
         return next((entry for entry in self._current() if entry.name == name), None)
 
+    @property
+    def entries(self) -> tuple[Entry, ...]:
+        """All of them."""
+        return self._current()
+
     def _current(self) -> tuple[Entry, ...]:
         with self._lock:
             if self._clock() - self._looked_s >= _LOOK_S:

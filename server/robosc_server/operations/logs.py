@@ -76,14 +76,20 @@ def set_up_logs(log_format: LogFormat, log_level: LogLevel, stream: TextIO | Non
         logging.getLogger(name).setLevel(max(level, logging.WARNING))
 
 
-def tell_fault(fault: BaseException | str) -> str:
+def tell_fault(fault: BaseException | str, reason: str = "INTERNAL_FAULT", *, is_ours: bool = False) -> str:
     """Log a fault of ours; returns its id, which is all that a caller is told of it.
 
     Args:
-        fault: It, or a traceback of it from another process. Its words are logged at the level debug alone.
+        fault: It, or what another process tells of it, such as a traceback. Its words are logged at the level debug
+            alone.
+        reason: The caller is told, as in google.rpc.ErrorInfo.
+        is_ours: Whether the words are the server's own, without anything of a model, so that they can be logged.
     """
     identity = secrets.token_hex(4)
     log = structlog.get_logger()
+    if isinstance(fault, str) and is_ours:
+        log.error("fault", fault=identity, reason=str(reason), words=fault)
+        return identity
     if isinstance(fault, str):
         kinds = _ERROR_KIND.findall(fault)
         kind = kinds[-1] if kinds else "unknown"
@@ -92,7 +98,7 @@ def tell_fault(fault: BaseException | str) -> str:
     else:
         kind, places = type(fault).__qualname__, _places(fault.__traceback__)
         words = "".join(traceback.format_exception(fault))
-    log.error("fault", fault=identity, error=kind, places=places)
+    log.error("fault", fault=identity, reason=str(reason), error=kind, places=places)
     log.debug("fault in words", fault=identity, traceback=words)
     return identity
 

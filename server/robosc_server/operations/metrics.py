@@ -18,7 +18,7 @@ from prometheus_client import (
     ProcessCollector,
     generate_latest,
 )
-from prometheus_client.core import GaugeMetricFamily, Metric
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.exposition import CONTENT_TYPE_LATEST
 
 from robosc_api.security import SecurityError, is_loopback_host, joined
@@ -107,9 +107,6 @@ class Metrics:
         )
         for where in ("memory", "store", "none"):
             self._lookups.labels(where)
-        self._restarts = Counter(
-            "robosc_server_worker_restarts", "Worker processes that had to be replaced.", registry=registry
-        )
         Gauge("robosc_server_calls_under_way", "Calls that have begun and not ended.", registry=registry).set_function(
             lambda: self.calls_under_way
         )
@@ -117,6 +114,7 @@ class Metrics:
         self._running: Callable[[], int] = _nothing
         self._jobs: Callable[[], Mapping[str, int]] = dict
         self._conditions: Callable[[], Mapping[str, bool]] = dict
+        self._restarts: Callable[[], int] = _nothing
         Gauge("robosc_server_tasks_waiting", "Tasks that wait for a worker.", registry=registry).set_function(
             lambda: self._waiting()
         )
@@ -172,10 +170,6 @@ class Metrics:
         """Count a request whose result was not there."""
         self._lookups.labels("none").inc()
 
-    def worker_restarted(self) -> None:
-        """Count a worker process that had to be replaced."""
-        self._restarts.inc()
-
     def follow(
         self,
         *,
@@ -183,6 +177,7 @@ class Metrics:
         running: Callable[[], int] | None = None,
         jobs: Callable[[], Mapping[str, int]] | None = None,
         conditions: Callable[[], Mapping[str, bool]] | None = None,
+        restarts: Callable[[], int] | None = None,
     ) -> None:
         """Who is asked each time that somebody wants the metrics, on the event loop: it must be quick.
 
@@ -191,11 +186,13 @@ class Metrics:
             running: How many tasks workers are at.
             jobs: How many jobs there are, by state.
             conditions: What the service needs, and whether it is there.
+            restarts: How often what starts workers had to be started again.
         """
         self._waiting = waiting or self._waiting
         self._running = running or self._running
         self._jobs = jobs or self._jobs
         self._conditions = conditions or self._conditions
+        self._restarts = restarts or self._restarts
 
     def followed(self) -> Iterable[Metric]:
         """What is asked for, and has labels."""
@@ -207,7 +204,11 @@ class Metrics:
         )
         for name, holds in sorted(self._conditions().items()):
             conditions.add_metric((name,), float(holds))
-        return jobs, conditions
+        restarts = CounterMetricFamily(
+            "robosc_server_worker_restarts", "How often what starts workers had to be started again."
+        )
+        restarts.add_metric((), self._restarts())
+        return jobs, conditions, restarts
 
     def text(self) -> bytes:
         """All of it, in the text format of Prometheus."""

@@ -75,18 +75,19 @@ def _workers(text: str) -> str:
     kind, _, address = text.partition("://")
     if text == "local":
         return text
-    if kind != "dask":
-        raise PydanticCustomError("workers", "'local' or 'dask://HOST:PORT' is needed")
+    if kind not in ("dask", "dask+tls"):
+        raise PydanticCustomError("workers", "'local', 'dask://HOST:PORT' or 'dask+tls://HOST:PORT' is needed")
     try:
         split(address)
     except ValueError as error:
-        raise PydanticCustomError("workers", "after dask:// there is HOST:PORT") from error
+        raise PydanticCustomError("workers", "after :// there is HOST:PORT") from error
     return text
 
 
 def _database(text: str) -> str:
-    if text.partition(":")[0].partition("+")[0] not in ("sqlite", "postgresql") or "://" not in text:
-        raise PydanticCustomError("database", "a URL with sqlite:// or postgresql:// is needed")
+    # Not the text itself in the message: it may hold a password.
+    if text.partition("://")[0] not in ("postgresql", "postgresql+psycopg") or "://" not in text:
+        raise PydanticCustomError("database", "postgresql://USER:PASSWORD@HOST:PORT/NAME is needed")
     return text
 
 
@@ -196,7 +197,10 @@ class Settings(BaseModel):
     )
 
     workers: Annotated[str, AfterValidator(_workers)] = _setting(
-        "local", "who works: `local` processes, or a Dask cluster, `dask://HOST:PORT`", _WORKING, metavar="WHERE"
+        "local",
+        "who works: `local` processes, or a Dask cluster, `dask://HOST:PORT` or `dask+tls://HOST:PORT`",
+        _WORKING,
+        metavar="WHERE",
     )
     worker_processes: Annotated[_Count, Field(le=1024)] = _setting(
         _processors,
@@ -214,8 +218,7 @@ class Settings(BaseModel):
     )
     database_url: Annotated[str, AfterValidator(_database)] | None = _setting(
         None,
-        "database for jobs and results, as SQLAlchemy writes it, such as postgresql+psycopg://USER:PASSWORD@HOST/NAME;"
-        " several servers may share one in PostgreSQL",
+        "database for jobs and results that several servers may share: postgresql://USER:PASSWORD@HOST:PORT/NAME",
         _KEEPING,
         metavar="URL",
         told="SQLite in state_dir",
@@ -275,11 +278,6 @@ class Settings(BaseModel):
             nodes=self.task_nodes,
             result_bytes=self.result_bytes,
         )
-
-    @property
-    def database(self) -> str:
-        """The database's URL."""
-        return self.database_url or f"sqlite:///{self.state_dir.absolute() / 'jobs.sqlite'}"
 
 
 class SettingsError(Exception):

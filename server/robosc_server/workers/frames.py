@@ -34,6 +34,7 @@ _TOLD_BY_WORKERS = frozenset(
         Reason.NODE_LIMIT,
         Reason.RESULT_TOO_LARGE,
         Reason.TIME_LIMIT,
+        Reason.WORKER_DIED,
         Reason.INTERNAL_FAULT,
     }
 )

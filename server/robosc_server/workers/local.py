@@ -49,6 +49,11 @@ class LocalWorkers:
         return self._supply.pids
 
     @property
+    def fault(self) -> str:
+        """Why no process can be had now, in one sentence; empty where there are."""
+        return self._supply.fault
+
+    @property
     def restarts(self) -> int:
         """How often the process that starts workers ended and was started again."""
         return self._supply.restarts

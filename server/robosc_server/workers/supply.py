@@ -34,6 +34,7 @@ class Supply:
 
     Attributes:
         restarts: How many templates ended without being told to.
+        fault: Why no process can be had now, in one sentence; empty where there are.
     """
 
     def __init__(self, task_function: str, spare: int) -> None:
@@ -44,7 +45,7 @@ class Supply:
         self._ready: deque[WorkerProcess] = deque()
         self._known: dict[int, WorkerProcess] = {}  # by pid, of the template that lives
         self._line: socket.socket | None = None
-        self._fault = ""
+        self.fault = ""
         self._failures = 0  # Templates that ended, one after the other, without a worker.
         self._is_closed = False
         self._changed = asyncio.Event()
@@ -56,8 +57,8 @@ class Supply:
         try:
             async with asyncio.timeout(START_S):
                 while not self._ready:
-                    if self._fault:
-                        raise WorkersError(self._fault)
+                    if self.fault:
+                        raise WorkersError(self.fault)
                     await self._change()
         except TimeoutError:
             await self._close()
@@ -90,12 +91,12 @@ class Supply:
             if self._is_closed:
                 raise WorkersError("the server's workers have ended")
             if self._failures >= _HOPELESS:
-                raise WorkersError(self._fault)
+                raise WorkersError(self.fault)
             try:
                 async with asyncio.timeout(end - time.monotonic()):
                     await self._change()
             except TimeoutError:
-                raise WorkersError(self._fault or f"no worker process stood ready within {_WAIT_S:.0f} s") from None
+                raise WorkersError(self.fault or f"no worker process stood ready within {_WAIT_S:.0f} s") from None
         self._ask_for(1)
         return worker
 
@@ -152,8 +153,8 @@ class Supply:
             status = await self._run_template()
             self.restarts += 1
             self._failures += 1
-            self._fault = self._fault or f"the process that starts workers ended with status {status}"
-            _LOG.error("%s; it is started again", self._fault)
+            self.fault = self.fault or f"the process that starts workers ended with status {status}"
+            _LOG.error("%s; it is started again", self.fault)
             self._changed.set()
             await asyncio.sleep(_PAUSES_S[min(self._failures, len(_PAUSES_S) - 1)])
 
@@ -180,7 +181,7 @@ class Supply:
             self._ask_for(self._spare)
             return await process.wait()
         except OSError as error:
-            self._fault = f"cannot start the process that starts workers: {error.strerror}"
+            self.fault = f"cannot start the process that starts workers: {error.strerror}"
             return None
         finally:
             if process is not None and process.returncode is None:
@@ -224,13 +225,13 @@ class Supply:
                 worker = WorkerProcess(told["pid"], socket.socket(fileno=connection), descriptor, last_words)
                 self._known[worker.pid] = worker
                 self._ready.append(worker)
-                self._fault, self._failures = "", 0
+                self.fault, self._failures = "", 0
             case "ended":
                 self._note_end(told["pid"], Ending(told["exit_code"], told["cpu_s"], told["peak_bytes"]))
             case "fault":
-                if told["message"] != self._fault:
-                    self._fault = told["message"]
-                    _LOG.error("%s", self._fault)
+                if told["message"] != self.fault:
+                    self.fault = told["message"]
+                    _LOG.error("%s", self.fault)
         self._changed.set()
         return True
 

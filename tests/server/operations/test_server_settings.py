@@ -63,8 +63,6 @@ def test_made_from_its_fields_it_looks_nowhere_else(monkeypatch: pytest.MonkeyPa
 def test_what_follows_from_settings() -> None:
     settings = Settings(host="::1", port=7, state_dir=Path("/state"), tls_key=Path("key"), task_seconds=3.0)
     assert settings.address == "[::1]:7"
-    assert settings.database == "sqlite:////state/jobs.sqlite"
-    assert Settings(database_url="postgresql+psycopg://h/n").database == "postgresql+psycopg://h/n"
     assert settings.security == ServerSecurity(key=Path("key"))
     assert settings.task_limits == TaskLimits(seconds=3.0)
     assert Settings().task_limits == TaskLimits()
@@ -103,12 +101,12 @@ def test_every_problem_is_told_with_its_place(
         f"{file}: task_seconds: it should be a finite number",
         f"{file}: bundle_files: a whole number is needed",
         f"{file}: waiting_tasks: a whole number is needed",
-        f"{file}: workers: after dask:// there is HOST:PORT",
+        f"{file}: workers: after :// there is HOST:PORT",
         f"{file}: log_format: it should be 'text' or 'json'",
         f"{file}: metrics_address: HOST:PORT is needed",
         f"{file}: tls_key: a text is needed",
         "$ROBOSC_SERVER_TASK_NODES: it should be greater than or equal to 1",
-        "--database-url: a URL with sqlite:// or postgresql:// is needed",
+        "--database-url: postgresql://USER:PASSWORD@HOST:PORT/NAME is needed",
         "--result-bytes: a number of bytes such as 1048576 or 1MiB is needed",
         "--host: a name or address is needed",
     }

@@ -209,8 +209,10 @@ class TestDeaths:
 
     def test_a_template_that_cannot_load_is_told_in_one_sentence(self) -> None:
         told = r"^cannot load no\.such:thing: ModuleNotFoundError: No module named"
+        workers = LocalWorkers(1, "no.such:thing")
         with BackgroundLoop() as loop, pytest.raises(WorkersError, match=told):
-            loop.run(LocalWorkers(1, "no.such:thing").__aenter__())
+            loop.run(workers.__aenter__())
+        assert workers.fault.startswith("cannot load no.such:thing")
 
     def test_ended_workers_take_no_task(self) -> None:
         with BackgroundLoop() as loop:

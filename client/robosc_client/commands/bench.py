@@ -1,0 +1,136 @@
+"""`robosc-client bench`: how many calls a second a server answers, and how long they take."""
+
+import argparse
+import asyncio
+import secrets
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from robosc.cli.arguments import add_model_arguments, read_bundle
+from robosc.cli.output import CommandError, ExitCode, print_json
+from robosc.source import Bundle, SourceFile
+from robosc_api.security import SecurityError
+from robosc_client import Check, Synthesize, Task
+from robosc_client.commands.connection import add_connection_arguments, seconds, target_of
+from robosc_client.commands.shown import Shown
+from robosc_client.commands.tasks import add_synthesis_arguments, synthesis_options
+from robosc_client.convert.requests import request_of
+from robosc_client.load import MAXIMUM_CONCURRENCY, Load, Measured, measure
+
+_DESCRIPTION = """\
+Ask a server for the same again and again, and tell how many calls a second it answers and how long they take. Each of
+the concurrent callers has one call under way at any time. The server answers what it knows from its store; with
+--uncached, a comment in the model makes every request another one.
+"""
+
+_RUN = secrets.token_hex(8)
+"""Of this process: what another one has asked is no request of this one."""
+
+_METHODS = {
+    "check": ("/robosc_api.v1.SynthesisService/Check", False),
+    "synth": ("/robosc_api.v1.SynthesisService/Synthesize", True),
+}
+
+
+def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command."""
+    parser = commands.add_parser("bench", help="measure how many calls a server answers", description=_DESCRIPTION)
+    add_model_arguments(parser)
+    parser.add_argument("--task", choices=list(_METHODS), default="check", help="what is asked (default: %(default)s)")
+    parser.add_argument(
+        "-c", "--concurrency", type=_callers, default=8, metavar="N", help="callers at once (default: %(default)s)"
+    )
+    amount = parser.add_mutually_exclusive_group()
+    amount.add_argument("-n", "--count", type=_count, metavar="N", help="calls in all")
+    amount.add_argument(
+        "-d", "--duration", type=seconds, default=10.0, metavar="SECONDS", help="how long (default: %(default)g)"
+    )
+    parser.add_argument(
+        "--connections", type=_callers, default=1, metavar="N", help="connections (default: %(default)s)"
+    )
+    parser.add_argument("--uncached", action="store_true", help="make every request another one")
+    add_synthesis_arguments(parser)
+    add_connection_arguments(parser)
+    parser.set_defaults(run_alone=_bench)
+
+
+def _callers(text: str) -> int:
+    value = int(text)
+    if not 0 < value <= MAXIMUM_CONCURRENCY:
+        raise ValueError
+    return value
+
+
+def _count(text: str) -> int:
+    value = int(text)
+    if not 0 < value <= 10**9:
+        raise ValueError
+    return value
+
+
+_callers.__name__ = _count.__name__ = "number"
+
+
+def _bench(arguments: argparse.Namespace) -> int:
+    bundle = read_bundle(arguments)
+    method, is_stream = _METHODS[arguments.task]
+    load = Load(
+        method=method,
+        is_stream=is_stream,
+        request=_requests(arguments, bundle),
+        concurrency=arguments.concurrency,
+        count=arguments.count,
+        duration_s=None if arguments.count else arguments.duration,
+        channels=min(arguments.connections, arguments.concurrency),
+        timeout_s=arguments.deadline or 60.0,
+    )
+    address, credentials = target_of(arguments)
+    try:
+        with Shown() as shown:
+            shown.show(f"{arguments.concurrency} callers at {address}")
+            measured = asyncio.run(measure(address, credentials, load))
+    except SecurityError as error:
+        raise CommandError(str(error), ExitCode.SERVICE) from error
+    _report(arguments, measured)
+    return ExitCode.SERVICE if measured.errors else ExitCode.OK
+
+
+def _requests(arguments: argparse.Namespace, bundle: Bundle) -> Callable[[int], bytes]:
+    """Serialized requests: always the same, or each with another comment at the end of its model."""
+
+    def content(chosen: Bundle) -> bytes:
+        task: Task = Check(chosen)
+        if arguments.task == "synth":
+            task = Synthesize(chosen, synthesis_options(arguments))
+        return request_of(task).SerializeToString()
+
+    if not arguments.uncached:
+        same = content(bundle)
+        return lambda number: same
+    return lambda number: content(varied(bundle, number))
+
+
+def varied(bundle: Bundle, number: int) -> Bundle:
+    """The same model in another text; different at any other time, too."""
+    text = f"{bundle.main.text}\n// {_RUN} {number}\n"
+    return Bundle(SourceFile(bundle.main.name, text), bundle.libraries, bundle.searched, bundle.interfaces)
+
+
+def _report(arguments: argparse.Namespace, measured: Measured) -> None:
+    document: dict[str, Any] = {
+        "task": arguments.task,
+        "cached": not arguments.uncached,
+        "concurrency": arguments.concurrency,
+        **measured.document(),
+    }
+    if arguments.json:
+        print_json(document)
+        return
+    times = ", ".join(f"{name} {value}" for name, value in document["milliseconds"].items())
+    sys.stdout.write(
+        f"{document['calls']} calls in {document['seconds']} s: {document['calls_per_second']} a second\n"
+        f"milliseconds: {times}\n"
+    )
+    for reason, number in document["errors"].items():
+        sys.stdout.write(f"errors: {number} {reason}\n")

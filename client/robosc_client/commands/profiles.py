@@ -1,0 +1,118 @@
+"""`robosc-client profile`: servers by name."""
+
+import argparse
+import getpass
+import sys
+from pathlib import Path
+
+from robosc.cli.output import ExitCode, UsageError, print_json
+from robosc_client.commands.connection import address
+from robosc_client.profiles import (
+    MAXIMUM_TOKEN_BYTES,
+    Profile,
+    add_profile,
+    profiles_file,
+    read_profiles,
+    remove_profile,
+    require_profile,
+)
+
+_DESCRIPTION = """\
+Servers by name, kept in ~/.config/robosc/client.toml (or below $XDG_CONFIG_HOME). The default profile is used by every
+command that names no server.
+"""
+
+
+def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command with its own commands."""
+    parser = commands.add_parser("profile", help="keep servers by name", description=_DESCRIPTION)
+    actions = parser.add_subparsers(title="commands", dest="action", required=True, metavar="COMMAND")
+
+    add = actions.add_parser("add", help="keep a server")
+    add.add_argument("name", metavar="NAME", help="what it is called")
+    add.add_argument("--server", type=address, required=True, metavar="HOST:PORT", help="where it listens")
+    add.add_argument("--tls", action="store_true", help="with TLS, believing the usual certificate authorities")
+    for name, what in (
+        ("ca", "with TLS, believing these certificates alone (PEM)"),
+        ("certificate", "own certificate chain (PEM)"),
+        ("key", "its private key (PEM)"),
+    ):
+        add.add_argument(f"--{name}", type=Path, metavar="FILE", help=what)
+    token = add.add_mutually_exclusive_group()
+    token.add_argument("--token-file", type=Path, metavar="FILE", help="file with a token")
+    token.add_argument(
+        "--token", action="store_true", help="read a token from standard input, and keep it in a file of your own"
+    )
+    add.add_argument("--default", action="store_true", help="use it where no server is named (the first always is)")
+    add.add_argument("--force", action="store_true", help="replace a profile of that name")
+    add.set_defaults(run_alone=_add)
+
+    shown = actions.add_parser("list", help="list the profiles")
+    shown.set_defaults(run_alone=_list)
+    show = actions.add_parser("show", help="show a profile")
+    show.add_argument("name", metavar="NAME", help="which")
+    show.set_defaults(run_alone=_show)
+    remove = actions.add_parser("remove", help="forget a profile, and the token that is kept for it")
+    remove.add_argument("name", metavar="NAME", help="which")
+    remove.set_defaults(run_alone=_remove)
+    for command in (add, shown, show, remove):
+        command.add_argument("--json", action="store_true", help="print one JSON document for machines")
+
+
+def _add(arguments: argparse.Namespace) -> int:
+    paths = {
+        name: value if value is None else value.absolute()
+        for name in ("ca", "certificate", "key", "token_file")
+        for value in (getattr(arguments, name),)
+    }
+    profile = Profile(server=arguments.server, tls=arguments.tls, **paths)
+    token = _token() if arguments.token else None
+    add_profile(arguments.name, profile, token=token, is_default=arguments.default, replaces=arguments.force)
+    return _print(arguments, f"{profiles_file()}: profile {arguments.name} for {arguments.server}\n")
+
+
+def _token() -> str:
+    """A token that nobody sees on a terminal or in a list of processes."""
+    if sys.stdin is None:
+        raise UsageError("standard input is closed")
+    given = getpass.getpass("token: ") if sys.stdin.isatty() else sys.stdin.read(MAXIMUM_TOKEN_BYTES + 1)
+    token = given.strip()
+    if not token or len(token) > MAXIMUM_TOKEN_BYTES or not token.isascii() or any(map(str.isspace, token)):
+        raise UsageError("standard input holds no single token")
+    return token
+
+
+def _list(arguments: argparse.Namespace) -> int:
+    known = read_profiles()
+    if arguments.json:
+        profiles = {name: profile.document() for name, profile in known.by_name.items()}
+        print_json({"default": known.default, "profiles": profiles})
+        return ExitCode.OK
+    for name, profile in known.by_name.items():
+        sys.stdout.write(f"{'*' if name == known.default else ' '} {name:20} {profile.server}\n")
+    return ExitCode.OK
+
+
+def _show(arguments: argparse.Namespace) -> int:
+    known = read_profiles()
+    profile = require_profile(known, arguments.name)
+    document = {"name": arguments.name, "default": arguments.name == known.default, **profile.document()}
+    if arguments.json:
+        print_json(document)
+        return ExitCode.OK
+    for key, value in document.items():
+        sys.stdout.write(f"{key:12} {str(value).lower() if isinstance(value, bool) else value}\n")
+    return ExitCode.OK
+
+
+def _remove(arguments: argparse.Namespace) -> int:
+    remove_profile(arguments.name)
+    return _print(arguments, f"{profiles_file()}: no profile {arguments.name} any more\n")
+
+
+def _print(arguments: argparse.Namespace, text: str) -> int:
+    if arguments.json:
+        print_json({"file": str(profiles_file()), "profile": arguments.name})
+    else:
+        sys.stdout.write(text)
+    return ExitCode.OK

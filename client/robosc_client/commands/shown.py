@@ -1,0 +1,48 @@
+"""What is shown while work goes on: a line with what moves, on a terminal alone."""
+
+import sys
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from robosc_client.results import Progress
+
+if TYPE_CHECKING:
+    import rich.progress
+
+_MAXIMUM = 100
+
+
+class Shown:
+    """A line on standard error that long work overwrites, and that is gone when the work has ended."""
+
+    def __init__(self) -> None:
+        self._bar: rich.progress.Progress | None = None
+        self._line: rich.progress.TaskID | None = None
+
+    def __enter__(self) -> Self:
+        if sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import Progress as Bar
+            from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
+
+            # What a server says is text, and no markup.
+            columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+            self._bar = Bar(*columns, console=Console(stderr=True), transient=True)
+            self._bar.start()
+            self._line = self._bar.add_task("")
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def show(self, text: str) -> None:
+        """Replace the line."""
+        if self._bar is not None and self._line is not None:
+            self._bar.update(self._line, description=text[:_MAXIMUM])
+
+    def tell(self, progress: Progress) -> None:
+        """Replace the line by where the work is."""
+        self.show(f"{progress.stage}: {progress.message}")

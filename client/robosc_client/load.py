@@ -1,0 +1,179 @@
+"""Load on a server, as a table of times: for finding out what a server can do, like `ghz` for gRPC in general.
+
+Calls are made from one event loop with messages that were serialized before, and answers are not looked into: what is
+measured is the server, and not the client. Each of the concurrent callers has one call under way at any time (a closed
+loop), so that no more is asked than is answered; its times say nothing about a server that is asked at a fixed rate.
+"""
+
+import asyncio
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import grpc
+import grpc.aio
+
+from robosc_api.security import Credentials, open_async_channel
+from robosc_client.connection import CHANNEL_OPTIONS
+from robosc_client.convert.failures import failure_of
+
+MAXIMUM_CONCURRENCY = 10_000
+
+_SETTLING_S = 30.0
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """What is asked.
+
+    Attributes:
+        method: The method's whole name, such as `/robosc_api.v1.SynthesisService/Check`.
+        is_stream: Whether it answers with a stream.
+        request: The serialized request of the call of a number.
+        concurrency: Callers, each with one call at a time.
+        count: Calls in all; None: as many as there is time for.
+        duration_s: Seconds after which no call is begun any more; None: any number.
+        channels: Connections that the callers share.
+        timeout_s: Seconds that one call may take.
+    """
+
+    method: str
+    is_stream: bool
+    request: Callable[[int], bytes]
+    concurrency: int = 1
+    count: int | None = None
+    duration_s: float | None = None
+    channels: int = 1
+    timeout_s: float = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """What came of it.
+
+    Attributes:
+        seconds: From the first call's beginning to the last one's end.
+        times_s: Of each call that was answered well, sorted.
+        answer_bytes: Bytes of all answers.
+        errors: How many calls failed, by the reason in the server's words, or by gRPC's status.
+    """
+
+    seconds: float
+    times_s: tuple[float, ...]
+    answer_bytes: int
+    errors: dict[str, int]
+
+    @property
+    def calls_per_second(self) -> float:
+        """Calls that were answered well, by time."""
+        return len(self.times_s) / self.seconds if self.seconds else 0.0
+
+    def percentile_s(self, percent: float) -> float | None:
+        """The time within which so many of a hundred calls were answered (nearest rank); None without any."""
+        if not self.times_s:
+            return None
+        rank = -(-len(self.times_s) * percent // 100)
+        return self.times_s[max(int(rank), 1) - 1]
+
+    def document(self) -> dict[str, Any]:
+        """As JSON values; times in milliseconds."""
+
+        def milliseconds(percent: float) -> float | None:
+            found = self.percentile_s(percent)
+            return None if found is None else round(found * 1e3, 3)
+
+        return {
+            "calls": len(self.times_s),
+            "seconds": round(self.seconds, 3),
+            "calls_per_second": round(self.calls_per_second, 1),
+            "answer_bytes": self.answer_bytes,
+            "milliseconds": {f"p{percent:g}": milliseconds(percent) for percent in (50, 90, 99, 100)},
+            "errors": dict(sorted(self.errors.items())),
+        }
+
+
+async def measure(address: str, credentials: Credentials, load: Load) -> Measured:
+    """Ask a server, and measure it.
+
+    Raises:
+        SecurityError: A certificate, key or token cannot be used.
+    """
+    # Channels with the same options would share one connection.
+    options = [(*CHANNEL_OPTIONS, ("robosc.bench", number)) for number in range(load.channels)]
+    channels = [open_async_channel(address, credentials, chosen) for chosen in options]
+    try:
+        await _connected(channels)
+        return await _measured(channels, load)
+    finally:
+        for channel in channels:
+            await channel.close()
+
+
+async def _connected(channels: list[grpc.aio.Channel]) -> None:
+    """Wait until there are connections; where there is no server, the calls tell so."""
+    ready = asyncio.gather(*(channel.channel_ready() for channel in channels))
+    try:
+        await asyncio.wait_for(ready, _SETTLING_S)
+    except TimeoutError:
+        return
+
+
+async def _measured(channels: list[grpc.aio.Channel], load: Load) -> Measured:
+    begun_s = time.perf_counter()
+    numbers = _numbers(load, begun_s)
+    times_s: list[float] = []
+    errors: Counter[str] = Counter()
+    size = 0
+
+    async def caller(place: int) -> None:
+        nonlocal size
+        call = _call(channels[place % len(channels)], load)
+        for number in numbers:
+            request = load.request(number)
+            before_s = time.perf_counter()
+            try:
+                size += await call(request)
+            except grpc.RpcError as error:
+                failure = failure_of(error)
+                errors[failure.reason or failure.code.name] += 1
+                # A server that refuses at once must not be asked in a tight loop.
+                await asyncio.sleep(0.001)
+            else:
+                times_s.append(time.perf_counter() - before_s)
+
+    async with asyncio.TaskGroup() as callers:
+        for place in range(load.concurrency):
+            callers.create_task(caller(place))
+    return Measured(time.perf_counter() - begun_s, tuple(sorted(times_s)), size, dict(errors))
+
+
+def _numbers(load: Load, begun_s: float) -> Iterator[int]:
+    """The calls that are to be begun, shared by all callers."""
+    number = 0
+    while load.count is None or number < load.count:
+        if load.duration_s is not None and time.perf_counter() - begun_s >= load.duration_s:
+            return
+        yield number
+        number += 1
+
+
+def _call(channel: grpc.aio.Channel, load: Load) -> Callable[[bytes], Any]:
+    """Makes one call, and gives the bytes of its answer."""
+    if not load.is_stream:
+        unary: Any = channel.unary_unary(load.method)
+
+        async def answer(request: bytes) -> int:
+            return len(await unary(request, timeout=load.timeout_s))
+
+        return answer
+    streamed: Any = channel.unary_stream(load.method)
+
+    async def answers(request: bytes) -> int:
+        size = 0
+        async for message in streamed(request, timeout=load.timeout_s):
+            size += len(message)
+        return size
+
+    return answers

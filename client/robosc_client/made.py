@@ -1,0 +1,220 @@
+"""What a server answers, as the values that `robosc` itself would have made: so both print and write the same."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import msgspec
+
+from robosc.automata import to_automata
+from robosc.automata.state import Subject, subject_domain, subjects
+from robosc.automata.structure import System
+from robosc.errors import InvalidSupervisorError, LanguageError, UnsupportedModelError
+from robosc.exploration import Graph, GraphState, graph_columns
+from robosc.expressions import Value
+from robosc.model import check
+from robosc.model.structure import Deployment, Model
+from robosc.model_checking import Property, Verdict, properties_of
+from robosc.model_checking.outcome import Remainder, Run, RunKind
+from robosc.source import Bundle, SourceFile, visible
+from robosc.supervisor import Made, MadeStatus, decode
+from robosc_client.errors import ServiceError, malformed
+from robosc_client.results import Exploration, Generation, StateGraph, Synthesis, SynthesisStatus
+
+
+def made_of(result: Synthesis | Generation | Exploration, content: bytes = b"") -> Made:
+    """What the server made.
+
+    Args:
+        result: How a synthesis ended.
+        content: The supervisor's file; empty: there is none.
+
+    Raises:
+        UnsupportedModelError: The model is correct, but cannot be handled.
+        ServiceError: The server's supervisor is no valid one.
+    """
+    if result.status is SynthesisStatus.UNSUPPORTED_MODEL:
+        raise UnsupportedModelError(result.reason)
+    try:
+        supervisor = decode(content) if content else None
+    except InvalidSupervisorError as error:
+        raise ServiceError(f"the server's supervisor is refused: {error}") from error
+    return Made(
+        MadeStatus(str(result.status)),
+        supervisor,
+        result.diagnostics,
+        reason=visible(result.reason),
+        explanation=result.explanation,
+    )
+
+
+def graph_of(found: StateGraph, bundle: Bundle, deployment: Deployment) -> Graph:
+    """The server's graph of a model's robot.
+
+    Raises:
+        ServiceError: It is a graph of another robot.
+    """
+    model = _model(bundle)
+    columns = graph_columns(to_automata(model, deployment), model)
+    states = tuple(
+        GraphState(
+            components=_shown(state.components),
+            variables=tuple((visible(name), _shown_value(value)) for name, value in state.variables.items()),
+            communications=_shown(state.communications),
+            enabled=tuple(map(visible, state.enabled)),
+        )
+        for state in found.states
+    )
+    if any(len((*item.components, *item.variables, *item.communications)) != len(columns) for item in states):
+        raise malformed("the graph is of another robot")
+    transitions = tuple((source, visible(event), target) for source, event, target in found.transitions)
+    return Graph(model.name, found.initial, columns, states, transitions)
+
+
+def _shown(items: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
+    return tuple((visible(name), visible(text)) for name, text in items.items())
+
+
+def _shown_value(value: Value) -> Value:
+    return visible(value) if isinstance(value, str) else value
+
+
+class _State(msgspec.Struct):
+    """A state in a report."""
+
+    components: dict[str, str]
+    variables: dict[str, Value]
+    communications: dict[str, str]
+
+
+class _Fault(msgspec.Struct):
+    """A fault in a report."""
+
+    check: str
+    message: str
+    trace: list[str] | None = None
+    shortest: bool | None = None
+    state: _State | None = None
+
+
+class _Recheck(msgspec.Struct):
+    """A report about a supervisor that was given."""
+
+    status: Literal["passed", "failed", "not checked"]
+    model: str
+    deployment: str
+    checks: dict[str, Literal["passed", "failed", "not checked"]]
+    faults: list[_Fault]
+    remarks: list[str]
+    states: int | None
+    transitions: int | None
+    method: str | None
+    diagnostics: list[dict[str, Any]]
+
+
+def require_recheck(report: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A report, which is about a supervisor that was given.
+
+    Raises:
+        ServiceError: It is another one.
+    """
+    try:
+        document = msgspec.convert(report, type=_Recheck)
+    except msgspec.ValidationError as error:
+        raise malformed(f"the report is none: {error}") from error
+    if any(len({fault.trace is None, fault.shortest is None, fault.state is None}) > 1 for fault in document.faults):
+        raise malformed("the report is none: a fault without its run")
+    return report
+
+
+def verdicts_of(
+    report: Mapping[str, Any],
+    bundle: Bundle,
+    deployment: Deployment,
+    texts: Sequence[SourceFile],
+    listings: Sequence[SourceFile],
+) -> tuple[tuple[Verdict, ...], System, Model]:
+    """The server's verdicts about properties, and what they are about.
+
+    Args:
+        report: Its report.
+        bundle: The model and its libraries.
+        deployment: Where the supervisor stands.
+        texts: Properties, one each.
+        listings: Files of properties.
+
+    Raises:
+        ServiceError: They are of other properties, or of another robot.
+    """
+    model = _model(bundle)
+    system = to_automata(model, deployment)
+    properties = properties_of(model, texts, listings)
+    try:
+        entries = report["properties"]
+        if len(entries) != len(properties):
+            raise malformed("verdicts of other properties")
+        verdicts = tuple(_verdict(*pair, system, model) for pair in zip(entries, properties, strict=True))
+    except (LookupError, TypeError, ValueError, AttributeError, LanguageError) as error:
+        raise malformed(f"a verdict is none: {error}") from error
+    return verdicts, system, model
+
+
+def _verdict(entry: Any, claim: Property, system: System, model: Model) -> Verdict:
+    if entry["property"] != claim.text or (entry["name"] or "") != claim.name or not isinstance(entry["holds"], bool):
+        raise malformed("a verdict of another property")
+    run = entry["run"]
+    return Verdict(claim, entry["holds"], None if run is None else _run(run, system, model))
+
+
+def _run(entry: Any, system: System, model: Model) -> Run:
+    found = Run(
+        kind=RunKind(entry["kind"]),
+        states=tuple(_state(state, system, model) for state in entry["states"]),
+        events=tuple(event if event is None else visible(event) for event in entry["events"]),
+        loop=entry["loop"],
+        left=tuple(
+            Remainder(int(item["state"]), _formula(item["property"], model), bool(item["holds"]))
+            for item in entry["left"]
+        ),
+    )
+    is_whole = len(found.states) == len(found.events) + 1
+    if not is_whole or (found.loop is not None and found.loop not in range(len(found.states))):
+        raise malformed("a run that does not fit together")
+    return found
+
+
+def _state(entry: Any, system: System, model: Model) -> tuple[Value, ...]:
+    components = {component.name for component in model.components}
+
+    def value(subject: Subject) -> Value:
+        kind, _, name = subject.automaton.partition(" ")
+        if subject.variable is not None:
+            found = entry["variables"][str(subject)]
+        elif subject.automaton in components:
+            found = entry["components"][subject.automaton]
+        elif kind in ("service", "action"):
+            found = entry["communications"][name]
+        else:
+            # The plants of messages have one location only.
+            (found,) = subject_domain(system, subject)
+        if not isinstance(found, bool | int | float | str):
+            raise malformed("a value in a run is none")
+        return visible(found) if isinstance(found, str) else found
+
+    return tuple(map(value, subjects(system)))
+
+
+def _formula(text: Any, model: Model) -> Any:
+    (found,) = properties_of(model, [SourceFile("answer", str(text))], [])
+    return found.formula
+
+
+def _model(bundle: Bundle) -> Model:
+    """The model of texts for which the server has found one.
+
+    Raises:
+        ServiceError: There is none.
+    """
+    model = check(bundle).model
+    if model is None:
+        raise malformed("it is about a model that has errors")
+    return model

@@ -1,0 +1,234 @@
+"""Servers that a user reaches often, by name: `client.toml` in the user's folder for settings.
+
+The file is the user's own: what else stands in it, comments too, stays. Tokens are in files of their own, which only
+their owner may read.
+
+    default = "lab"
+
+    [profiles.lab]
+    server = "lab.example:50051"
+    ca = "/home/me/lab-ca.pem"
+    token_file = "/home/me/.config/robosc/tokens/lab"
+"""
+
+import os
+import re
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from robosc.cli.output import UsageError
+
+if TYPE_CHECKING:
+    from tomlkit import TOMLDocument
+
+MAXIMUM_BYTES = 64 * 1024
+"""Of the file; nobody has more servers."""
+
+MAXIMUM_TOKEN_BYTES = 4096
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}\Z")
+_ADDRESS = re.compile(r"(\[[0-9A-Fa-f:.%]+\]|[A-Za-z0-9._-]+):([0-9]{1,5})\Z")
+_PATHS = ("ca", "certificate", "key", "token_file")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Profile:
+    """How a server is reached.
+
+    Attributes:
+        server: HOST:PORT.
+        tls: With TLS, believing the usual certificate authorities; a CA or certificate implies TLS.
+        ca: Certificates (PEM) that are believed instead.
+        certificate: Own chain of certificates (PEM).
+        key: Its private key.
+        token_file: File with a token.
+    """
+
+    server: str
+    tls: bool = False
+    ca: Path | None = None
+    certificate: Path | None = None
+    key: Path | None = None
+    token_file: Path | None = None
+
+    def document(self) -> dict[str, Any]:
+        """As it stands in the file: without what is not set."""
+        paths = {name: str(getattr(self, name)) for name in _PATHS if getattr(self, name) is not None}
+        return {"server": self.server, **({"tls": True} if self.tls else {}), **paths}
+
+
+@dataclass(frozen=True, slots=True)
+class Profiles:
+    """All of them.
+
+    Attributes:
+        default: Name of the one that is used where none is named; None: there is none.
+        by_name: The profiles, in the order of the file.
+    """
+
+    default: str | None
+    by_name: dict[str, Profile]
+
+
+def is_address(text: str) -> bool:
+    """Whether a text is HOST:PORT."""
+    match = _ADDRESS.match(text)
+    return match is not None and 0 < int(match[2]) <= 65535
+
+
+def settings_folder() -> Path:
+    """The user's folder for settings (XDG Base Directory Specification 0.8: a relative path does not count)."""
+    chosen = Path(os.environ.get("XDG_CONFIG_HOME", ""))
+    try:
+        return (chosen if chosen.is_absolute() else Path.home() / ".config") / "robosc"
+    except RuntimeError as error:
+        raise UsageError("there is no home, so there are no profiles: use --server") from error
+
+
+def profiles_file() -> Path:
+    """Where the profiles stand."""
+    return settings_folder() / "client.toml"
+
+
+def read_profiles() -> Profiles:
+    """The user's profiles; none where there is no file.
+
+    Raises:
+        UsageError: The file cannot be read, or says what no profile is.
+    """
+    file = profiles_file()
+    text = _text(file)
+    try:
+        document = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise UsageError(f"{file}: {error}") from error
+    found = document.pop("profiles", {})
+    default = document.pop("default", None)
+    if document or not isinstance(found, dict) or not (default is None or isinstance(default, str)):
+        raise UsageError(f"{file}: only 'default' (a name) and tables [profiles.NAME] may stand in it")
+    by_name = {name: _profile(file, name, entry) for name, entry in found.items()}
+    if default is not None and default not in by_name:
+        raise UsageError(f"{file}: the default {default!r} is none of its profiles")
+    return Profiles(default, by_name)
+
+
+def add_profile(name: str, profile: Profile, *, token: str | None = None, is_default: bool, replaces: bool) -> None:
+    """Write a profile.
+
+    Args:
+        name: What it is called.
+        profile: What it says.
+        token: A token that is kept in a file of its own, which the profile then names; None: there is none to keep.
+        is_default: Whether it is the one that is used where none is named; the first one always is.
+        replaces: Whether one of that name may be there.
+
+    Raises:
+        UsageError: The name is none, or taken; or a file cannot be written.
+    """
+    if not _NAME.match(name):
+        raise UsageError(f"a profile's name has letters, digits, '.', '-' and '_', at most 64: not {name!r}")
+    known = read_profiles()
+    if name in known.by_name and not replaces:
+        raise UsageError(f"there is a profile {name!r}: --force replaces it")
+    entry = profile.document()
+    if token is not None:
+        entry["token_file"] = str(_token_file(name))
+        _write(_token_file(name), f"{token}\n")
+    document = _document()
+    document.setdefault("profiles", {})[name] = entry
+    if is_default or known.default is None:
+        document["default"] = name
+    _write(profiles_file(), document.as_string())
+
+
+def remove_profile(name: str) -> None:
+    """Remove a profile, and the token that was kept for it.
+
+    Raises:
+        UsageError: There is none of that name, or a file cannot be written.
+    """
+    known = read_profiles()
+    require_profile(known, name)
+    document = _document()
+    document["profiles"].remove(name)
+    if known.default == name:
+        document.remove("default")
+    _write(profiles_file(), document.as_string())
+    try:
+        _token_file(name).unlink(missing_ok=True)
+    except OSError as error:
+        raise UsageError(f"cannot remove {_token_file(name)}: {error.strerror}") from error
+
+
+def require_profile(known: Profiles, name: str) -> Profile:
+    """The profile of a name.
+
+    Raises:
+        UsageError: There is none.
+    """
+    if name not in known.by_name:
+        there = f"; there are {', '.join(known.by_name)}" if known.by_name else ""
+        raise UsageError(f"there is no profile {name!r}{there}")
+    return known.by_name[name]
+
+
+def _profile(file: Path, name: str, entry: Any) -> Profile:
+    def refused(why: str) -> UsageError:
+        return UsageError(f"{file}: profile {name!r}: {why}")
+
+    if not _NAME.match(name):
+        raise refused("its name has other characters than letters, digits, '.', '-' and '_', or too many")
+    if not isinstance(entry, dict) or not isinstance(entry.get("server"), str) or not is_address(entry["server"]):
+        raise refused("'server' must be HOST:PORT")
+    if not isinstance(entry.get("tls", False), bool):
+        raise refused("'tls' must be true or false")
+    for key, value in entry.items():
+        if key not in ("server", "tls", *_PATHS):
+            raise refused(f"unknown key {key!r}")
+        if key in _PATHS and (not isinstance(value, str) or not value or "\0" in value):
+            raise refused(f"{key!r} must be the name of a file")
+    # What is relative is so to the file, wherever the command is called.
+    paths = {key: file.parent / Path(entry[key]).expanduser() for key in _PATHS if key in entry}
+    return Profile(server=entry["server"], tls=entry.get("tls", False), **paths)
+
+
+def _token_file(name: str) -> Path:
+    return settings_folder() / "tokens" / name
+
+
+def _document() -> "TOMLDocument":
+    """The file as it stands, for changing it; it was read before."""
+    import tomlkit
+
+    return tomlkit.parse(_text(profiles_file()))
+
+
+def _text(file: Path) -> str:
+    try:
+        with file.open("rb") as stream:
+            content = stream.read(MAXIMUM_BYTES + 1)
+    except FileNotFoundError:
+        return ""
+    except OSError as error:
+        raise UsageError(f"cannot read {file}: {error.strerror or error}") from error
+    if len(content) > MAXIMUM_BYTES:
+        raise UsageError(f"{file}: more than {MAXIMUM_BYTES} bytes")
+    try:
+        return content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise UsageError(f"{file}: no UTF-8") from error
+
+
+def _write(file: Path, text: str) -> None:
+    """Write a file for its owner alone, whole or not at all."""
+    temporary = file.with_name(f".{file.name}.{os.getpid()}")
+    try:
+        file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        with os.fdopen(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as out:
+            out.write(text)
+        temporary.replace(file)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise UsageError(f"cannot write {file}: {error.strerror or error}") from error

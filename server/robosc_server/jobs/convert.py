@@ -1,0 +1,194 @@
+"""Between messages of the jobs' service and values."""
+
+import hashlib
+import struct
+from base64 import urlsafe_b64decode, urlsafe_b64encode
+from typing import Any
+
+from google.protobuf import timestamp_pb2
+
+from robosc_api.v1 import jobs_pb2 as pb
+from robosc_api.v1 import jobs_pb2_grpc, synthesis_pb2
+from robosc_server.failures import RefusedError, code_of
+from robosc_server.store import JobFilter, JobRecord, JobState
+from robosc_server.tasks.task import Reason, TaskKind
+
+JOB_SERVICE_NAME: str = pb.DESCRIPTOR.services_by_name["JobService"].full_name
+JOB_METHODS: tuple[str, ...] = tuple(method.name for method in pb.DESCRIPTOR.services_by_name["JobService"].methods)
+
+JobServiceServicer = jobs_pb2_grpc.JobServiceServicer
+add_servicer = jobs_pb2_grpc.add_JobServiceServicer_to_server
+
+MAXIMUM_LABEL = 200
+MAXIMUM_IDEMPOTENCY_KEY = 128
+MAXIMUM_PAGE = 1000
+_DEFAULT_PAGE = 100
+
+_STATES: dict[JobState, Any] = {state: pb.JobState.Value(f"JOB_STATE_{state.name}") for state in JobState}
+_KINDS: dict[TaskKind, Any] = {kind: pb.TaskKind.Value(f"TASK_KIND_{kind.name}") for kind in TaskKind}
+_STATE_OF = {number: state for state, number in _STATES.items()}
+_KIND_OF = {number: kind for kind, number in _KINDS.items()}
+_FIELD_OF = {kind: pb.GetJobResultResponse.DESCRIPTOR.fields_by_name[kind.value].number for kind in TaskKind}
+
+# Time of creation, id, and what the page was asked for: eight bytes of a digest, against mistakes.
+_TOKEN = struct.Struct(">Q16s8s")
+_TOKEN_CHARACTERS = 44
+_LENGTH_DELIMITED = 2
+
+
+def refusal(message: str) -> RefusedError:
+    """A request that is wrong."""
+    return RefusedError(Reason.MALFORMED_REQUEST, message)
+
+
+def kind_and_request(task: pb.Task) -> tuple[TaskKind, bytes]:
+    """What a task is, and its request, serialized.
+
+    Raises:
+        RefusedError: There is none.
+    """
+    name = task.WhichOneof("request")
+    if name is None:
+        raise refusal("a job needs a task")
+    return TaskKind(name), getattr(task, name).SerializeToString()
+
+
+def checked_idempotency_key(text: str) -> str:
+    """An idempotency key.
+
+    Raises:
+        RefusedError: It is none.
+    """
+    if len(text) > MAXIMUM_IDEMPOTENCY_KEY or not all(" " <= character <= "~" for character in text):
+        raise refusal(f"an idempotency key has 1 to {MAXIMUM_IDEMPOTENCY_KEY} printable ASCII characters")
+    return text
+
+
+def checked_label(text: str) -> str:
+    """A label.
+
+    Raises:
+        RefusedError: It is none.
+    """
+    if len(text) > MAXIMUM_LABEL or not text.isprintable():
+        raise refusal(f"a label has at most {MAXIMUM_LABEL} printable characters")
+    return text
+
+
+def retention_s_of(request: pb.SubmitJobRequest) -> float | None:
+    """For how long a job is to be kept; None: it is not said.
+
+    Raises:
+        RefusedError: It is no time.
+    """
+    if not request.HasField("retention"):
+        return None
+    retention_s = request.retention.seconds + request.retention.nanos / 1e9
+    if retention_s < 0 or not 0 <= request.retention.nanos < 1_000_000_000:
+        raise refusal("a retention is a time that is not negative")
+    return retention_s
+
+
+def filter_of(request: pb.ListJobsRequest, caller: str) -> JobFilter:
+    """Which jobs are asked for.
+
+    Raises:
+        RefusedError: There are no such states or kinds.
+    """
+    if any(number not in _STATE_OF for number in request.states):
+        raise refusal("there is no such state of a job")
+    if request.kind and request.kind not in _KIND_OF:
+        raise refusal("there is no such kind of task")
+    states = frozenset(_STATE_OF[number] for number in request.states)
+    return JobFilter(None if request.all_owners else caller, states, _KIND_OF.get(request.kind))
+
+
+def page_size_of(request: pb.ListJobsRequest) -> int:
+    """How many jobs are asked for."""
+    return min(request.page_size or _DEFAULT_PAGE, MAXIMUM_PAGE)
+
+
+def page_token(last: JobRecord, chosen: JobFilter) -> str:
+    """What asks for the jobs that follow one."""
+    return urlsafe_b64encode(_TOKEN.pack(last.created_us, bytes.fromhex(last.id), _digest(chosen))).decode()
+
+
+def place_of(token: str, chosen: JobFilter) -> tuple[int, str] | None:
+    """Time of creation and id of the job that a page follows; None: it is the first.
+
+    Raises:
+        RefusedError: The token is none, or one for other jobs.
+    """
+    if not token:
+        return None
+    try:
+        if len(token) != _TOKEN_CHARACTERS:
+            raise ValueError
+        created_us, job_id, digest = _TOKEN.unpack(urlsafe_b64decode(token.encode("ascii")))
+    except (ValueError, struct.error) as error:
+        raise refusal("this is no page token of this server") from error
+    if digest != _digest(chosen) or created_us >= 2**63:
+        raise refusal("this page token is for another list: the other fields must be those of the page before")
+    return created_us, job_id.hex()
+
+
+def _digest(chosen: JobFilter) -> bytes:
+    text = repr((chosen.owner, sorted(chosen.states), chosen.kind))
+    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).digest()[:8]
+
+
+def job_of(record: JobRecord, waiting_before: int) -> pb.Job:
+    """A job as a message."""
+    job = pb.Job(
+        id=record.id,
+        owner=record.owner,
+        kind=_KINDS[record.kind],
+        state=_STATES[record.state],
+        revision=record.revision,
+        main_file=record.main_file,
+        label=record.label,
+        create_time=_timestamp(record.created_us),
+        start_time=_timestamp(record.started_us),
+        end_time=_timestamp(record.ended_us),
+        expire_time=_timestamp(record.expires_us),
+        attempts=record.attempts,
+        from_store=record.is_from_store,
+        waiting_before=waiting_before,
+    )
+    if record.progress is not None:
+        job.progress.CopyFrom(synthesis_pb2.Progress(stage=record.progress.stage, message=record.progress.message))
+    if record.failure is not None:
+        code: int = code_of(record.failure.reason).value[0]
+        job.failure.CopyFrom(pb.Failure(code=code, reason=record.failure.reason, message=record.failure.message))
+    return job
+
+
+def _timestamp(time_us: int | None) -> timestamp_pb2.Timestamp | None:
+    if time_us is None:
+        return None
+    stamp = timestamp_pb2.Timestamp()
+    stamp.FromMicroseconds(time_us)
+    return stamp
+
+
+def result_response(kind: TaskKind, message: bytes) -> bytes:
+    """A GetJobResultResponse, serialized, around a message that is: nothing of it is parsed.
+
+    Its field is written as the encoding of Protocol Buffers has it: a tag of number and wire type, the length, the
+    bytes (protobuf.dev: Encoding, "Length-Delimited Records").
+    """
+    return _varint(_FIELD_OF[kind] << 3 | _LENGTH_DELIMITED) + _varint(len(message)) + message
+
+
+def _varint(number: int) -> bytes:
+    found = bytearray()
+    while number > 0x7F:
+        found.append(number & 0x7F | 0x80)
+        number >>= 7
+    found.append(number)
+    return bytes(found)
+
+
+def serialized(message: Any) -> bytes:
+    """The bytes of a message, or bytes that are serialized already."""
+    return message if isinstance(message, bytes) else message.SerializeToString()

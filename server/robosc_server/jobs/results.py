@@ -1,0 +1,152 @@
+"""Results by the content that they were made from: in memory, and in the database."""
+
+import asyncio
+import contextlib
+import logging
+from collections import OrderedDict
+from types import TracebackType
+from typing import Self
+
+from robosc_server.store import Store, StoreUnavailableError
+from robosc_server.tasks.task import Result, TaskKind
+
+_log = logging.getLogger(__name__)
+
+_OVERHEAD_BYTES = 500
+_UNWRITTEN_BYTES = 128 * 2**20
+_TOUCHED = 10_000
+_TOUCH_S = 30.0
+
+
+class Results:
+    """What was worked out before. Without the database it goes on with what it has in memory.
+
+    Inside the context, what is kept is written to the database beside; outside, it stays in memory.
+
+    Args:
+        store: The database.
+        memory_bytes: How much is kept in memory, those that were asked for last.
+    """
+
+    def __init__(self, store: Store, memory_bytes: int) -> None:
+        self._store, self._memory_bytes = store, memory_bytes
+        self._memory: OrderedDict[str, Result] = OrderedDict()
+        self._taken_bytes = 0
+        self._unwritten: OrderedDict[str, tuple[TaskKind, Result]] = OrderedDict()
+        self._unwritten_bytes = 0
+        self._has_unwritten = asyncio.Event()
+        self._touched: set[str] = set()
+        self._tasks: list[asyncio.Task[None]] = []
+        self.hits = 0
+        self.misses = 0
+
+    async def __aenter__(self) -> Self:
+        self._tasks = [asyncio.create_task(self._write()), asyncio.create_task(self._touch())]
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        self._tasks = []
+        # A last try: what was made shortly before the end is there after the next start.
+        with contextlib.suppress(StoreUnavailableError):
+            while self._unwritten:
+                await self._write_one()
+
+    def at_hand(self, key: str) -> Result | None:
+        """A result that is in memory."""
+        found = self._memory.get(key)
+        if found is not None:
+            self._memory.move_to_end(key)
+            self._note_use(key)
+            self.hits += 1
+        return found
+
+    async def find(self, key: str) -> Result | None:
+        """A result that is known; None also if the database cannot be asked."""
+        found = self.at_hand(key)
+        if found is not None:
+            return found
+        unwritten = self._unwritten.get(key)
+        if unwritten is not None:
+            self.hits += 1
+            return unwritten[1]
+        with contextlib.suppress(StoreUnavailableError):
+            found = await self._store.find_result(key)
+        if found is None:
+            self.misses += 1
+            return None
+        self.hits += 1
+        self._note_use(key)
+        self.remember(key, found)
+        return found
+
+    def keep(self, key: str, kind: TaskKind, result: Result) -> None:
+        """Keep a result in memory, and before long in the database, unless too much waits to be written there."""
+        self.remember(key, result)
+        size = _size_of(result)
+        if key not in self._unwritten and self._unwritten_bytes + size <= _UNWRITTEN_BYTES:
+            self._unwritten[key] = kind, result
+            self._unwritten_bytes += size
+            self._has_unwritten.set()
+
+    def remember(self, key: str, result: Result) -> None:
+        """Keep a result in memory alone."""
+        size = _size_of(result)
+        if key in self._memory or size > self._memory_bytes:
+            return
+        self._memory[key] = result
+        self._taken_bytes += size
+        while self._taken_bytes > self._memory_bytes:
+            self._taken_bytes -= _size_of(self._memory.popitem(last=False)[1])
+
+    def _note_use(self, key: str) -> None:
+        if len(self._touched) < _TOUCHED:
+            self._touched.add(key)
+
+    async def _write(self) -> None:
+        """Write what is kept, one after the other."""
+        while True:
+            await self._has_unwritten.wait()
+            try:
+                await self._write_one()
+            except StoreUnavailableError as error:
+                await asyncio.sleep(error.retry_after_s or 1.0)
+            except Exception:
+                _log.exception("a result cannot be kept")
+                await asyncio.sleep(1.0)
+
+    async def _write_one(self) -> None:
+        key, (kind, result) = next(iter(self._unwritten.items()))
+        try:
+            await self._store.keep_result(key, kind, result)
+        except StoreUnavailableError:
+            # Another one has its turn first: this one may be what does not fit.
+            self._unwritten.move_to_end(key)
+            raise
+        except Exception:
+            self._forget(key, result)
+            raise
+        self._forget(key, result)
+
+    def _forget(self, key: str, result: Result) -> None:
+        del self._unwritten[key]
+        self._unwritten_bytes -= _size_of(result)
+        if not self._unwritten:
+            self._has_unwritten.clear()
+
+    async def _touch(self) -> None:
+        """Tell the database now and then what was asked for."""
+        while True:
+            await asyncio.sleep(_TOUCH_S)
+            touched, self._touched = self._touched, set()
+            if touched:
+                with contextlib.suppress(StoreUnavailableError):
+                    await self._store.touch(touched)
+
+
+def _size_of(result: Result) -> int:
+    return _OVERHEAD_BYTES + sum(len(message) + 50 for message in result.messages)

@@ -1,0 +1,74 @@
+"""Who watches which job: whoever waits costs nothing until there is something to tell."""
+
+import asyncio
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from robosc_server.store import JobRecord
+
+
+class Watch:
+    """One watcher of one job: holds the newest that it was told, and drops what was between.
+
+    Attributes:
+        revision: The one that it knows; set by whoever uses it.
+    """
+
+    __slots__ = ("_news", "_record", "revision")
+
+    def __init__(self) -> None:
+        self.revision = 0
+        self._record: JobRecord | None = None
+        self._news = asyncio.Event()
+
+    def tell(self, record: JobRecord) -> None:
+        """Give it a job as it is now."""
+        if self._record is None or record.revision > self._record.revision:
+            self._record = record
+            self._news.set()
+
+    def wake(self) -> None:
+        """Have it look up, though nothing has changed."""
+        self._news.set()
+
+    async def news(self) -> JobRecord | None:
+        """What it was told since it asked last, once there is something; None: it was woken."""
+        await self._news.wait()
+        self._news.clear()
+        record, self._record = self._record, None
+        return record
+
+
+class Watchers:
+    """All watchers."""
+
+    def __init__(self) -> None:
+        self._by_job: dict[str, set[Watch]] = {}
+
+    @contextmanager
+    def watch(self, job_id: str) -> Iterator[Watch]:
+        """Watch a job; what changes from now on is not missed."""
+        watch = Watch()
+        self._by_job.setdefault(job_id, set()).add(watch)
+        try:
+            yield watch
+        finally:
+            watches = self._by_job[job_id]
+            watches.discard(watch)
+            if not watches:
+                del self._by_job[job_id]
+
+    def tell(self, record: JobRecord) -> None:
+        """Tell all watchers of a job how it is now."""
+        for watch in self._by_job.get(record.id, ()):
+            watch.tell(record)
+
+    def wake(self) -> None:
+        """Have everybody look up."""
+        for watches in self._by_job.values():
+            for watch in watches:
+                watch.wake()
+
+    def revisions(self) -> dict[str, int]:
+        """The watched jobs, and what the one of their watchers knows that knows least."""
+        return {job_id: min(watch.revision for watch in watches) for job_id, watches in self._by_job.items() if watches}

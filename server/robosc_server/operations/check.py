@@ -1,0 +1,269 @@
+"""Whether a server could start with such settings: everything that can be known without starting it.
+
+Nothing is made or changed. What another process holds now, such as the server that runs with the same settings, is a
+warning.
+"""
+
+import contextlib
+import datetime
+import errno
+import importlib.util
+import os
+import socket
+import sqlite3
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from robosc_api.security import Scope, SecurityError, TokenFile, check_files, check_listening, is_loopback_host
+from robosc_api.security.addresses import split
+from robosc_api.security.listening import read
+from robosc_server.operations.metrics import check_metrics_address
+from robosc_server.operations.settings import Settings, shown
+from robosc_server.signing import SigningError, read_signing_key
+
+_CONNECT_S = 5.0
+_SOON_DAYS = 14
+
+
+class Grade(StrEnum):
+    """How grave a finding is."""
+
+    OK = "ok"
+    WARNING = "warning"
+    ERROR = "error"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What was found about one part.
+
+    Attributes:
+        part: Which.
+        grade: How grave it is; with an error a server does not start, or cannot work.
+        message: One sentence, without a secret.
+    """
+
+    part: str
+    grade: Grade
+    message: str
+
+
+def check_settings(settings: Settings) -> tuple[Finding, ...]:
+    """What is found about every part of the settings, in the order in which a server comes to them."""
+    parts: dict[str, Callable[[Settings], Iterator[tuple[Grade, str]]]] = {
+        "listening": _listening,
+        "certificates": _certificates,
+        "tokens": _tokens,
+        "signing": _signing,
+        "database": _database,
+        "workers": _workers,
+        "metrics": _metrics,
+        "tracing": _tracing,
+    }
+    return tuple(Finding(part, grade, message) for part, look in parts.items() for grade, message in look(settings))
+
+
+def _listening(settings: Settings) -> Iterator[tuple[Grade, str]]:
+    try:
+        check_listening(settings.address, settings.security)
+    except (SecurityError, ValueError) as error:
+        yield Grade.ERROR, str(error)
+        return
+    yield _bindable(settings.host, settings.port)
+    security = settings.security
+    if security.tokens is None and security.client_ca is None and not is_loopback_host(settings.host):
+        yield Grade.WARNING, "whoever reaches the address may use the server: there are neither tokens nor a client_ca"
+
+
+def _bindable(host: str, port: int) -> tuple[Grade, str]:
+    """Whether somebody could listen there now."""
+    try:
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+    except (OSError, UnicodeError) as error:
+        return Grade.ERROR, f"{host}: {getattr(error, 'strerror', None) or 'no such name'}"
+    family, kind, protocol, _, address = found[0]
+    with contextlib.closing(socket.socket(family, kind, protocol)) as place:
+        place.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            place.bind(address)
+        except OSError as error:
+            if error.errno == errno.EADDRINUSE:
+                return Grade.WARNING, f"{host}, port {port} is in use now"
+            return Grade.ERROR, f"cannot listen on {host}, port {port}: {error.strerror}"
+    return Grade.OK, f"{host}, port {port or 'any that is free'}"
+
+
+def _certificates(settings: Settings) -> Iterator[tuple[Grade, str]]:
+    security = settings.security
+    if security.certificate is None or security.key is None:
+        yield Grade.OK, "no TLS"
+        return
+    try:
+        check_files(settings.model_copy(update={"tokens": None}).security)
+    except SecurityError as error:
+        yield Grade.ERROR, str(error)
+        return
+    for file in (security.certificate, security.client_ca):
+        if file is not None:
+            yield _valid(file)
+
+
+def _valid(file: Path) -> tuple[Grade, str]:
+    """Whether the certificates of a file are valid today."""
+    if importlib.util.find_spec("cryptography") is None:
+        return Grade.OK, f"{file}: can be used; until when cannot be told without the extra `signing`"
+    from cryptography import x509
+
+    try:
+        certificates = x509.load_pem_x509_certificates(read(file))
+    except ValueError as error:
+        return Grade.ERROR, f"{file}: {error}"
+    now = datetime.datetime.now(datetime.UTC)
+    begins = max(certificate.not_valid_before_utc for certificate in certificates)
+    ends = min(certificate.not_valid_after_utc for certificate in certificates)
+    if begins > now:
+        return Grade.ERROR, f"{file}: is valid from {begins:%Y-%m-%d %H:%M} UTC on"
+    if ends <= now:
+        return Grade.ERROR, f"{file}: has expired at {ends:%Y-%m-%d %H:%M} UTC"
+    grade = Grade.WARNING if ends - now < datetime.timedelta(days=_SOON_DAYS) else Grade.OK
+    return grade, f"{file}: valid until {ends:%Y-%m-%d %H:%M} UTC"
+
+
+def _tokens(settings: Settings) -> Iterator[tuple[Grade, str]]:
+    if settings.tokens is None:
+        yield Grade.OK, "callers need none"
+        return
+    try:
+        entries = TokenFile(settings.tokens).entries
+    except SecurityError as error:
+        yield Grade.ERROR, str(error)
+        return
+    useful = [entry for entry in entries if Scope.SYNTHESIZE in entry.scopes]
+    if not useful:
+        yield Grade.WARNING, f"{settings.tokens}: no token has the scope '{Scope.SYNTHESIZE}', so nobody is let in"
+    else:
+        yield Grade.OK, f"{settings.tokens}: {len(useful)} with the scope '{Scope.SYNTHESIZE}'"
+
+
+def _signing(settings: Settings) -> Iterator[tuple[Grade, str]]:
+    if settings.signing_key is None:
+        yield Grade.OK, "supervisors are not signed"
+        return
+    try:
+        read_signing_key(settings.signing_key)
+    except SigningError as error:
+        yield Grade.ERROR, str(error)
+    else:
+        yield Grade.OK, f"{settings.signing_key}"
+
+
+def _database(settings: Settings) -> Iterator[tuple[Grade, str]]:
+    if settings.database_url is not None:
+        yield _postgresql(settings.database_url)
+    else:
+        yield _folder(settings.state_dir.absolute())
+
+
+def _postgresql(text: str) -> tuple[Grade, str]:
+    from sqlalchemy import create_engine, make_url
+    from sqlalchemy import text as statement
+    from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
+
+    try:
+        url = make_url(text).set(drivername="postgresql+psycopg")
+        engine = create_engine(url, connect_args={"connect_timeout": round(_CONNECT_S)}, hide_parameters=True)
+    except (ArgumentError, ValueError):
+        return Grade.ERROR, "database_url: postgresql://USER:PASSWORD@HOST:PORT/NAME is needed"
+    except (ImportError, NoSuchModuleError):
+        return Grade.ERROR, "PostgreSQL needs the extra `postgresql`: pip install 'robosc[postgresql]'"
+    name = url.render_as_string(hide_password=True)
+    try:
+        with engine.connect() as connection:
+            version = connection.scalar(statement("SHOW server_version"))
+    except DBAPIError as error:
+        return Grade.ERROR, f"{name}: {' '.join(str(error.orig).split())}"
+    finally:
+        engine.dispose()
+    return Grade.OK, f"{name}: PostgreSQL {version}"
+
+
+def _folder(folder: Path) -> tuple[Grade, str]:
+    """Whether the state folder can be used, or made."""
+    there = next(place for place in (folder, *folder.parents) if place.exists())
+    if not there.is_dir():
+        return Grade.ERROR, f"{there} is no folder"
+    if not os.access(there, os.W_OK | os.X_OK):
+        return Grade.ERROR, f"{there} cannot be written"
+    if there != folder:
+        return Grade.OK, f"{folder} will be made"
+    for file in sorted(folder.glob("*.sqlite3")):
+        try:
+            with contextlib.closing(sqlite3.connect(f"{file.as_uri()}?mode=ro", uri=True, timeout=1.0)) as connection:
+                connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        except sqlite3.Error as error:
+            return Grade.ERROR, f"{file}: {error}"
+    return Grade.OK, f"SQLite in {folder}"
+
+
+def _workers(settings: Settings) -> Iterator[tuple[Grade, str]]:
+    if settings.workers != "local":
+        yield _cluster(settings.workers)
+        return
+    wanted = settings.worker_processes * settings.task_memory_bytes
+    there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if wanted > there:
+        yield (
+            Grade.WARNING,
+            f"{settings.worker_processes} processes of {shown('task_memory_bytes', settings.task_memory_bytes)} may "
+            "together want more memory than this machine has",
+        )
+    else:
+        yield Grade.OK, f"{settings.worker_processes} local processes"
+
+
+def _cluster(spec: str) -> tuple[Grade, str]:
+    if importlib.util.find_spec("distributed") is None:
+        return Grade.ERROR, "a Dask cluster needs the extra `dask`: pip install 'robosc[dask]'"
+    address = spec.partition("://")[2]
+    error = _unreachable(address)
+    return (Grade.OK, f"{address} answers") if error is None else (Grade.ERROR, error)
+
+
+def _unreachable(address: str) -> str | None:
+    """Why nobody takes a connection there; None: somebody does."""
+    try:
+        socket.create_connection(split(address), timeout=_CONNECT_S).close()
+    except (OSError, UnicodeError) as error:
+        return f"{address}: {getattr(error, 'strerror', None) or error}"
+    return None
+
+
+def _metrics(settings: Settings) -> Iterator[tuple[Grade, str]]:
+    if settings.metrics_address is None:
+        yield Grade.OK, "nowhere"
+        return
+    try:
+        check_metrics_address(settings.metrics_address, beyond_loopback=settings.metrics_beyond_loopback)
+    except SecurityError as error:
+        yield Grade.ERROR, str(error)
+        return
+    yield _bindable(*split(settings.metrics_address))
+
+
+def _tracing(settings: Settings) -> Iterator[tuple[Grade, str]]:
+    endpoint = settings.tracing_endpoint
+    if endpoint is None:
+        yield Grade.OK, "nowhere"
+        return
+    try:
+        is_there = importlib.util.find_spec("opentelemetry.exporter.otlp.proto.grpc") is not None
+    except ImportError:
+        is_there = False
+    if not is_there:
+        yield Grade.ERROR, "traces need the extra `tracing`: pip install 'robosc[tracing]'"
+        return
+    error = _unreachable(endpoint.partition("://")[2].rstrip("/"))
+    # A server works without who takes its traces.
+    yield (Grade.OK, endpoint) if error is None else (Grade.WARNING, error)

@@ -1,0 +1,146 @@
+"""Commands beside serving: `robosc-server token`, `check-config` and `example-config`."""
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from robosc_api.security import Scope, SecurityError, add_token_arguments, written_token
+from robosc_server.operations.check import Finding, Grade, check_settings
+from robosc_server.operations.example import example_file
+from robosc_server.operations.settings import (
+    Settings,
+    SettingsError,
+    add_settings_arguments,
+    config_file_of,
+    default_text,
+    settings_of,
+    shown,
+    source_of,
+)
+
+_CHECK_EPILOG = """\
+exit status:
+  0  a server could start (there may be warnings)
+  1  it could not
+  2  wrong use, or wrong settings
+"""
+
+
+def run_command(words: Sequence[str]) -> int | None:
+    """Do what a command line says that begins with a command.
+
+    Args:
+        words: After the program's name.
+
+    Returns:
+        The exit status; None: it begins with no command, and so means to serve.
+    """
+    commands: dict[str, Callable[[Sequence[str]], int]] = {
+        "token": new_token,
+        "check-config": check_config,
+        "example-config": print_example,
+    }
+    command = commands.get(words[0]) if words else None
+    return None if command is None else command(words[1:])
+
+
+def new_token(argv: Sequence[str]) -> int:
+    """Print a new token, and to standard error the line for the file of tokens; the exit status."""
+    parser = argparse.ArgumentParser(
+        prog="robosc-server token", description="Make a token for a caller.", allow_abbrev=False
+    )
+    add_token_arguments(parser, (Scope.SYNTHESIZE,), has_quotas=True)
+    try:
+        token, line = written_token(parser.parse_args(argv))
+    except SecurityError as error:
+        sys.stderr.write(f"robosc-server: {error}\n")
+        return 2
+    sys.stdout.write(token)
+    sys.stderr.write(line)
+    return 0
+
+
+def print_example(argv: Sequence[str]) -> int:
+    """Print a file with every setting; the exit status."""
+    parser = argparse.ArgumentParser(
+        prog="robosc-server example-config",
+        description="Print a file of settings: each with what it is and its default, as a comment.",
+        allow_abbrev=False,
+    )
+    parser.parse_args(argv)
+    sys.stdout.write(example_file())
+    return 0
+
+
+def check_config(argv: Sequence[str]) -> int:
+    """Print whether a server could start with such settings; the exit status."""
+    parser = argparse.ArgumentParser(
+        prog="robosc-server check-config",
+        description="Look whether a server could start with such settings: address, certificates, tokens, database, "
+        "workers. Nothing is started, made or changed.",
+        epilog=_CHECK_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("--json", action="store_true", help="one JSON document: ok, settings, findings, problems")
+    add_settings_arguments(parser)
+    arguments = parser.parse_args(argv)
+    try:
+        settings = settings_of(arguments)
+    except SettingsError as error:
+        if arguments.json:
+            _print_json({"ok": False, "settings": {}, "findings": [], "problems": list(error.problems)})
+        else:
+            for problem in error.problems:
+                sys.stderr.write(f"robosc-server: {problem}\n")
+        return 2
+    findings = check_settings(settings)
+    is_ok = all(finding.grade is not Grade.ERROR for finding in findings)
+    if arguments.json:
+        _print_json(
+            {
+                "ok": is_ok,
+                "settings": _settings_document(settings, arguments),
+                "findings": [
+                    {"part": finding.part, "grade": finding.grade, "message": finding.message} for finding in findings
+                ],
+                "problems": [],
+            }
+        )
+    else:
+        sys.stdout.write("".join(map(_line, findings)))
+    return 0 if is_ok else 1
+
+
+def _line(finding: Finding) -> str:
+    return f"{finding.grade:<8} {finding.part}: {finding.message}\n"
+
+
+def _settings_document(settings: Settings, arguments: argparse.Namespace) -> dict[str, Any]:
+    """Each setting's value, and where it comes from."""
+    document = {}
+    config = config_file_of(arguments)
+    for name in Settings.model_fields:
+        value = getattr(settings, name)
+        is_set = name in settings.model_fields_set
+        document[name] = {
+            "value": _plain(name, value),
+            "source": source_of(name, vars(arguments), config) if is_set else "default",
+            "default": default_text(name),
+        }
+    return document
+
+
+def _plain(name: str, value: Any) -> Any:
+    if value is None or isinstance(value, bool | int | float):
+        return value
+    # It may hold a password.
+    return "set, not shown" if name == "database_url" else shown(name, value)
+
+
+def _print_json(document: dict[str, Any]) -> None:
+    json.dump(document, sys.stdout, indent=2)
+    sys.stdout.write(os.linesep)

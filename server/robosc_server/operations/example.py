@@ -1,0 +1,73 @@
+"""A file of settings with every one of them, its words and its default, each a comment."""
+
+import json
+import textwrap
+from typing import Any
+
+from pydantic_core import PydanticUndefined
+
+from robosc_server.operations.settings import Settings, default_text, flag_of, group_of, shown, variable_of, words_of
+
+_WIDTH = 100
+
+_EXAMPLES = {
+    "tls_certificate": "/etc/robosc/server.crt",
+    "tls_key": "/etc/robosc/server.key",
+    "client_ca": "/etc/robosc/callers.pem",
+    "tokens": "/etc/robosc/tokens",
+    "signing_key": "/etc/robosc/signing.key",
+    "worker_processes": 4,
+    "state_dir": "/var/lib/robosc-server",
+    "database_url": "postgresql://robosc:PASSWORD@localhost:5432/robosc",
+    "metrics_address": "127.0.0.1:9464",
+    "tracing_endpoint": "http://127.0.0.1:4317",
+}
+
+
+def example_file() -> str:
+    """The file, in TOML."""
+    lines = [
+        "# Settings of robosc-server. Flags (--state-dir) and the environment (ROBOSC_SERVER_STATE_DIR) go before this",
+        "# file, which is given with --config or ROBOSC_SERVER_CONFIG. Paths that are not absolute begin where the",
+        "# server was started.",
+    ]
+    group = ""
+    for name in Settings.model_fields:
+        if group_of(name) != group:
+            group = group_of(name)
+            lines += ["", f"## {group}"]
+        words = f"{words_of(name)} (default: {default_text(name)})"
+        lines += ["", *textwrap.wrap(words, _WIDTH, initial_indent="# ", subsequent_indent="# ")]
+        lines.append(f"#{name} = {_literal(name)}")
+    return "\n".join(lines) + "\n"
+
+
+def _literal(name: str) -> str:
+    default = Settings.model_fields[name].default
+    value: Any = _EXAMPLES.get(name) if default is None or default is PydanticUndefined else default
+    text = shown(name, value)
+    is_number = (isinstance(value, bool | int | float) and text.lower() in ("true", "false")) or _is_number(text)
+    return text if is_number else json.dumps(text)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def settings_table() -> str:
+    """The settings as the manual has them: a table in Markdown for each group."""
+    parts = []
+    for group in dict.fromkeys(map(group_of, Settings.model_fields)):
+        rows = ["| flag | file | environment | what it is | default |", "|---|---|---|---|---|"]
+        for name in Settings.model_fields:
+            if group_of(name) == group:
+                cells = (f"`{flag_of(name)}`", f"`{name}`", f"`{variable_of(name)}`", words_of(name))
+                rows.append(
+                    f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} | {default_text(name)} |"
+                )
+        parts.append(f"### {group[0].upper()}{group[1:]}\n\n" + "\n".join(rows) + "\n")
+    return "\n".join(parts)

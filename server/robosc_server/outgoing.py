@@ -1,0 +1,69 @@
+"""Results on their way to those who asked: how much of them may wait to be read.
+
+A message that was given to gRPC stays in memory until its caller has read it, or its connection is gone. Who asks for
+large results and reads none of them would fill the server's memory without this.
+"""
+
+from collections import Counter
+from typing import Any
+
+from robosc_api.security import caller_of
+from robosc_server.failures import RefusedError
+from robosc_server.tasks.task import Reason
+
+SMALL_BYTES = 64 * 1024
+"""Results up to this size are not counted: as many of them as calls can be under way."""
+
+_RETRY_S = 5.0
+
+
+class Outgoing:
+    """Sends results, and counts those that are not read yet.
+
+    Args:
+        per_caller_bytes: Of one caller's results; one alone may be larger.
+        bytes_in_all: Of all results; one alone may be larger.
+    """
+
+    def __init__(self, per_caller_bytes: int, bytes_in_all: int) -> None:
+        self._per_caller_bytes = per_caller_bytes
+        self._bytes_in_all = bytes_in_all
+        self._unread: Counter[str] = Counter()
+
+    @property
+    def unread_bytes(self) -> int:
+        """Bytes of the results that are on their way."""
+        return self._unread.total()
+
+    async def send(self, context: Any, messages: tuple[bytes, ...]) -> None:
+        """Send the messages of a result as fast as they are read.
+
+        Args:
+            context: Of the call (of grpc.aio), whose responses are bytes.
+            messages: Each serialized.
+
+        Raises:
+            RefusedError: Too much that was sent before is not read yet.
+        """
+        size = sum(map(len, messages))
+        if size > SMALL_BYTES:
+            self._count(context, size)
+        for message in messages:
+            await context.write(message)
+
+    def _count(self, context: Any, size: int) -> None:
+        caller = caller_of(context)
+        unread = self._unread[caller]
+        if unread and unread + size > self._per_caller_bytes:
+            raise RefusedError(Reason.SERVER_BUSY, "results that were sent before are to be read first", _RETRY_S)
+        if self._unread and self.unread_bytes + size > self._bytes_in_all:
+            raise RefusedError(Reason.SERVER_BUSY, "too many results wait to be read by others", _RETRY_S)
+        self._unread[caller] += size
+
+        def forget(_: Any) -> None:
+            self._unread[caller] -= size
+            if not self._unread[caller]:
+                del self._unread[caller]
+
+        # When the call has ended for gRPC, too: a handler that has ended has only handed its messages over.
+        context.add_done_callback(forget)

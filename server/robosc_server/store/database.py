@@ -1,0 +1,221 @@
+"""A database that is used from the event loop: transactions in a few threads, bounded in number and time.
+
+A transaction that does not answer in time is given up: its connection is cut off from beside, so that its thread is
+free again, and whoever waits is told at once that the database is unavailable. Where connecting itself takes long (a
+host that is gone), calls are refused without another try for a moment.
+"""
+
+import asyncio
+import contextlib
+import logging
+import os
+import socket
+import sqlite3
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+from sqlalchemy import Connection, Engine
+from sqlalchemy.exc import DataError, DBAPIError, IntegrityError, ProgrammingError
+from sqlalchemy.exc import TimeoutError as PoolTimeoutError
+
+from robosc_server.store.errors import StoreUnavailableError
+
+_log = logging.getLogger(__name__)
+
+_PENDING = 2048
+"""Transactions that may wait for a thread."""
+
+_TRIES = 3
+"""Of a change that meets another one of the same rows."""
+
+_PAUSE_S = 0.5
+"""After a connection has failed: for how long nothing is tried."""
+
+_FAULTS_OF_OURS = (IntegrityError, ProgrammingError, DataError)
+_COLLISIONS = frozenset({"40001", "40P01"})  # serialization_failure, deadlock_detected
+
+
+class _Transaction[T]:
+    """One unit of work, which another thread may cut off.
+
+    Args:
+        engine: Of the database.
+        work: What is done; it may be done again after a collision.
+        is_write: Whether it changes anything.
+    """
+
+    def __init__(self, engine: Engine, work: Callable[[Connection], T], *, is_write: bool) -> None:
+        self._engine, self._work, self._is_write = engine, work, is_write
+        self._lock = threading.Lock()
+        self._driver_connection: Any = None
+        self._is_abandoned = False
+
+    def run(self) -> T:
+        """What the work gives back; called in a thread.
+
+        Raises:
+            DBAPIError: As the database says.
+            PoolTimeoutError: There is no connection to be had.
+        """
+        for tries_left in reversed(range(_TRIES)):
+            try:
+                return self._run_once()
+            except DBAPIError as error:
+                if self._is_abandoned or not tries_left or not _is_collision(error):
+                    raise
+        raise AssertionError("unreachable: the last try returns or raises")
+
+    def abandon(self) -> None:
+        """Cut it off, if it is under way; called in any thread."""
+        with self._lock:
+            self._is_abandoned = True
+            if self._driver_connection is not None:
+                _cut_off(self._driver_connection)
+
+    def _run_once(self) -> T:
+        if self._is_abandoned:
+            raise PoolTimeoutError
+        with self._engine.connect() as connection:
+            connection = connection.execution_options(robosc_write=self._is_write)
+            with self._lock:
+                self._driver_connection = connection.connection.driver_connection
+            try:
+                with connection.begin():
+                    return self._work(connection)
+            finally:
+                with self._lock:
+                    self._driver_connection = None
+
+
+def _cut_off(driver_connection: Any) -> None:
+    if isinstance(driver_connection, sqlite3.Connection):
+        driver_connection.interrupt()
+        return
+    with contextlib.suppress(Exception):  # It may be closing this moment.
+        duplicate = socket.socket(fileno=os.dup(driver_connection.fileno()))
+        try:
+            duplicate.shutdown(socket.SHUT_RDWR)
+        finally:
+            duplicate.close()
+
+
+def _is_collision(error: DBAPIError) -> bool:
+    return isinstance(error, IntegrityError) or getattr(error.orig, "sqlstate", None) in _COLLISIONS
+
+
+class Database:
+    """An engine, and threads for it.
+
+    Args:
+        engine: Of the database; `close` disposes of it.
+        readers: Threads for what only reads.
+        writers: Threads for what changes something.
+        answer_s: Longest time that anybody waits for a transaction.
+        clock: Seconds of a monotonic clock.
+    """
+
+    def __init__(
+        self,
+        engine: Engine,
+        *,
+        readers: int,
+        writers: int,
+        answer_s: float = 8.0,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._engine = engine
+        self._readers = ThreadPoolExecutor(readers, thread_name_prefix="store-reader")
+        self._writers = ThreadPoolExecutor(writers, thread_name_prefix="store-writer")
+        self._answer_s = answer_s
+        self._clock = clock
+        self._pending = 0
+        self._paused_until_s = 0.0
+        # What failed last, and nothing of its kind has succeeded since.
+        self._is_failing = {False: False, True: False}
+
+    @property
+    def dialect(self) -> str:
+        """`sqlite` or `postgresql`."""
+        return self._engine.dialect.name
+
+    @property
+    def is_available(self) -> bool:
+        """Whether what was read and what was changed last worked."""
+        return not any(self._is_failing.values())
+
+    async def read[T](self, work: Callable[[Connection], T]) -> T:
+        """What some work finds, in a transaction.
+
+        Raises:
+            StoreUnavailableError: The database is away or too slow.
+        """
+        return await self._run(work, is_write=False)
+
+    async def write[T](self, work: Callable[[Connection], T]) -> T:
+        """What some work gives back whose changes are kept when this returns; it may be done twice.
+
+        Raises:
+            StoreUnavailableError: The database is away, too slow or full.
+        """
+        return await self._run(work, is_write=True)
+
+    def close(self) -> None:
+        """Close connections and threads; what is under way ends first, or is cut off by its own limit."""
+        self._readers.shutdown(cancel_futures=True)
+        self._writers.shutdown(cancel_futures=True)
+        self._engine.dispose()
+
+    async def _run[T](self, work: Callable[[Connection], T], *, is_write: bool) -> T:
+        if self._pending >= _PENDING or self._clock() < self._paused_until_s:
+            raise StoreUnavailableError
+        transaction = _Transaction(self._engine, work, is_write=is_write)
+        threads = self._writers if is_write else self._readers
+        self._pending += 1
+        future = asyncio.get_running_loop().run_in_executor(threads, transaction.run)
+        future.add_done_callback(self._count_down)
+        try:
+            # Who waits may be cancelled; the transaction goes on then.
+            result = await asyncio.wait_for(asyncio.shield(future), self._answer_s)
+        except _FAULTS_OF_OURS:
+            raise
+        except (DBAPIError, PoolTimeoutError, TimeoutError) as error:
+            if isinstance(error, TimeoutError):
+                future.add_done_callback(_drop)
+                future.cancel()
+                transaction.abandon()
+            self._note_failure(error, is_write=is_write)
+            raise StoreUnavailableError from error
+        except asyncio.CancelledError:
+            future.add_done_callback(_drop)
+            raise
+        self._note_success(is_write=is_write)
+        return result
+
+    def _count_down(self, _future: asyncio.Future[Any]) -> None:
+        self._pending -= 1
+
+    def _note_failure(self, error: Exception, *, is_write: bool) -> None:
+        if self.is_available:
+            # Without the statement's parameters: they are a caller's.
+            reason = error.orig if isinstance(error, DBAPIError) else type(error).__name__
+            _log.error("the database cannot be used: %s", reason)
+        self._is_failing[is_write] = True
+        if self.dialect != "sqlite":
+            self._paused_until_s = self._clock() + _PAUSE_S
+
+    def _note_success(self, *, is_write: bool) -> None:
+        if self.is_available:
+            return
+        # What can be changed can be read.
+        self._is_failing = {False: False, True: self._is_failing[True] and not is_write}
+        if self.is_available:
+            _log.warning("the database can be used again")
+
+
+def _drop(future: asyncio.Future[Any]) -> None:
+    """Take notice of how something ended that nobody waits for."""
+    if not future.cancelled():
+        future.exception()

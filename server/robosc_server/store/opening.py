@@ -1,0 +1,182 @@
+"""Opens the database: SQLite in the server's own folder, or PostgreSQL by URL.
+
+SQLite keeps a write-ahead log and waits for the disk at each commit, so that what was answered is there after the power
+has failed; the folder is locked, for one server alone. The log is cut back to 16 MiB at checkpoints, and pages that are
+free again go back to the disk a few at a time (sqlite.org: wal.html, pragma.html).
+"""
+
+import fcntl
+import os
+import sqlite3
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
+from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
+
+from robosc_server.store.database import Database
+from robosc_server.store.errors import StoreError
+from robosc_server.store.schema import prepare
+from robosc_server.store.store import Store
+
+_FILE = "jobs.sqlite3"
+_LOCK = "lock"
+_LOG_BYTES = 16 * 2**20
+_BUSY_S = 5.0
+
+_POSTGRESQL_OPTIONS = {
+    "connect_timeout": 3,
+    "keepalives_idle": 10,
+    "keepalives_interval": 5,
+    "keepalives_count": 3,
+    "tcp_user_timeout": 8000,
+    "application_name": "robosc-server",
+    "options": "-c statement_timeout=7000 -c lock_timeout=5000 -c idle_in_transaction_session_timeout=15000",
+}
+_POSTGRESQL_THREADS = 4
+
+_held: set[Path] = set()
+_held_lock = threading.Lock()
+
+
+def open_store(state_dir: Path, database_url: str = "", wall_clock: Callable[[], float] = time.time) -> Store:
+    """The server's database, with its tables; blocks until it has answered.
+
+    Args:
+        state_dir: Folder for SQLite; made where it is missing.
+        database_url: `postgresql://USER:PASSWORD@HOST:PORT/NAME`; empty: SQLite.
+        wall_clock: Seconds since 1970.
+
+    Raises:
+        StoreError: It cannot be used.
+    """
+    if database_url:
+        return Store(_open_postgresql(database_url), wall_clock=wall_clock)
+    database, lock = _open_sqlite(state_dir)
+    return Store(database, lambda: _unlock(lock), wall_clock)
+
+
+def _open_postgresql(text: str) -> Database:
+    try:
+        url = make_url(text)
+    except ArgumentError as error:
+        # Not the text itself: it may hold a password.
+        raise StoreError("the database's URL is not one; write postgresql://USER:PASSWORD@HOST:PORT/NAME") from error
+    if url.drivername not in {"postgresql", "postgresql+psycopg"}:
+        raise StoreError(f"there is no database '{url.drivername}'; only postgresql, and SQLite without a URL")
+    try:
+        engine = create_engine(
+            url.set(drivername="postgresql+psycopg"),
+            pool_size=2 * _POSTGRESQL_THREADS,
+            max_overflow=0,
+            pool_timeout=1.0,
+            pool_pre_ping=True,
+            hide_parameters=True,
+            connect_args=_POSTGRESQL_OPTIONS,
+        )
+    except (ImportError, NoSuchModuleError) as error:
+        raise StoreError("PostgreSQL needs the extra `postgresql`: pip install 'robosc[postgresql]'") from error
+    _prepare(engine, f"the database {url.render_as_string(hide_password=True)}")
+    return Database(engine, readers=_POSTGRESQL_THREADS, writers=_POSTGRESQL_THREADS)
+
+
+def _open_sqlite(folder: Path) -> tuple[Database, tuple[Path, int]]:
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        lock = _locked(folder.resolve() / _LOCK)
+    except OSError as error:
+        raise StoreError(f"the state folder {folder} cannot be used: {error.strerror}") from error
+    path = folder.resolve() / _FILE
+    try:
+        # What is in it is the callers'.
+        os.close(os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600))
+        engine = create_engine(
+            URL.create("sqlite+pysqlite", database=str(path)),
+            pool_size=3,
+            max_overflow=0,
+            pool_timeout=_BUSY_S,
+            hide_parameters=True,
+            connect_args={"check_same_thread": False, "timeout": _BUSY_S},
+        )
+        event.listen(engine, "connect", _set_up_sqlite)
+        event.listen(engine, "begin", _begin_sqlite)
+        _prepare(engine, f"the database {path}")
+    except OSError as error:
+        _unlock(lock)
+        raise StoreError(f"the database {path} cannot be used: {error.strerror}") from error
+    except StoreError:
+        _unlock(lock)
+        raise
+    # One writer: SQLite takes one at a time, and here they wait in a fair line.
+    return Database(engine, readers=2, writers=1), lock
+
+
+def _prepare(engine: Engine, what: str) -> None:
+    try:
+        with engine.connect().execution_options(robosc_write=True) as connection, connection.begin():
+            prepare(connection)
+    except DBAPIError as error:
+        engine.dispose()
+        reason = " ".join(str(error.orig).split())
+        raise StoreError(f"{what} cannot be used: {reason}") from error
+    except StoreError as error:
+        engine.dispose()
+        raise StoreError(f"{what} cannot be used: {error}") from error
+
+
+def _set_up_sqlite(connection: sqlite3.Connection, _record: Any) -> None:
+    # Transactions begin where we say so, not where the driver thinks.
+    connection.isolation_level = None
+    cursor = connection.cursor()
+    for setting in (
+        f"busy_timeout = {round(_BUSY_S * 1000)}",
+        # Before there is any table; later it changes nothing.
+        "auto_vacuum = INCREMENTAL",
+        "journal_mode = WAL",
+        "synchronous = FULL",
+        "foreign_keys = ON",
+        "trusted_schema = OFF",
+        f"journal_size_limit = {_LOG_BYTES}",
+    ):
+        cursor.execute(f"PRAGMA {setting}")
+    cursor.close()
+
+
+def _begin_sqlite(connection: Connection) -> None:
+    # Who will write says so at once: a reader that becomes a writer may meet another one, and fails.
+    is_write = connection.get_execution_options().get("robosc_write", False)
+    connection.exec_driver_sql("BEGIN IMMEDIATE" if is_write else "BEGIN")
+
+
+def _locked(path: Path) -> tuple[Path, int]:
+    """A lock of this process on a file, which no child inherits; POSIX record locks know no threads, so `_held` does.
+
+    Raises:
+        StoreError: Somebody else has it.
+        OSError: The file cannot be made.
+    """
+    taken = StoreError(f"the state folder {path.parent} is in use by another robosc-server")
+    with _held_lock:
+        if path in _held:
+            raise taken
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        try:
+            fcntl.lockf(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except (BlockingIOError, PermissionError) as error:
+            os.close(descriptor)
+            raise taken from error
+        except OSError:
+            os.close(descriptor)
+            raise
+        _held.add(path)
+    return path, descriptor
+
+
+def _unlock(lock: tuple[Path, int]) -> None:
+    path, descriptor = lock
+    with _held_lock:
+        _held.discard(path)
+        os.close(descriptor)

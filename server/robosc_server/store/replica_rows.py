@@ -1,0 +1,58 @@
+"""Rows of servers that share a database.
+
+A server counts up its own beats. Another one that finds the same number for as long as a lease, by its own clock, takes
+it for dead; so no two clocks are compared (as in leases with a fencing number: C. Gray and D. Cheriton, "Leases", SOSP
+1989, pages 202-210). A server that was taken for dead finds no row of its own any more, and its jobs are another's.
+"""
+
+from collections.abc import Mapping
+
+from sqlalchemy import Connection, delete, insert, select, update
+
+from robosc_server.store.job_rows import take_orphans
+from robosc_server.store.records import JobRecord
+from robosc_server.store.schema import REPLICAS
+
+
+def enter(connection: Connection, replica: str) -> None:
+    """Tell that a server is there; it may have been told."""
+    if connection.scalar(select(REPLICAS.c.id).where(REPLICAS.c.id == replica)) is None:
+        connection.execute(insert(REPLICAS).values(id=replica, beats=0))
+
+
+def leave(connection: Connection, replica: str) -> None:
+    """Tell that a server is gone, and has left its jobs to others."""
+    connection.execute(delete(REPLICAS).where(REPLICAS.c.id == replica))
+
+
+def beat(connection: Connection, replica: str) -> bool:
+    """Count up; False: the server was taken for dead."""
+    counted = connection.execute(update(REPLICAS).where(REPLICAS.c.id == replica).values(beats=REPLICAS.c.beats + 1))
+    return bool(counted.rowcount)
+
+
+def beats_of_others(connection: Connection, replica: str) -> dict[str, int]:
+    """How far each other server has counted."""
+    rows = connection.execute(select(REPLICAS).where(REPLICAS.c.id != replica))
+    return {row.id: row.beats for row in rows}
+
+
+def adopt(connection: Connection, ours: str, dead: Mapping[str, int], now_us: int) -> list[JobRecord]:
+    """Take over the jobs of servers that have not counted on from the numbers given, and those of nobody.
+
+    Returns:
+        The jobs that have changed.
+    """
+    for name, beats in dead.items():
+        connection.execute(delete(REPLICAS).where(REPLICAS.c.id == name, REPLICAS.c.beats == beats))
+    return take_orphans(connection, ours, now_us)
+
+
+def adopt_all(connection: Connection, ours: str, now_us: int) -> list[JobRecord]:
+    """Take over all jobs: there is no other server.
+
+    Returns:
+        The jobs that have changed.
+    """
+    connection.execute(delete(REPLICAS).where(REPLICAS.c.id != ours))
+    return take_orphans(connection, ours, now_us)

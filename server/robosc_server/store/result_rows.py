@@ -1,0 +1,89 @@
+"""Rows of results: what one transaction does with them."""
+
+from collections.abc import Collection
+from typing import Any
+
+from sqlalchemy import Connection, delete, func, insert, select, update
+from sqlalchemy.dialects import postgresql, sqlite
+
+from robosc_server.store.records import blocks_of
+from robosc_server.store.schema import BLOCKS, JOBS, RESULTS
+from robosc_server.tasks.task import Result, TaskKind
+
+
+def insert_result(connection: Connection, key: str, kind: TaskKind, result: Result, now_us: int) -> None:
+    """Keep a result, unless there is one of that key."""
+    size = sum(map(len, result.messages))
+    dialect = postgresql if connection.dialect.name == "postgresql" else sqlite
+    made: Any = dialect.insert(RESULTS).values(key=key, kind=kind, size=size, used_us=now_us)
+    if connection.execute(made.on_conflict_do_nothing()).rowcount:
+        for number, block in enumerate(blocks_of(result.messages)):
+            connection.execute(insert(BLOCKS).values(key=key, number=number, content=block))
+
+
+def count_blocks(connection: Connection, key: str) -> int | None:
+    """How many blocks a result has; None: there is none."""
+    if connection.scalar(select(RESULTS.c.key).where(RESULTS.c.key == key)) is None:
+        return None
+    return connection.scalar(select(func.count()).select_from(BLOCKS).where(BLOCKS.c.key == key))
+
+
+def read_block(connection: Connection, key: str, number: int) -> bytes | None:
+    """One block of a result; None: it is not there."""
+    content = connection.scalar(select(BLOCKS.c.content).where(BLOCKS.c.key == key, BLOCKS.c.number == number))
+    return None if content is None else bytes(content)
+
+
+def read_blocks(connection: Connection, key: str) -> list[bytes] | None:
+    """All blocks of a result; None: there is none."""
+    if connection.scalar(select(RESULTS.c.key).where(RESULTS.c.key == key)) is None:
+        return None
+    query = select(BLOCKS.c.content).where(BLOCKS.c.key == key).order_by(BLOCKS.c.number)
+    return [bytes(content) for content in connection.scalars(query)]
+
+
+def touch(connection: Connection, keys: Collection[str], now_us: int) -> None:
+    """Note that some results were asked for."""
+    names = sorted(keys)  # The same order in each server: none waits for one that waits for it.
+    for place in range(0, len(names), 500):
+        part = names[place : place + 500]
+        connection.execute(update(RESULTS).where(RESULTS.c.key.in_(part)).values(used_us=now_us))
+
+
+def size_of_all(connection: Connection) -> int:
+    """Bytes of all results."""
+    return int(connection.scalar(select(func.sum(RESULTS.c.size))) or 0)
+
+
+def size_of_needed(connection: Connection) -> int:
+    """Bytes of the results that kept jobs refer to."""
+    return int(connection.scalar(select(func.sum(RESULTS.c.size)).where(_is_needed())) or 0)
+
+
+def trim(connection: Connection, excess_bytes: int, limit: int) -> int:
+    """Delete results that no job refers to, those first that were not asked for longest.
+
+    Args:
+        connection: In a transaction.
+        excess_bytes: How many bytes are too many.
+        limit: How many results at most.
+
+    Returns:
+        Bytes that are no longer taken.
+    """
+    query = select(RESULTS.c.key, RESULTS.c.size).where(~_is_needed()).order_by(RESULTS.c.used_us, RESULTS.c.key)
+    # One that a job is about to refer to is left alone.
+    query = query.limit(limit).with_for_update(skip_locked=True, of=RESULTS)
+    chosen, freed = [], 0
+    for row in connection.execute(query):
+        if freed >= excess_bytes:
+            break
+        chosen.append(row.key)
+        freed += row.size
+    if chosen:
+        connection.execute(delete(RESULTS).where(RESULTS.c.key.in_(chosen)))
+    return freed
+
+
+def _is_needed() -> Any:
+    return select(JOBS.c.id).where(JOBS.c.result_key == RESULTS.c.key).exists()

@@ -1,0 +1,130 @@
+"""Tables, the same in SQLite and PostgreSQL, and their version.
+
+Times are microseconds since 1970, in UTC. Texts and numbers of a job stand apart from its request, and the messages of
+a result from what is known about it, so that lists and sweeps touch no large values.
+"""
+
+from sqlalchemy import (
+    BigInteger,
+    Boolean,
+    Column,
+    Connection,
+    ForeignKey,
+    Index,
+    Integer,
+    LargeBinary,
+    MetaData,
+    Table,
+    Text,
+    UniqueConstraint,
+    insert,
+    inspect,
+    select,
+    text,
+)
+
+from robosc_server.store.errors import StoreError
+
+VERSION = 1
+"""Of the tables below; a database with another one is not touched."""
+
+_LOCK = 0x726F626F7363
+"""PostgreSQL's advisory lock while tables are made: replicas may start at the same time."""
+
+METADATA = MetaData()
+
+SCHEMA = Table("robosc_schema", METADATA, Column("version", Integer, nullable=False))
+
+# Servers that share this database. A server counts up its beats; one that stops is taken for dead.
+REPLICAS = Table(
+    "replicas",
+    METADATA,
+    Column("id", Text, primary_key=True),
+    Column("beats", BigInteger, nullable=False),
+)
+
+RESULTS = Table(
+    "results",
+    METADATA,
+    Column("key", Text, primary_key=True),
+    Column("kind", Text, nullable=False),
+    Column("size", BigInteger, nullable=False),
+    Column("used_us", BigInteger, nullable=False),
+    Index("results_used", "used_us"),
+)
+
+# The messages of a result: as many in a block as fit, so that a large result is never read at once.
+BLOCKS = Table(
+    "result_blocks",
+    METADATA,
+    Column("key", Text, ForeignKey("results.key", ondelete="CASCADE"), primary_key=True),
+    Column("number", Integer, primary_key=True),
+    Column("content", LargeBinary, nullable=False),
+)
+
+JOBS = Table(
+    "jobs",
+    METADATA,
+    Column("id", Text, primary_key=True),
+    Column("owner", Text, nullable=False),
+    Column("kind", Text, nullable=False),
+    Column("state", Text, nullable=False),
+    Column("revision", BigInteger, nullable=False),
+    Column("key", Text, nullable=False),
+    Column("main_file", Text, nullable=False),
+    Column("label", Text, nullable=False),
+    Column("idempotency_key", Text),
+    Column("retention_us", BigInteger, nullable=False),
+    Column("created_us", BigInteger, nullable=False),
+    Column("started_us", BigInteger),
+    Column("ended_us", BigInteger),
+    Column("expires_us", BigInteger),
+    Column("attempts", Integer, nullable=False),
+    Column("stage", Text),
+    Column("progress", Text),
+    Column("reason", Text),
+    Column("message", Text),
+    Column("is_from_store", Boolean, nullable=False),
+    # Whose it is to do; NULL: whoever finds it first, or it has ended.
+    Column("replica", Text),
+    # Set when it has succeeded. As long as it stands there, the result cannot be deleted.
+    Column("result_key", Text, ForeignKey("results.key")),
+    UniqueConstraint("owner", "idempotency_key", name="jobs_idempotency"),
+    Index("jobs_listed", "owner", "created_us", "id"),
+    Index("jobs_all_listed", "created_us", "id"),
+    Index("jobs_active", "state", "replica"),
+    Index("jobs_expiring", "expires_us"),
+    Index("jobs_results", "result_key"),
+)
+
+# What jobs that have not ended are asked to do.
+REQUESTS = Table(
+    "job_requests",
+    METADATA,
+    Column("job", Text, ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True),
+    Column("content", LargeBinary, nullable=False),
+)
+
+
+def prepare(connection: Connection) -> None:
+    """Make the tables, or see that they are those of this version.
+
+    Raises:
+        StoreError: They are not.
+    """
+    if connection.dialect.name == "postgresql":
+        connection.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": _LOCK})
+    names = set(inspect(connection).get_table_names())
+    if SCHEMA.name not in names:
+        if names & set(METADATA.tables):
+            raise StoreError("the database holds tables of something else with the names of RoboSC's")
+        METADATA.create_all(connection)
+        connection.execute(insert(SCHEMA).values(version=VERSION))
+        return
+    versions = list(connection.scalars(select(SCHEMA.c.version)))
+    if versions != [VERSION]:
+        found = versions[0] if len(versions) == 1 else "unknown"
+        raise StoreError(
+            f"the database has tables of version {found}, and this server knows version {VERSION} alone; it was "
+            "written by another version of RoboSC"
+        )

@@ -1,0 +1,235 @@
+"""What is kept: jobs, results, and which servers there are. Each call is one transaction.
+
+Every call raises StoreUnavailableError where the database is away, full or too slow.
+"""
+
+import time
+from collections.abc import Callable, Collection, Mapping
+from functools import partial
+
+from sqlalchemy import Connection
+
+from robosc_server.store import job_rows, replica_rows, result_rows
+from robosc_server.store.database import Database
+from robosc_server.store.records import JobFilter, JobRecord, JobState, messages_of
+from robosc_server.tasks.task import Failure, Report, Result, TaskKind
+
+_SWEPT_AT_ONCE = 200
+_TRIMMED_AT_ONCE = 50
+_FREE_PAGES = 2000
+
+
+def _nothing() -> None:
+    """Nothing was locked."""
+
+
+class Store:
+    """A database with jobs and results.
+
+    Args:
+        database: With its tables.
+        on_close: Called when it is closed.
+        wall_clock: Seconds since 1970.
+    """
+
+    def __init__(
+        self,
+        database: Database,
+        on_close: Callable[[], None] = _nothing,
+        wall_clock: Callable[[], float] = time.time,
+    ) -> None:
+        self._database = database
+        self._on_close = on_close
+        self._wall_clock = wall_clock
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether other servers may use it at the same time."""
+        return self._database.dialect != "sqlite"
+
+    @property
+    def is_available(self) -> bool:
+        """Whether what was asked of it last worked."""
+        return self._database.is_available
+
+    def now_us(self) -> int:
+        """Microseconds since 1970."""
+        return round(self._wall_clock() * 1e6)
+
+    def close(self) -> None:
+        """Let go of the database; blocks for a moment."""
+        self._database.close()
+        self._on_close()
+
+    async def accept(
+        self, record: JobRecord, request: bytes, result: Result | None, bound: int
+    ) -> tuple[JobRecord, bool] | None:
+        """Keep a new job, see `job_rows.accept`: the job, and whether it was there before."""
+        now_us = self.now_us()
+        return await self._database.write(
+            lambda connection: job_rows.accept(connection, record, request, result, bound, now_us)
+        )
+
+    async def find(self, job_id: str) -> JobRecord | None:
+        """A job that is kept."""
+        now_us = self.now_us()
+        return await self._database.read(lambda connection: job_rows.find(connection, job_id, now_us))
+
+    async def find_by_key(self, owner: str, idempotency_key: str) -> JobRecord | None:
+        """The job that was accepted from an owner with an idempotency key."""
+        now_us = self.now_us()
+        return await self._database.read(
+            lambda connection: job_rows.find_by_key(connection, owner, idempotency_key, now_us)
+        )
+
+    async def find_changed(self, revisions: Mapping[str, int]) -> list[JobRecord]:
+        """Those of some jobs that have greater revisions than those given."""
+        known = dict(revisions)
+        return await self._database.read(lambda connection: job_rows.find_many(connection, known))
+
+    async def list_jobs(self, chosen: JobFilter, after: tuple[int, str] | None, limit: int) -> list[JobRecord]:
+        """Jobs, the youngest first; see `job_rows.listed`."""
+        now_us = self.now_us()
+        return await self._database.read(lambda connection: job_rows.listed(connection, chosen, after, limit, now_us))
+
+    async def counts_by_state(self) -> dict[JobState, int]:
+        """How many jobs there are in each state."""
+        return await self._database.read(job_rows.counts_by_state)
+
+    async def begin(self, job_id: str, replica: str) -> tuple[JobRecord, bytes] | None:
+        """Have a waiting job run; see `job_rows.begin`."""
+        now_us = self.now_us()
+        return await self._database.write(lambda connection: job_rows.begin(connection, job_id, replica, now_us))
+
+    async def put_back(self, ids: Collection[str], replica: str, next_replica: str | None) -> list[JobRecord]:
+        """Have running jobs wait again; see `job_rows.put_back`."""
+        return await self._database.write(lambda connection: job_rows.put_back(connection, ids, replica, next_replica))
+
+    async def end(self, job_id: str, replica: str, outcome: Result | Failure) -> JobRecord | None:
+        """End a job; None: it has ended, or is another server's."""
+        now_us = self.now_us()
+        if isinstance(outcome, Result):
+            return await self._database.write(
+                lambda connection: job_rows.succeed(connection, job_id, replica, outcome, now_us)
+            )
+        return await self._database.write(
+            lambda connection: job_rows.fail(connection, job_id, replica, outcome, now_us)
+        )
+
+    async def cancel(self, job_id: str) -> JobRecord | None:
+        """End a job, whoever is at it; None: there is none."""
+        now_us = self.now_us()
+        return await self._database.write(lambda connection: job_rows.cancel(connection, job_id, now_us))
+
+    async def note_progress(self, replica: str, progress: Mapping[str, tuple[int, Report]]) -> None:
+        """Keep what workers have told; see `job_rows.note_progress`."""
+        told = {
+            job_id: (revision, Report(job_rows.clean(report.stage), job_rows.clean(report.message)))
+            for job_id, (revision, report) in progress.items()
+        }
+        await self._database.write(lambda connection: job_rows.note_progress(connection, replica, told))
+
+    async def active_of(self, replica: str) -> list[JobRecord]:
+        """The jobs of a server that have not ended, the oldest first."""
+        return await self._database.read(lambda connection: job_rows.active_of(connection, replica))
+
+    async def active_ids_of(self, replica: str) -> set[str]:
+        """The ids of the jobs of a server that have not ended."""
+        return await self._database.read(lambda connection: job_rows.active_ids_of(connection, replica))
+
+    async def enter(self, replica: str) -> None:
+        """Tell that a server is there; where no other can be, it takes over all jobs."""
+        now_us = self.now_us()
+
+        def work(connection: Connection) -> None:
+            replica_rows.enter(connection, replica)
+            if not self.is_shared:
+                replica_rows.adopt_all(connection, replica, now_us)
+
+        await self._database.write(work)
+
+    async def leave(self, replica: str) -> None:
+        """Tell that a server is gone; its jobs that wait are left to others."""
+
+        def work(connection: Connection) -> None:
+            job_rows.give_up_waiting(connection, replica)
+            replica_rows.leave(connection, replica)
+
+        await self._database.write(work)
+
+    async def beat(self, replica: str) -> bool:
+        """Tell that a server lives; False: it was taken for dead."""
+        return await self._database.write(partial(_beat, replica))
+
+    async def others(self, replica: str) -> tuple[dict[str, int], bool]:
+        """How far each other server has counted, and whether there are jobs of nobody."""
+        return await self._database.read(
+            lambda connection: (replica_rows.beats_of_others(connection, replica), job_rows.has_orphans(connection))
+        )
+
+    async def adopt(self, replica: str, dead: Mapping[str, int]) -> list[JobRecord]:
+        """Take over the jobs of dead servers, and those of nobody; see `replica_rows.adopt`."""
+        now_us = self.now_us()
+        return await self._database.write(lambda connection: replica_rows.adopt(connection, replica, dead, now_us))
+
+    async def keep_result(self, key: str, kind: TaskKind, result: Result) -> None:
+        """Keep a result, unless there is one of that key."""
+        now_us = self.now_us()
+        await self._database.write(lambda connection: result_rows.insert_result(connection, key, kind, result, now_us))
+
+    async def find_result(self, key: str) -> Result | None:
+        """A whole result."""
+        blocks = await self._database.read(lambda connection: result_rows.read_blocks(connection, key))
+        if blocks is None:
+            return None
+        return Result(tuple(message for block in blocks for message in messages_of(block)))
+
+    async def count_blocks(self, key: str) -> int | None:
+        """How many blocks a result has; None: there is none."""
+        return await self._database.read(lambda connection: result_rows.count_blocks(connection, key))
+
+    async def read_block(self, key: str, number: int) -> bytes | None:
+        """One block of a result; see `records.messages_of`."""
+        return await self._database.read(lambda connection: result_rows.read_block(connection, key, number))
+
+    async def touch(self, keys: Collection[str]) -> None:
+        """Note that some results were asked for."""
+        now_us = self.now_us()
+        await self._database.write(lambda connection: result_rows.touch(connection, keys, now_us))
+
+    async def size_of_needed(self) -> int:
+        """Bytes of the results that kept jobs refer to."""
+        return await self._database.read(result_rows.size_of_needed)
+
+    async def sweep(self, results_bytes: int) -> int:
+        """Delete jobs whose time has passed, and results that are too many; in small transactions, others between.
+
+        Args:
+            results_bytes: Bytes of results that may stay; those that jobs refer to do in any case.
+
+        Returns:
+            How many jobs were deleted.
+        """
+        now_us = self.now_us()
+        total = 0
+        while swept := await self._database.write(partial(job_rows.sweep, now_us=now_us, limit=_SWEPT_AT_ONCE)):
+            total += swept
+        while (excess := await self._database.read(result_rows.size_of_all) - results_bytes) > 0:
+            trim = partial(result_rows.trim, excess_bytes=excess, limit=_TRIMMED_AT_ONCE)
+            if not await self._database.write(trim):
+                break
+        if not self.is_shared:
+            await self._database.write(_give_pages_back)
+        return total
+
+
+def _beat(replica: str, connection: Connection) -> bool:
+    return replica_rows.beat(connection, replica)
+
+
+def _give_pages_back(connection: Connection) -> None:
+    cursor = connection.connection.cursor()
+    # A page goes back with each row, also where the driver knows of no columns.
+    cursor.execute(f"PRAGMA incremental_vacuum({_FREE_PAGES})")
+    cursor.fetchall()
+    cursor.close()

@@ -1,0 +1,302 @@
+"""Workers of a Dask cluster: tasks are sent to its scheduler, and done by processes beside its workers.
+
+The package `distributed` is loaded only where somebody wants this.
+"""
+
+import asyncio
+import contextlib
+import logging
+import time
+import uuid
+from collections import deque
+from concurrent.futures import CancelledError as FutureCancelledError
+from typing import Any, Self
+
+from robosc import __version__
+from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Task, TaskLimits
+from robosc_server.workers import OnReport, WorkersError
+from robosc_server.workers.frames import FrameError
+from robosc_server.workers.local import TASK_FUNCTION
+
+_LOG = logging.getLogger(__name__)
+
+CONNECT_S = 5.0
+"""How long one attempt to reach the scheduler may take."""
+
+LOOK_S = 0.5
+"""How often the cluster is asked for its workers."""
+
+_ATTEMPTS = 2
+_GRACE_S = 30.0
+_CANCEL_S = 1.0
+_EXAMINE_S = 3.0
+_KEPT_REPORTS = 64
+_LOST = "two workers of the cluster were lost while they did this task"
+
+
+class _Watched:
+    """What a cluster tells of one task under way."""
+
+    def __init__(self) -> None:
+        self.begun = 0
+        self.begun_at = 0.0
+        self._reports: deque[Report] = deque(maxlen=_KEPT_REPORTS)
+        self._news = asyncio.Event()
+
+    def tell(self, event: dict[str, Any]) -> None:
+        """Take an event of the cluster's."""
+        if event["is"] == "begun":
+            self.begun += 1
+            self.begun_at = time.monotonic()
+        else:
+            self._reports.extend(Report(str(stage), str(message)) for stage, message in event["reports"])
+        self._news.set()
+
+    async def pass_on(self, on_report: OnReport) -> Failure:
+        """Pass reports on, the last of them where the receiver is slow; returns once too many workers were lost."""
+        while self.begun <= _ATTEMPTS:
+            await self._news.wait()
+            self._news.clear()
+            while self._reports:
+                await on_report(self._reports.popleft())
+        return Failure(Reason.WORKER_DIED, _LOST)
+
+
+class DaskWorkers:
+    """The workers of a cluster; an asynchronous context. It is there also while the cluster is away.
+
+    Attributes:
+        fault: Why no task can be done now, in one sentence; empty where tasks can be done.
+    """
+
+    def __init__(self, address: str, task_function: str = TASK_FUNCTION) -> None:
+        """Plan.
+
+        Args:
+            address: Of the scheduler, such as `tcp://HOST:PORT` or `tls://HOST:PORT`.
+            task_function: What does tasks there, `package.module:name`.
+
+        Raises:
+            WorkersError: The package `distributed` is missing.
+        """
+        try:
+            import distributed
+        except ImportError as error:
+            raise WorkersError(
+                "workers on a Dask cluster need the package distributed: pip install 'robosc[dask]'"
+            ) from error
+        self._distributed = distributed
+        self._address = address
+        self._task_function = task_function
+        self._client: Any = None
+        self._threads: dict[str, int] = {}
+        self._refused: dict[str, str] = {}
+        self._watched: dict[str, _Watched] = {}
+        self._keeper: asyncio.Task[None] | None = None
+        self._has_looked = asyncio.Event()
+        self.fault = f"the Dask scheduler at {address} was not reached yet"
+
+    async def __aenter__(self) -> Self:
+        self._keeper = asyncio.create_task(self._keep())
+        await self._has_looked.wait()
+        if self.fault:
+            _LOG.error("%s; it is tried again", self.fault)
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        if self._keeper is not None:
+            self._keeper.cancel()
+            await asyncio.gather(self._keeper, return_exceptions=True)
+        self.fault = "the server's workers have ended"
+
+    @property
+    def capacity(self) -> int:
+        """Threads of all workers of the cluster that can be used; 0 while it is away."""
+        return sum(self._threads.values())
+
+    async def run(self, task: Task, limits: TaskLimits, on_report: OnReport) -> Outcome:
+        """The outcome of a task; see `Workers.run`.
+
+        A worker of the cluster that is lost has its task done by another one, once. Reports come at most ten times a
+        second, and of many at once only the last.
+
+        Raises:
+            WorkersError: The cluster is away, was lost on the way, has no worker, or only such as cannot be used.
+        """
+        watched = _Watched()
+        for _ in range(_ATTEMPTS):
+            outcome = await self._run_once(task, limits, on_report, watched)
+            if outcome is not None:
+                return outcome
+        return Failure(Reason.WORKER_DIED, _LOST)
+
+    async def _run_once(self, task: Task, limits: TaskLimits, on_report: OnReport, watched: _Watched) -> Outcome | None:
+        """The outcome of a task; None: the scheduler gave it up, since workers were lost."""
+        from robosc_server.workers.dask_task import run_on_cluster
+
+        client = self._client
+        if client is None or not self._threads:
+            raise WorkersError(self.fault or f"the Dask cluster at {self._address} has no worker")
+        name = f"robosc-{task.kind}-{uuid.uuid4().hex}"
+        self._watched[name] = watched
+        future = client.submit(
+            run_on_cluster,
+            __version__,
+            self._task_function,
+            _topic(client),
+            str(task.kind),
+            task.request,
+            (task.key, task.main_file),
+            (limits.seconds, limits.cpu_seconds, limits.memory_bytes, limits.nodes, limits.result_bytes),
+            key=name,
+            pure=False,
+            workers=sorted(self._threads) if self._refused else None,
+        )
+        works = (
+            asyncio.create_task(self._answer(future, limits)),
+            asyncio.create_task(watched.pass_on(on_report)),
+            asyncio.create_task(self._guard(client, watched, limits)),
+        )
+        try:
+            done, _ = await asyncio.wait(works, return_when=asyncio.FIRST_COMPLETED)
+            # The answer first, if it is there.
+            return next(work for work in works if work in done).result()
+        finally:
+            del self._watched[name]
+            for work in works:
+                work.cancel()
+            with contextlib.suppress(Exception):
+                async with asyncio.timeout(_CANCEL_S):
+                    if future.done():
+                        future.release()
+                    else:  # Its worker is told to stop by this.
+                        await future.cancel()
+                    await asyncio.gather(*works, return_exceptions=True)
+
+    async def _answer(self, future: Any, limits: TaskLimits) -> Outcome | None:
+        """What the cluster answers; None: it gave up."""
+        from robosc_server.workers.dask_task import ANSWER, NO_WORKER, outcome_of
+
+        try:
+            content = await future.result()
+        except FutureCancelledError as error:
+            raise WorkersError(f"the Dask scheduler at {self._address} was lost") from error
+        except self._distributed.KilledWorker:
+            return None
+        except Exception as error:  # Whatever was raised there, or on the way from there.
+            told = f"{type(error).__name__}: {error}"
+            raise WorkersError(f"the Dask cluster at {self._address} cannot do tasks: {told[:1000]}") from error
+        if isinstance(content, bytes) and content[:1] == ANSWER:
+            try:
+                return outcome_of(content[1:], limits)
+            except FrameError as error:
+                return Failure(Reason.WORKER_DIED, "the worker process sent what is no answer", str(error))
+        if isinstance(content, bytes) and content[:1] == NO_WORKER:
+            raise WorkersError(content[1:1000].decode("utf-8", "replace"))
+        raise WorkersError(f"the Dask cluster at {self._address} answered what is no answer of RoboSC")
+
+    async def _guard(self, client: Any, watched: _Watched, limits: TaskLimits) -> Failure:
+        """End a wait for what will not come.
+
+        Raises:
+            WorkersError: The cluster is lost, or has had no worker for a while.
+        """
+        worked_at = time.monotonic()
+        while True:
+            await asyncio.sleep(LOOK_S)
+            now = time.monotonic()
+            if self._client is not client:
+                raise WorkersError(f"the Dask scheduler at {self._address} was lost")
+            if self._threads:
+                worked_at = now
+            if now - worked_at > _GRACE_S:
+                raise WorkersError(self.fault or f"the Dask cluster at {self._address} has no worker")
+            if watched.begun and now - watched.begun_at > limits.seconds + _GRACE_S:
+                return Failure(Reason.TIME_LIMIT, "the work took longer than a task may take")
+
+    async def _keep(self) -> None:
+        """Have a client of the cluster, whenever that is there."""
+        while True:
+            client = None
+            try:
+                client = await self._connect()
+                await self._look_after(client)
+            except Exception as error:  # Of the network, of Dask, of another version of it: told, and tried again.
+                self._note_fault(f"the Dask scheduler at {self._address} cannot be reached: {_sentence(error)}")
+            finally:
+                self._client, self._threads, self._refused = None, {}, {}
+                self._has_looked.set()
+                if client is not None:
+                    with contextlib.suppress(Exception):
+                        async with asyncio.timeout(CONNECT_S):
+                            await client.close()
+            await asyncio.sleep(LOOK_S)
+
+    async def _connect(self) -> Any:
+        # Certificates for tls:// are Dask's own settings.
+        return await self._distributed.Client(  # type: ignore[no-untyped-call]
+            self._address, asynchronous=True, timeout=CONNECT_S, set_as_default=False, name="robosc-server"
+        )
+
+    async def _look_after(self, client: Any) -> None:
+        """Know the cluster's workers, until it is lost."""
+        connection = client.scheduler_comm
+        client.subscribe_topic(_topic(client), self._hear)
+        known: dict[str, str] = {}
+        while True:
+            if client.status != "running" or client.scheduler_comm is not connection:
+                raise ConnectionError("the connection was lost")
+            async with asyncio.timeout(CONNECT_S):
+                threads = dict(await client.nthreads())
+            new = [self._examine(client, address) for address in threads.keys() - known.keys()]
+            examined = dict(await asyncio.gather(*new))
+            known = {address: why for address, why in (known | examined).items() if why is not None}
+            for address in examined.keys() & known.keys():
+                if known[address]:
+                    _LOG.error("%s", known[address])
+            self._refused = {address: why for address, why in known.items() if why and address in threads}
+            self._threads = {address: count for address, count in threads.items() if known.get(address) == ""}
+            self._client = client
+            if self._threads:
+                self._note_fault("")
+            else:
+                reasons = [*self._refused.values(), f"the Dask cluster at {self._address} has no worker"]
+                self._note_fault(reasons[0])
+            self._has_looked.set()
+            await asyncio.sleep(LOOK_S)
+
+    async def _examine(self, client: Any, address: str) -> tuple[str, str | None]:
+        """A worker's address, and why it cannot be used: empty if it can, None if it does not answer."""
+        from robosc_server.workers.dask_task import mismatch, ready_version
+
+        try:
+            async with asyncio.timeout(_EXAMINE_S):
+                version = await client.run(ready_version, self._task_function, workers=[address])
+        except (TimeoutError, OSError):
+            return address, None
+        except Exception as error:  # Whatever was raised there: it has no RoboSC, or another Python.
+            return address, f"the Dask worker at {address} cannot load RoboSC: {_sentence(error)}"
+        return address, "" if version.get(address) == __version__ else mismatch(
+            address, str(version.get(address)), __version__
+        )
+
+    async def _hear(self, event: tuple[float, Any]) -> None:
+        watched = self._watched.get(event[1]["task"])
+        if watched is not None:
+            watched.tell(event[1])
+
+    def _note_fault(self, fault: str) -> None:
+        if fault != self.fault and self._has_looked.is_set():
+            if fault:
+                _LOG.error("%s; it is tried again", fault)
+            else:
+                _LOG.info("the Dask cluster at %s is there again", self._address)
+        self.fault = fault
+
+
+def _topic(client: Any) -> str:
+    return f"robosc-{client.id}"
+
+
+def _sentence(error: object) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split())[:500]

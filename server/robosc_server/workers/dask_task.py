@@ -1,0 +1,130 @@
+"""What a Dask worker does for the server: a task in a process of its own, reports told on the way, an answer in bytes.
+
+The answer is bytes with a mark before it, and never an object: what a hostile model has been through is read by the
+server with the care of `frames`.
+"""
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from distributed import get_worker
+
+from robosc import __version__
+from robosc_server.tasks.task import Failure, Outcome, Report, Result, Task, TaskKind, TaskLimits
+from robosc_server.workers import WorkersError
+from robosc_server.workers.frames import HEADER, AnswerReader, FrameError, Tag, failure_frame, frame
+from robosc_server.workers.isolated import StoppedError, prepare, run_isolated
+
+ANSWER = b"A"
+NO_WORKER = b"W"
+
+BEGUN = "begun"
+REPORTS = "reports"
+
+_TELL_EVERY_ASKS = 5  # A tenth of a second.
+_KEPT_REPORTS = 16
+_UNDER_WAY = ("executing", "long-running")
+
+
+def ready_version(task_function: str) -> str:
+    """This worker's version of RoboSC; has processes stand ready for what comes."""
+    threading.Thread(target=_prepare_quietly, args=(task_function,), daemon=True).start()
+    return __version__
+
+
+def _prepare_quietly(task_function: str) -> None:
+    try:
+        prepare(task_function)
+    except WorkersError:
+        return  # The task that comes is told.
+
+
+def run_on_cluster(
+    version: str,
+    task_function: str,
+    topic: str,
+    kind: str,
+    request: bytes,
+    identity: tuple[str, str],
+    limits: tuple[float, float, int, int, int],
+) -> bytes:
+    """Do a task on this worker; stops when nobody on the cluster wants its result any more.
+
+    Args:
+        version: Of the server.
+        task_function: What does tasks, `package.module:name`.
+        topic: Where reports are told.
+        kind: The task's kind.
+        request: Its request.
+        identity: Its key and the name of its main file.
+        limits: The values of its `TaskLimits`.
+    """
+    worker: Any = get_worker()
+    name = worker.get_current_task()
+    if version != __version__:
+        return NO_WORKER + mismatch(worker.address, __version__, version).encode()
+    kept: deque[Report] = deque(maxlen=_KEPT_REPORTS)
+    asks = 0
+
+    def is_unwanted() -> bool:
+        nonlocal asks
+        asks += 1
+        if asks % _TELL_EVERY_ASKS == 0 and kept:
+            reports = [kept.popleft() for _ in range(len(kept))]
+            told = [[report.stage, report.message] for report in reports]
+            worker.log_event(topic, {"is": REPORTS, "task": name, "reports": told})
+        state = worker.state.tasks.get(name)
+        return state is None or state.state not in _UNDER_WAY
+
+    worker.log_event(topic, {"is": BEGUN, "task": name, "worker": worker.address})
+    task = Task(TaskKind(kind), request, *identity)
+    try:
+        return ANSWER + answer(run_isolated(task, TaskLimits(*limits), _keeper(kept), is_unwanted, task_function))
+    except WorkersError as error:
+        return NO_WORKER + f"the Dask worker at {worker.address}: {error}".encode()
+    except StoppedError:
+        return NO_WORKER + b"stopped"
+
+
+def _keeper(kept: deque[Report]) -> Callable[[Report], None]:
+    return kept.append
+
+
+def mismatch(address: str, theirs: str, ours: str) -> str:
+    """What is told of a worker with another version."""
+    return f"the Dask worker at {address} has RoboSC {theirs}, and this server {ours}: they must be the same"
+
+
+def answer(outcome: Outcome) -> bytes:
+    """An outcome as the frames of `frames`."""
+    if isinstance(outcome, Failure):
+        return failure_frame(outcome)
+    parts: list[bytes] = []
+    for message in outcome.messages:
+        parts += [HEADER.pack(Tag.MESSAGE.value, len(message)), message]
+    return b"".join((*parts, frame(Tag.RESULT, b"")))
+
+
+def outcome_of(content: bytes, limits: TaskLimits) -> Outcome:
+    """The outcome that an answer tells.
+
+    Raises:
+        FrameError: It is no answer.
+    """
+    reader = AnswerReader(limits)
+    view = memoryview(content)
+    while len(view) >= HEADER.size:
+        announced = reader.announced(bytes(view[: HEADER.size]))
+        if isinstance(announced, Failure):
+            return announced
+        tag, length = announced
+        payload = bytes(view[HEADER.size :][:length])
+        view = view[HEADER.size + length :]
+        if len(payload) < length:
+            break
+        told = reader.read(tag, payload)
+        if isinstance(told, Result | Failure):
+            return told
+    raise FrameError("an answer that ends too early")

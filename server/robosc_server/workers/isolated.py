@@ -1,0 +1,96 @@
+"""One task in a process of its own, for callers without an event loop, such as a thread of a Dask worker."""
+
+import asyncio
+import threading
+from collections.abc import Callable, Coroutine
+from concurrent.futures import Future
+from typing import Any
+
+from robosc_server.tasks.task import Outcome, Report, Task, TaskLimits
+from robosc_server.workers.local import TASK_FUNCTION, LocalWorkers
+
+_ASK_S = 0.02
+_SPARE = 2
+
+
+class StoppedError(Exception):
+    """The task's process was killed, because the caller said so."""
+
+
+class _Background:
+    """Workers in an event loop of their own, as long as this process lives."""
+
+    def __init__(self, task_function: str) -> None:
+        self._loop = asyncio.new_event_loop()
+        # No thread is waited for at the end of the process; workers end with it.
+        threading.Thread(target=self._loop.run_forever, name="robosc workers", daemon=True).start()
+        self.workers = LocalWorkers(1, task_function, _SPARE)
+        self._lock = threading.Lock()
+        self._is_started = False
+
+    def start[T](self, work: Coroutine[Any, Any, T]) -> Future[T]:
+        """Begin a piece of work in the loop."""
+        return asyncio.run_coroutine_threadsafe(work, self._loop)
+
+    def prepare(self) -> None:
+        """Return when workers stand ready; where that failed before, it is tried again."""
+        with self._lock:
+            if not self._is_started:
+                self.start(self.workers.__aenter__()).result()
+                self._is_started = True
+
+
+_LOCK = threading.Lock()
+_BACKGROUNDS: dict[str, _Background] = {}
+
+
+def prepare(task_function: str = TASK_FUNCTION) -> None:
+    """Have processes stand ready for tasks; they stay as long as this process.
+
+    Raises:
+        WorkersError: None can be had.
+    """
+    _background(task_function).prepare()
+
+
+def _background(task_function: str) -> _Background:
+    with _LOCK:
+        if task_function not in _BACKGROUNDS:
+            _BACKGROUNDS[task_function] = _Background(task_function)
+        return _BACKGROUNDS[task_function]
+
+
+def run_isolated(
+    task: Task,
+    limits: TaskLimits,
+    on_report: Callable[[Report], None],
+    should_stop: Callable[[], bool],
+    task_function: str = TASK_FUNCTION,
+) -> Outcome:
+    """The outcome of a task, done in a process of its own within limits.
+
+    Args:
+        task: What to do.
+        limits: What it may take.
+        on_report: Told each report, in another thread; must not wait.
+        should_stop: Asked every 20 ms, in this thread; once true, the process is killed.
+        task_function: What does tasks, `package.module:name`.
+
+    Raises:
+        StoppedError: `should_stop` said so.
+        WorkersError: No process can be had.
+    """
+    background = _background(task_function)
+    background.prepare()
+
+    async def tell(report: Report) -> None:
+        on_report(report)
+
+    work = background.start(background.workers.run(task, limits, tell))
+    ended = threading.Event()
+    work.add_done_callback(lambda _: ended.set())
+    while not ended.wait(_ASK_S):
+        if should_stop():
+            work.cancel()
+            raise StoppedError
+    return work.result()

@@ -1,0 +1,255 @@
+"""Workers of a real Dask cluster: a scheduler and workers as processes, which are lost and come back."""
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import CancelledError, Future
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import hypothesis.strategies as st
+import pytest
+from hypothesis import given
+
+from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, TaskKind, TaskLimits
+from robosc_server.workers import WorkersError
+from robosc_server.workers.dask_cluster import DaskWorkers
+from robosc_server.workers.dask_task import answer, outcome_of
+from robosc_server.workers.frames import FrameError
+from robosc_server.workers.local import LocalWorkers
+from robosc_server.workers.opening import open_workers
+from support.background import BackgroundLoop, eventually, is_running
+from support.dask_clusters import Cluster, dask_cluster, kill
+from support.fake_tasks import TASK_FUNCTION, fake_task, said
+
+LIMITS = TaskLimits(seconds=60, cpu_seconds=20, memory_bytes=512 * 2**20, result_bytes=10**6)
+KILLED_WITHIN_S = 0.2
+
+
+class Running:
+    """Workers of a cluster, and what their tasks report."""
+
+    def __init__(self, loop: BackgroundLoop, workers: DaskWorkers) -> None:
+        self.workers = workers
+        self._loop = loop
+
+    def start(self, text: str, limits: TaskLimits = LIMITS, kind: TaskKind = TaskKind.CHECK) -> Future[Outcome]:
+        self.reports: list[Report] = []
+        reports = self.reports
+
+        async def note(report: Report) -> None:
+            reports.append(report)
+
+        return self._loop.start(self.workers.run(fake_task(text, kind), limits, note))
+
+    def run(self, text: str, limits: TaskLimits = LIMITS) -> Outcome:
+        return self.start(text, limits).result(60)
+
+    def failure(self, text: str, limits: TaskLimits = LIMITS) -> Failure:
+        outcome = self.run(text, limits)
+        assert isinstance(outcome, Failure), outcome
+        return outcome
+
+    def begun(self, text: str) -> tuple[Future[Outcome], int]:
+        """A task under way, and the number of its process."""
+        future = self.start(f"pid\n{text}")
+        return future, self.next_pid(1)
+
+    def next_pid(self, count: int) -> int:
+        """The number of the process that is at the task the so-manieth time."""
+        assert eventually(lambda: len(self.reports) == count)
+        return int(self.reports[-1].message)
+
+
+@contextmanager
+def running_on(address: str, capacity: int) -> Iterator[Running]:
+    with BackgroundLoop() as loop:
+        workers = DaskWorkers(address, TASK_FUNCTION)
+        loop.run(workers.__aenter__())
+        try:
+            assert eventually(lambda: workers.capacity == capacity), workers.fault
+            yield Running(loop, workers)
+        finally:
+            loop.run(workers.__aexit__())
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    with dask_cluster(tmp_path_factory.mktemp("cluster"), workers=2) as cluster:
+        yield cluster
+
+
+@pytest.fixture(scope="module")
+def running(cluster: Cluster) -> Iterator[Running]:
+    with running_on(cluster.address, 2) as running:
+        yield running
+
+
+def dask_worker_of(cluster: Cluster, pid: int) -> "subprocess.Popen[bytes]":
+    """The worker of the cluster that a task's process belongs to: the parent of its template."""
+    for _ in range(2):
+        pid = int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
+    return next(worker for worker in cluster.workers if worker.pid == pid)
+
+
+class TestTasks:
+    def test_a_task_is_answered_after_its_reports(self, running: Running) -> None:
+        future = running.start("reports 3\nsleep 0.3\necho hello")
+        assert said(future.result(60)) == "hello"
+        assert running.reports == [Report("synthesis", f"step {number}") for number in range(3)]
+
+    def test_the_last_of_very_many_reports_are_told(self, running: Running) -> None:
+        future = running.start("reports 5000\nsleep 0.3\necho done")
+        assert said(future.result(60)) == "done"
+        assert running.reports[-1] == Report("synthesis", "step 4999")
+        assert len(running.reports) < 1000
+
+    @pytest.mark.parametrize("kind", [TaskKind.SYNTHESIZE, TaskKind.FORMAT])
+    def test_kinds_reach_the_function(self, running: Running, kind: TaskKind) -> None:
+        outcome = running.start("echo here", kind=kind).result(60)
+        assert isinstance(outcome, Result)
+        assert b"here" in outcome.messages[0]
+
+    def test_limits_hold_there_as_well(self, running: Running) -> None:
+        assert said(running.run("limits")) == f"20 0 0 {LIMITS.memory_bytes}"
+        assert running.failure("allocate").reason is Reason.MEMORY_LIMIT
+        assert running.failure("spin", replace(LIMITS, cpu_seconds=0.1)).reason is Reason.CPU_LIMIT
+        assert running.failure("stop", replace(LIMITS, seconds=0.2)).reason is Reason.TIME_LIMIT
+        assert running.failure("size 1000000").reason is Reason.RESULT_TOO_LARGE
+
+    def test_deaths_and_faults_are_told_there_as_well(self, running: Running) -> None:
+        failure = running.failure("die 11")
+        assert failure.reason is Reason.WORKER_DIED
+        assert failure.message == "the worker process was ended by SIGSEGV"
+        assert running.failure("raise").details.rstrip().endswith("ValueError: a fault, on purpose")
+
+    @pytest.mark.real_time
+    @pytest.mark.parametrize("text", ["stuck", "stop", "sleep 600"])
+    def test_a_cancelled_task_is_gone_in_time(self, running: Running, text: str) -> None:
+        future, pid = running.begun(text)
+        begin = time.monotonic()
+        future.cancel()
+        assert eventually(lambda: not is_running(pid))
+        assert time.monotonic() - begin < KILLED_WITHIN_S
+        with pytest.raises(CancelledError):
+            future.result(60)
+
+    def test_no_task_outlives_the_server(self, cluster: Cluster) -> None:
+        with running_on(cluster.address, 2) as other:
+            future, pid = other.begun("stuck")
+        assert eventually(lambda: not is_running(pid))
+        with pytest.raises(WorkersError, match="was lost"):
+            future.result(60)
+        with BackgroundLoop() as loop, pytest.raises(WorkersError, match="have ended"):
+            loop.run(other.workers.run(fake_task("echo"), LIMITS, None))  # type: ignore[arg-type]  # never told
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ("import robosc\nrobosc.__version__ = '0.0.1'\n", "has RoboSC 0.0.1, and this server"),
+        ("import sys\nsys.modules['robosc_server'] = None\n", "cannot load RoboSC: "),
+    ],
+)
+def test_a_worker_of_another_version_is_told_of_and_left_out(
+    cluster: Cluster, running: Running, tmp_path: Path, caplog: pytest.LogCaptureFixture, change: str, told: str
+) -> None:
+    (tmp_path / "sitecustomize.py").write_text(change)
+    path = os.pathsep.join((str(tmp_path), *(path for path in sys.path if path)))
+    worker = cluster.start_worker(environment={"PYTHONPATH": path})
+    assert eventually(lambda: told in caplog.text)
+    assert running.workers.capacity == 2
+    for _ in range(4):
+        assert said(running.run("echo fine")) == "fine"
+    kill(worker)
+    cluster.workers.remove(worker)
+
+
+def test_losses(tmp_path: Path) -> None:
+    """Workers are killed in the middle of tasks, then the scheduler; each comes back."""
+    with dask_cluster(tmp_path, workers=2) as cluster, running_on(cluster.address, 2) as running:
+        # A worker: another one does its task.
+        future, pid = running.begun("sleep 1\necho again")
+        kill(dask_worker_of(cluster, pid))
+        assert said(future.result(60)) == "again"
+        assert eventually(lambda: not is_running(pid))
+        assert len({report.message for report in running.reports}) == 2
+
+        # Two of them, under one task.
+        cluster.start_worker()
+        assert eventually(lambda: running.workers.capacity == 2)
+        future, pid = running.begun("sleep 600")
+        for count in (2, 3):
+            kill(dask_worker_of(cluster, pid))
+            cluster.start_worker()
+            if count == 2:
+                pid = running.next_pid(count)
+        outcome = future.result(60)
+        assert outcome == Failure(Reason.WORKER_DIED, "two workers of the cluster were lost while they did this task")
+
+        # The scheduler, under a task.
+        assert eventually(lambda: running.workers.capacity == 2)
+        future, pid = running.begun("stuck")
+        assert cluster.scheduler is not None
+        kill(cluster.scheduler)
+        with pytest.raises(WorkersError, match=f"the Dask scheduler at {cluster.address} was lost"):
+            future.result(60)
+        assert eventually(lambda: not is_running(pid))
+        assert eventually(lambda: bool(running.workers.fault))
+        with pytest.raises(WorkersError, match="cannot be reached"):
+            running.run("echo")
+
+        cluster.start_scheduler()
+        cluster.start_worker()
+        assert eventually(lambda: running.workers.capacity == 1)
+        assert said(running.run("echo back")) == "back"
+        assert running.workers.fault == ""
+
+
+def test_a_cluster_that_is_away_is_waited_for(tmp_path: Path) -> None:
+    cluster = Cluster(tmp_path)
+    told = f"the Dask scheduler at {cluster.address} cannot be reached"
+    with running_on(cluster.address, 0) as running, pytest.raises(WorkersError, match=told):
+        running.run("echo")
+
+
+def test_a_missing_package_is_told_in_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(WorkersError, match=r"^workers on a Dask cluster need .*: pip install 'robosc\[dask\]'$"):
+        open_workers("dask://localhost:8786", 1)
+
+
+def test_nobody_loads_dask_who_does_not_ask_for_it() -> None:
+    program = "import sys, robosc_server.workers.opening; print({'distributed', 'dask', 'grpc'} & sys.modules.keys())"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    told = subprocess.run([sys.executable, "-c", program], env=environment, check=True, capture_output=True, text=True)
+    assert told.stdout.strip() == "set()"
+
+
+def test_workers_are_opened_by_what_the_operator_writes() -> None:
+    assert isinstance(open_workers("local", 3), LocalWorkers)
+    assert open_workers("local", 3).capacity == 3
+    for spec in ("dask://cluster.example:8786", "dask://[::1]:8786", "dask+tls://10.0.0.1:1/"):
+        assert isinstance(open_workers(spec, 1), DaskWorkers)
+    for spec in ("", "Local", "dask://", "dask://host", "tcp://host:1", "dask://host:1/x", "dask://user@host:1"):
+        with pytest.raises(ValueError, match="workers are 'local'"):
+            open_workers(spec, 1)
+
+
+@given(st.lists(st.binary(max_size=50), max_size=5) | st.text())
+def test_answers_travel_as_bytes(said: list[bytes] | str) -> None:
+    outcome: Outcome = Failure(Reason.NODE_LIMIT, said, "") if isinstance(said, str) else Result(tuple(said))
+    content = answer(outcome)
+    assert isinstance(content, bytes)
+    assert outcome_of(content, LIMITS) == outcome
+    with pytest.raises(FrameError):
+        outcome_of(content[:-1], LIMITS)
+
+
+@given(st.binary(max_size=100))
+def test_bytes_that_are_no_answer_are_one_kind_of_error(content: bytes) -> None:
+    with pytest.raises(FrameError):
+        outcome_of(content, LIMITS)

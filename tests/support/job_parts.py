@@ -1,0 +1,135 @@
+"""The parts of a server that have to do with jobs, put together in this process, with scripted workers."""
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import grpc.aio
+
+from robosc_api.v1 import jobs_pb2_grpc
+from robosc_server.jobs import (
+    Caller,
+    JobLimits,
+    JobManager,
+    JobService,
+    QueueLimits,
+    Results,
+    Scheduler,
+    add_job_service,
+    caller_of,
+)
+from robosc_server.jobs.service import Context
+from robosc_server.store import JobRecord, JobState, Store, open_store
+from robosc_server.tasks.task import TaskLimits
+from support.job_workers import ScriptedWorkers, accepted
+
+PATIENCE_S = 60.0
+"""How long a test waits for what must happen; only a failing test waits so long."""
+
+ME = Caller("me")
+
+
+@dataclass
+class Times:
+    """The time, as a test wants it."""
+
+    wall_s: float = 1_700_000_000.0
+    monotonic_s: float = 0.0
+
+    def wall(self) -> float:
+        return self.wall_s
+
+    def monotonic(self) -> float:
+        return self.monotonic_s
+
+
+@dataclass
+class Parts:
+    """Everything that belongs together."""
+
+    store: Store
+    workers: ScriptedWorkers
+    scheduler: Scheduler
+    results: Results
+    manager: JobManager
+
+
+@dataclass
+class Choices:
+    """How the parts are made."""
+
+    url: str = ""
+    limits: JobLimits = field(default_factory=lambda: JobLimits(look_s=0.02, sweep_s=3600.0))
+    queue: QueueLimits = field(default_factory=QueueLimits)
+    capacity: int = 2
+    memory_bytes: int = 2**20
+    times: Times = field(default_factory=Times)
+
+
+@asynccontextmanager
+async def parts(folder: Path, choices: Choices | None = None) -> AsyncIterator[Parts]:
+    """All parts, working."""
+    chosen = choices or Choices()
+    store = await asyncio.to_thread(open_store, folder, chosen.url, chosen.times.wall)
+    try:
+        workers = ScriptedWorkers(chosen.capacity)
+        scheduler = Scheduler(workers, chosen.queue)
+        async with Results(store, chosen.memory_bytes) as results:
+            manager = JobManager(
+                store, scheduler, workers, results, TaskLimits(), chosen.limits, chosen.times.monotonic
+            )
+            async with manager:
+                yield Parts(store, workers, scheduler, results, manager)
+    finally:
+        await asyncio.to_thread(store.close)
+
+
+@asynccontextmanager
+async def offered(manager: JobManager, identify: Callable[[Context], Caller] = caller_of) -> AsyncIterator[Any]:
+    """The jobs' service over gRPC; yields a stub."""
+    server = grpc.aio.server()
+    add_job_service(JobService(manager, accepted, identify), server)
+    port = server.add_insecure_port("127.0.0.1:0")
+    await server.start()
+    try:
+        async with grpc.aio.insecure_channel(f"127.0.0.1:{port}") as channel:
+            yield jobs_pb2_grpc.JobServiceStub(channel)  # type: ignore[no-untyped-call]
+    finally:
+        await server.stop(None)
+
+
+def in_loop(test: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    """Run a test in an event loop."""
+    asyncio.run(test())
+
+
+async def ended(manager: JobManager, job_id: str, caller: Caller = ME) -> JobRecord:
+    """A job when it has ended."""
+    async with asyncio.timeout(PATIENCE_S):
+        async for record in manager.watch(job_id, caller, 0):
+            if record.state.has_ended:
+                return record
+    raise AssertionError("it never ended")
+
+
+async def until(condition: Callable[[], Awaitable[bool]]) -> None:
+    """Wait until a condition holds."""
+    end_s = time.monotonic() + PATIENCE_S
+    while not await condition():
+        assert time.monotonic() < end_s, "it never came true"
+        await asyncio.sleep(0.005)
+
+
+async def is_in(manager: JobManager, job_id: str, state: JobState) -> bool:
+    """Whether a job is in a state."""
+    return (await manager.get(job_id, ME)).state is state
+
+
+async def messages_of_job(manager: JobManager, job_id: str) -> tuple[bytes, ...]:
+    """The result of a job."""
+    _, messages = await manager.result(job_id, ME)
+    return tuple([message async for message in messages])

@@ -2,7 +2,7 @@
 
 The base image is this machine's own /usr with its Python at /usr/local; everything else is what the Dockerfile says: its
 RUN instructions, its user, its paths. The root is read-only, the network is its own, no capability is left, and the
-program is process 1, as in an engine. Packages come from a folder of wheels that `make image-wheels` has filled.
+program is process 1, as in an engine. Packages come from a folder of wheels that `make images` has filled.
 """
 
 import contextlib
@@ -16,6 +16,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -42,7 +43,7 @@ def why_not(wheels: Path) -> str:
         return "no namespaces can be made here"
     if sys.base_prefix == "/usr":
         return "the interpreter is the system's own; the base image is imitated with one beside it"
-    return "" if wheels.is_dir() else "no wheels are there: make image-wheels"
+    return "" if wheels.is_dir() else "no wheels are there: make images"
 
 
 @dataclass(frozen=True)
@@ -305,6 +306,10 @@ class Container:
             assert self._outer.poll() is None, self.output
             time.sleep(0.05)
 
+    def wait(self, limit_s: float) -> int:
+        """Its exit status, waiting for its end."""
+        return self._outer.wait(limit_s)
+
     def stop(self, limit_s: float) -> int:
         """Tell it to end, and wait; returns its exit status."""
         os.kill(self.pid, signal.SIGTERM)
@@ -324,8 +329,29 @@ def _host_path(root: Path, path: str) -> str:
     return ":".join([*places, "/usr/bin", "/usr/sbin"])
 
 
+def wheels_of(name: str) -> Path:
+    """Where the packages of an image lie, once `make images` has fetched them."""
+    return TOP / "out" / "wheels" / name
+
+
 def seconds(text: str) -> float:
     """A duration as Docker writes it."""
     match = re.fullmatch(r"(\d+)(s|m)", text)
     assert match, text
     return int(match[1]) * {"s": 1, "m": 60}[match[2]]
+
+
+def main() -> int:
+    """Build every image once, so that the next time is a matter of seconds; returns the exit status."""
+    for name in ("server", "bridge"):
+        reason = why_not(wheels_of(name))
+        if reason:
+            sys.stderr.write(f"{name}: {reason}\n")
+            return 0
+        with tempfile.TemporaryDirectory() as folder:
+            build(name, wheels_of(name), Path(folder))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -108,7 +108,9 @@ def _carry_out(stage: Stage, root: Path, roots: Mapping[str, Path], wheels: Path
                 goal = _inside(root, os.path.join(place, target))
                 if "from" in item.flags:
                     (source,) = sources
-                    shutil.copytree(_inside(roots[item.flags["from"]], source), goal, symlinks=True, copy_function=_link)
+                    shutil.copytree(
+                        _inside(roots[item.flags["from"]], source), goal, symlinks=True, copy_function=_link
+                    )
                     continue
                 for source, file in context_files(TOP, sources, ignored):
                     relative = file.relative_to(TOP / source) if (TOP / source).is_dir() else file.name
@@ -248,7 +250,7 @@ class Start:
     user: tuple[int, int] = (10001, 10001)
     files: Mapping[str, Path] = field(default_factory=dict)
     volumes: Mapping[str, Path] = field(default_factory=dict)
-    temporary: Sequence[str] = ("/tmp",)  # noqa: S108
+    temporary: Sequence[str] = ("/tmp",)
     folder: str = "/"
     hosts: Sequence[str] = ()
     is_memory_sealed: bool = False

@@ -11,12 +11,13 @@ import logging
 import math
 import secrets
 import time
+import traceback
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterable, Mapping
 from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Any, Self
 
-from robosc_server.failures import RefusedError
+from robosc_server.failures import RefusedError, for_callers
 from robosc_server.jobs.callers import Caller
 from robosc_server.jobs.limits import JobLimits
 from robosc_server.jobs.results import Results
@@ -24,7 +25,7 @@ from robosc_server.jobs.scheduler import Place, Scheduler
 from robosc_server.jobs.watching import Watchers
 from robosc_server.store import JobFilter, JobRecord, JobState, Store, StoreUnavailableError
 from robosc_server.store.records import STEP, messages_of
-from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, Task, TaskLimits
+from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, Task, TaskKind, TaskLimits
 from robosc_server.workers import Workers, WorkersError
 
 _log = logging.getLogger(__name__)
@@ -258,6 +259,12 @@ class JobManager:
             raise RefusedError(Reason.JOB_CANCELLED, "the job was cancelled, and has no result")
         if record.result_key is None:
             raise RefusedError(Reason.JOB_NOT_ENDED, "the job has not ended; watch it")
+        if record.kind is TaskKind.SYNTHESIZE:
+            # One message, and the only one that has something done to it before it is sent.
+            result = await self._results.find(record.result_key)
+            if result is None:
+                raise StoreUnavailableError
+            return record, _each(result.messages)
         number = await self._store.count_blocks(record.result_key)
         if number is None:
             raise _no_such_job()
@@ -300,8 +307,8 @@ class JobManager:
         """Have a job kept, then carry it."""
         record = carried.record
         try:
-            at_hand = self._results.at_hand(task.key)
-            answer = await self._store.accept(record, task.request, at_hand, self._limits.jobs_per_owner)
+            result = self._results.unwritten(task.key)
+            answer = await self._store.accept(record, task.request, result, self._limits.jobs_per_owner)
         except BaseException:
             # It may be kept nevertheless: one of the next looks finds it then.
             self._doubtful_looks = _DOUBTFUL_LOOKS
@@ -332,9 +339,7 @@ class JobManager:
         try:
             outcome = await self._outcome(carried)
         except Exception:
-            fault = secrets.token_hex(4)
-            outcome = Failure(Reason.INTERNAL_FAULT, f"internal error {fault}, see the server's log")
-            _log.exception("fault %s: job %s cannot be carried on", fault, carried.record.id)
+            outcome = Failure(Reason.INTERNAL_FAULT, "a fault of the server", traceback.format_exc())
         self._give_place_back(carried)
         if outcome is not None:
             await self._end(carried, outcome)
@@ -380,8 +385,8 @@ class JobManager:
     async def _end(self, carried: _Carried, outcome: Outcome) -> None:
         """Have the end of a job kept, however long that takes."""
         job_id = carried.record.id
-        if isinstance(outcome, Failure) and outcome.details:
-            _log.error("job %s failed (%s): %s", job_id, outcome.reason, outcome.details)
+        if isinstance(outcome, Failure):
+            outcome = for_callers(outcome)
         while True:
             try:
                 ended = await self._store.end(job_id, self._replica, outcome)
@@ -391,7 +396,7 @@ class JobManager:
         if ended is None:
             return
         if isinstance(outcome, Result):
-            self._results.remember(ended.key, outcome)
+            self._results.remember(ended.key, ended.kind, outcome)
             self._needed_bytes += sum(map(len, outcome.messages))
         self._set(carried, ended)
 
@@ -577,6 +582,11 @@ class JobManager:
         await self._store.sweep(self._limits.results_bytes)
         self._needed_bytes = await self._store.size_of_needed()
         self._counts = await self._store.counts_by_state()
+
+
+async def _each(messages: Iterable[bytes]) -> AsyncIterator[bytes]:
+    for message in messages:
+        yield message
 
 
 def _may_see(caller: Caller, record: JobRecord) -> bool:

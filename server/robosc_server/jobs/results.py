@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import logging
 from collections import OrderedDict
+from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
@@ -18,6 +19,10 @@ _TOUCHED = 10_000
 _TOUCH_S = 30.0
 
 
+def _as_it_is(kind: TaskKind, result: Result) -> Result:
+    return result
+
+
 class Results:
     """What was worked out before. Without the database it goes on with what it has in memory.
 
@@ -26,10 +31,13 @@ class Results:
     Args:
         store: The database.
         memory_bytes: How much is kept in memory, those that were asked for last.
+        finish: What is done to a result before it is sent; the database has it as it was made.
     """
 
-    def __init__(self, store: Store, memory_bytes: int) -> None:
-        self._store, self._memory_bytes = store, memory_bytes
+    def __init__(
+        self, store: Store, memory_bytes: int, finish: Callable[[TaskKind, Result], Result] = _as_it_is
+    ) -> None:
+        self._store, self._memory_bytes, self._finish = store, memory_bytes, finish
         self._memory: OrderedDict[str, Result] = OrderedDict()
         self._taken_bytes = 0
         self._unwritten: OrderedDict[str, tuple[TaskKind, Result]] = OrderedDict()
@@ -73,35 +81,54 @@ class Results:
         unwritten = self._unwritten.get(key)
         if unwritten is not None:
             self.hits += 1
-            return unwritten[1]
+            return self.remember(key, *unwritten)
+        there = None
         with contextlib.suppress(StoreUnavailableError):
-            found = await self._store.find_result(key)
-        if found is None:
+            there = await self._store.find_result(key)
+        if there is None:
             self.misses += 1
             return None
         self.hits += 1
         self._note_use(key)
-        self.remember(key, found)
-        return found
+        return self.remember(key, *there)
 
-    def keep(self, key: str, kind: TaskKind, result: Result) -> None:
-        """Keep a result in memory, and before long in the database, unless too much waits to be written there."""
-        self.remember(key, result)
+    def unwritten(self, key: str) -> Result | None:
+        """A result, as it was made, that the database will have before long."""
+        found = self._unwritten.get(key)
+        return None if found is None else found[1]
+
+    def keep(self, key: str, kind: TaskKind, result: Result) -> Result:
+        """Keep a new result in memory, and before long in the database, unless too much waits to be written there.
+
+        Returns:
+            The result as it is sent.
+        """
+        finished = self.remember(key, kind, result)
         size = _size_of(result)
         if key not in self._unwritten and self._unwritten_bytes + size <= _UNWRITTEN_BYTES:
             self._unwritten[key] = kind, result
             self._unwritten_bytes += size
             self._has_unwritten.set()
+        return finished
 
-    def remember(self, key: str, result: Result) -> None:
-        """Keep a result in memory alone."""
-        size = _size_of(result)
-        if key in self._memory or size > self._memory_bytes:
-            return
-        self._memory[key] = result
+    def remember(self, key: str, kind: TaskKind, result: Result) -> Result:
+        """Keep a result in memory alone.
+
+        Returns:
+            The result as it is sent.
+        """
+        known = self._memory.get(key)
+        if known is not None:
+            return known
+        finished = self._finish(kind, result)
+        size = _size_of(finished)
+        if size > self._memory_bytes:
+            return finished
+        self._memory[key] = finished
         self._taken_bytes += size
         while self._taken_bytes > self._memory_bytes:
             self._taken_bytes -= _size_of(self._memory.popitem(last=False)[1])
+        return finished
 
     def _note_use(self, key: str) -> None:
         if len(self._touched) < _TOUCHED:

@@ -22,8 +22,7 @@ from robosc_server.store.errors import StoreError
 from robosc_server.store.schema import prepare
 from robosc_server.store.store import Store
 
-_FILE = "jobs.sqlite3"
-_LOCK = "lock"
+DATABASE_FILE = "jobs.sqlite"
 _LOG_BYTES = 16 * 2**20
 _BUSY_S = 5.0
 
@@ -42,31 +41,36 @@ _held: set[Path] = set()
 _held_lock = threading.Lock()
 
 
-def open_store(state_dir: Path, database_url: str = "", wall_clock: Callable[[], float] = time.time) -> Store:
+def open_store(state_dir: Path, database_url: str | None = None, wall_clock: Callable[[], float] = time.time) -> Store:
     """The server's database, with its tables; blocks until it has answered.
 
     Args:
         state_dir: Folder for SQLite; made where it is missing.
-        database_url: `postgresql://USER:PASSWORD@HOST:PORT/NAME`; empty: SQLite.
+        database_url: `postgresql://USER:PASSWORD@HOST:PORT/NAME`, or `sqlite:///FILE`; None: a file in the folder.
         wall_clock: Seconds since 1970.
 
     Raises:
         StoreError: It cannot be used.
     """
+    path = state_dir / DATABASE_FILE
     if database_url:
-        return Store(_open_postgresql(database_url), wall_clock=wall_clock)
-    database, lock = _open_sqlite(state_dir)
+        try:
+            url = make_url(database_url)
+        except ArgumentError as error:
+            # Not the text itself: it may hold a password.
+            raise StoreError("the database's URL is none; write postgresql://USER:PASSWORD@HOST:PORT/NAME") from error
+        if url.drivername in {"postgresql", "postgresql+psycopg"}:
+            return Store(_open_postgresql(url), wall_clock=wall_clock)
+        if url.drivername not in {"sqlite", "sqlite+pysqlite"}:
+            raise StoreError(f"the database '{url.drivername}' is not supported, only postgresql and sqlite")
+        if not url.database or url.database == ":memory:" or url.query:
+            raise StoreError("a URL of SQLite names a file: sqlite:///FILE")
+        path = Path(url.database)
+    database, lock = _open_sqlite(path)
     return Store(database, lambda: _unlock(lock), wall_clock)
 
 
-def _open_postgresql(text: str) -> Database:
-    try:
-        url = make_url(text)
-    except ArgumentError as error:
-        # Not the text itself: it may hold a password.
-        raise StoreError("the database's URL is not one; write postgresql://USER:PASSWORD@HOST:PORT/NAME") from error
-    if url.drivername not in {"postgresql", "postgresql+psycopg"}:
-        raise StoreError(f"there is no database '{url.drivername}'; only postgresql, and SQLite without a URL")
+def _open_postgresql(url: URL) -> Database:
     try:
         engine = create_engine(
             url.set(drivername="postgresql+psycopg"),
@@ -83,13 +87,13 @@ def _open_postgresql(text: str) -> Database:
     return Database(engine, readers=_POSTGRESQL_THREADS, writers=_POSTGRESQL_THREADS)
 
 
-def _open_sqlite(folder: Path) -> tuple[Database, tuple[Path, int]]:
+def _open_sqlite(given: Path) -> tuple[Database, tuple[Path, int]]:
     try:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        lock = _locked(folder.resolve() / _LOCK)
+        given.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        path = given.resolve()
+        lock = _locked(path)
     except OSError as error:
-        raise StoreError(f"the state folder {folder} cannot be used: {error.strerror}") from error
-    path = folder.resolve() / _FILE
+        raise StoreError(f"the database {given} cannot be used: {error.strerror}") from error
     try:
         # What is in it is the callers'.
         os.close(os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600))
@@ -152,17 +156,17 @@ def _begin_sqlite(connection: Connection) -> None:
 
 
 def _locked(path: Path) -> tuple[Path, int]:
-    """A lock of this process on a file, which no child inherits; POSIX record locks know no threads, so `_held` does.
+    """A lock of this process beside a file, which no child inherits; within the process, `_held` tells.
 
     Raises:
         StoreError: Somebody else has it.
         OSError: The file cannot be made.
     """
-    taken = StoreError(f"the state folder {path.parent} is in use by another robosc-server")
+    taken = StoreError(f"the database {path} is in use by another robosc-server")
     with _held_lock:
         if path in _held:
             raise taken
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        descriptor = os.open(path.with_name(f"{path.name}.lock"), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
         try:
             fcntl.lockf(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except (BlockingIOError, PermissionError) as error:

@@ -34,12 +34,13 @@ def read_block(connection: Connection, key: str, number: int) -> bytes | None:
     return None if content is None else bytes(content)
 
 
-def read_blocks(connection: Connection, key: str) -> list[bytes] | None:
-    """All blocks of a result; None: there is none."""
-    if connection.scalar(select(RESULTS.c.key).where(RESULTS.c.key == key)) is None:
+def read_blocks(connection: Connection, key: str) -> tuple[TaskKind, list[bytes]] | None:
+    """What a result is of, and all its blocks; None: there is none."""
+    kind = connection.scalar(select(RESULTS.c.kind).where(RESULTS.c.key == key))
+    if kind is None:
         return None
     query = select(BLOCKS.c.content).where(BLOCKS.c.key == key).order_by(BLOCKS.c.number)
-    return [bytes(content) for content in connection.scalars(query)]
+    return TaskKind(kind), [bytes(content) for content in connection.scalars(query)]
 
 
 def touch(connection: Connection, keys: Collection[str], now_us: int) -> None:

@@ -177,12 +177,13 @@ class Store:
         now_us = self.now_us()
         await self._database.write(lambda connection: result_rows.insert_result(connection, key, kind, result, now_us))
 
-    async def find_result(self, key: str) -> Result | None:
-        """A whole result."""
-        blocks = await self._database.read(lambda connection: result_rows.read_blocks(connection, key))
-        if blocks is None:
+    async def find_result(self, key: str) -> tuple[TaskKind, Result] | None:
+        """A whole result, and what its task was."""
+        found = await self._database.read(lambda connection: result_rows.read_blocks(connection, key))
+        if found is None:
             return None
-        return Result(tuple(message for block in blocks for message in messages_of(block)))
+        kind, blocks = found
+        return kind, Result(tuple(message for block in blocks for message in messages_of(block)))
 
     async def count_blocks(self, key: str) -> int | None:
         """How many blocks a result has; None: there is none."""

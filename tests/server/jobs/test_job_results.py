@@ -1,0 +1,101 @@
+"""What was worked out before: in memory, in the database, and without the database."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from robosc_server.jobs import Results
+from robosc_server.store import Store, StoreUnavailableError, open_store
+from robosc_server.tasks.task import Result, TaskKind
+from support.job_parts import in_loop, until
+
+_KIND = TaskKind.SYNTHESIZE
+
+
+async def is_written(store: Store, key: str) -> bool:
+    return await store.find_result(key) is not None
+
+
+def test_what_is_kept_is_written_beside_as_it_was_made_and_sent_as_it_is_finished(tmp_path: Path) -> None:
+    def finish(kind: TaskKind, result: Result) -> Result:
+        assert kind is _KIND
+        return Result((*result.messages, b"signed"))
+
+    async def test() -> None:
+        store = open_store(tmp_path)
+        made, sent = Result((b"a", b"")), Result((b"a", b"", b"signed"))
+        async with Results(store, 10_000, finish) as results:
+            assert await results.find("k") is None
+            assert results.keep("k", _KIND, made) == sent
+            assert results.unwritten("k") == made
+            assert results.at_hand("k") == await results.find("k") == sent
+            await until(lambda: is_written(store, "k"))
+            assert await store.find_result("k") == (_KIND, made)
+            assert (results.hits, results.misses) == (2, 1)
+        async with Results(store, 10_000, finish) as results:
+            assert results.at_hand("k") is None
+            assert await results.find("k") == sent
+            assert results.at_hand("k") == sent
+        store.close()
+
+    in_loop(test)
+
+
+def test_memory_is_bounded_and_what_was_asked_for_last_stays(tmp_path: Path) -> None:
+    async def test() -> None:
+        store = open_store(tmp_path)
+        results = Results(store, 5_000)
+        for key in "abc":
+            results.remember(key, _KIND, Result((bytes(1000),)))
+        assert results.at_hand("a") is not None
+        results.remember("d", _KIND, Result((bytes(1000),)))
+        assert [key for key in "abcd" if results.at_hand(key)] == ["a", "c", "d"]
+        results.remember("large", _KIND, Result((bytes(5_000),)))
+        assert results.at_hand("large") is None
+        assert [key for key in "abcd" if results.at_hand(key)] == ["a", "c", "d"]
+        store.close()
+
+    in_loop(test)
+
+
+def test_without_the_database_it_goes_on_and_writes_when_it_is_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def test() -> None:
+        store = open_store(tmp_path)
+        tried = asyncio.Event()
+        keep = store.keep_result
+
+        async def away(*_: object) -> None:
+            tried.set()
+            error = StoreUnavailableError()
+            error.retry_after_s = 0.01
+            raise error
+
+        async with Results(store, 0) as results:
+            monkeypatch.setattr(store, "keep_result", away)
+            monkeypatch.setattr(store, "find_result", away)
+            results.keep("k", _KIND, Result((b"a",)))
+            await tried.wait()
+            assert await results.find("other") is None
+            assert await results.find("k") == Result((b"a",))
+            monkeypatch.undo()
+            assert store.keep_result == keep
+            await until(lambda: is_written(store, "k"))
+        store.close()
+
+    in_loop(test)
+
+
+def test_what_was_kept_shortly_before_the_end_is_there_after_it(tmp_path: Path) -> None:
+    async def test() -> None:
+        store = open_store(tmp_path)
+        async with Results(store, 0) as results:
+            for number in range(20):
+                results.keep(str(number), _KIND, Result((bytes(number),)))
+        for number in range(20):
+            assert await store.find_result(str(number)) == (_KIND, Result((bytes(number),)))
+        store.close()
+
+    in_loop(test)

@@ -1,0 +1,180 @@
+"""The database itself: opening, refusing, surviving."""
+
+import asyncio
+import os
+import sqlite3
+import stat
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sqlalchemy import Connection, text
+
+from robosc_server.store import StoreError, StoreUnavailableError, open_store
+from robosc_server.store.records import blocks_of, messages_of
+from support.job_parts import PATIENCE_S, in_loop
+
+_HOLD = """
+import sys
+from pathlib import Path
+from robosc_server.store import open_store
+store = open_store(Path(sys.argv[1]))
+print("open", flush=True)
+sys.stdin.read()
+"""
+
+
+@given(st.lists(st.one_of(st.binary(max_size=50), st.integers(0, 2**20).map(bytes)), max_size=12))
+def test_messages_are_found_again_in_their_blocks(messages: list[bytes]) -> None:
+    blocks = list(blocks_of(messages))
+    assert [message for block in blocks for message in messages_of(block)] == messages
+    assert all(len(block) <= 512 * 1024 or len(list(messages_of(block))) == 1 for block in blocks)
+
+
+def test_a_folder_is_for_one_server_and_free_after_a_kill(tmp_path: Path) -> None:
+    folder = tmp_path / "deep" / "state"
+    holder = subprocess.Popen(
+        [sys.executable, "-c", _HOLD, str(folder)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert holder.stdout is not None and holder.stdout.readline() == "open\n"
+        with pytest.raises(StoreError, match="in use by another robosc-server"):
+            open_store(folder)
+    finally:
+        holder.kill()
+        holder.communicate(timeout=PATIENCE_S)
+    store = open_store(folder)
+    with pytest.raises(StoreError, match="in use by another robosc-server"):
+        open_store(folder)
+    store.close()
+    open_store(folder, f"sqlite:///{folder}/jobs.sqlite").close()
+
+
+def test_what_is_kept_is_for_its_owner_alone(tmp_path: Path) -> None:
+    folder = tmp_path / "state"
+    store = open_store(folder)
+    try:
+        assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+        assert {stat.S_IMODE(path.stat().st_mode) for path in folder.iterdir()} == {0o600}
+    finally:
+        store.close()
+
+
+def test_a_newer_or_foreign_database_is_not_touched(tmp_path: Path) -> None:
+    open_store(tmp_path).close()
+    path = tmp_path / "jobs.sqlite"
+    with sqlite3.connect(path) as connection:
+        connection.execute("UPDATE robosc_schema SET version = 2")
+    connection.close()
+    with pytest.raises(StoreError, match="version 2, and this server knows version 1"):
+        open_store(tmp_path)
+    with sqlite3.connect(path) as connection:
+        connection.execute("DROP TABLE robosc_schema")
+    connection.close()
+    with pytest.raises(StoreError, match="of something else"):
+        open_store(tmp_path)
+    path.write_bytes(b"This is no database, whatever its name says. " * 100)
+    with pytest.raises(StoreError, match="not a database"):
+        open_store(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("url", "message"),
+    [
+        ("nonsense", "the database's URL is none"),
+        ("mysql://me:secret@host/name", "'mysql' is not supported"),
+        ("sqlite://", "names a file"),
+        ("sqlite:///:memory:", "names a file"),
+        ("postgresql://me:secret@127.0.0.1:1/name", "cannot be used"),
+    ],
+)
+def test_other_urls_are_refused_without_their_passwords(tmp_path: Path, url: str, message: str) -> None:
+    with pytest.raises(StoreError, match=message) as refused:
+        open_store(tmp_path, url)
+    assert "secret" not in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(StoreError, match="cannot be used"):
+        open_store(tmp_path / "file" / "state")
+
+
+def test_a_transaction_that_takes_too_long_is_cut_off_and_the_next_one_is_served(tmp_path: Path) -> None:
+    store = open_store(tmp_path)
+    endless = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT count(*) FROM n"
+    ended = threading.Event()
+
+    def work(connection: Connection) -> None:
+        try:
+            connection.execute(text(endless))
+        finally:
+            ended.set()
+
+    async def test() -> None:
+        store._database._answer_s = 0.2
+        for _ in range(5):  # More than there are threads.
+            with pytest.raises(StoreUnavailableError):
+                await store._database.read(work)
+            assert await asyncio.to_thread(ended.wait, PATIENCE_S)
+            ended.clear()
+        assert not store.is_available
+        store._database._answer_s = PATIENCE_S
+        assert await store.find("x") is None
+        assert store.is_available
+
+    in_loop(test)
+    store.close()
+
+
+def test_the_event_loop_is_never_held_up(tmp_path: Path) -> None:
+    store = open_store(tmp_path)
+
+    def slow(connection: Connection) -> None:
+        time.sleep(0.3)
+
+    async def test() -> None:
+        loop = asyncio.get_running_loop()
+        writing = asyncio.gather(*(store._database.write(slow) for _ in range(2)))
+        worst_s, last_s = 0.0, loop.time()
+        while not writing.done():
+            await asyncio.sleep(0.005)
+            worst_s, last_s = max(worst_s, loop.time() - last_s), loop.time()
+        await writing
+        assert worst_s < 0.25
+
+    in_loop(test)
+    store.close()
+
+
+def test_the_log_of_changes_stays_short(tmp_path: Path) -> None:
+    store = open_store(tmp_path)
+
+    def work(connection: Connection) -> None:
+        connection.execute(text("CREATE TABLE IF NOT EXISTS filler (content BLOB)"))
+        connection.execute(text("INSERT INTO filler VALUES (zeroblob(4000000))"))
+        connection.execute(text("DELETE FROM filler"))
+
+    async def test() -> None:
+        for _ in range(15):
+            await store._database.write(work)
+
+    in_loop(test)
+    log = tmp_path / "jobs.sqlite-wal"
+    assert log.stat().st_size < 24 * 2**20
+    # And pages that are free go back to the disk.
+    path = tmp_path / "jobs.sqlite"
+
+    async def sweep() -> None:
+        await store.sweep(0)
+
+    in_loop(sweep)
+    store.close()
+    assert path.stat().st_size < 2**20
+    assert os.path.lexists(path)

@@ -24,21 +24,24 @@ PATIENCE_S = 60.0
 
 
 @contextmanager
-def served(task_function: str = TASK_FUNCTION, /, **settings: Any) -> Iterator[str]:
+def served(task_function: str = TASK_FUNCTION, /, *, given_workers: Any = None, **settings: Any) -> Iterator[str]:
     """A server in a thread of this process; yields its address.
 
     Args:
         task_function: What does the tasks, such as `fake_tasks.TASK_FUNCTION`.
+        given_workers: Who does the tasks instead, not started yet; None: processes of this machine.
         **settings: Those that are not as usual.
     """
     with tempfile.TemporaryDirectory() as folder:
         usual = {"port": 0, "worker_processes": 1, "state_dir": Path(folder), "drain_seconds": 0.5}
-        with _served(Settings(**(usual | settings)), task_function) as address:
+        chosen = Settings.model_validate(usual | settings)
+        workers = given_workers or LocalWorkers(chosen.worker_processes, task_function)
+        with _served(chosen, workers) as address:
             yield address
 
 
 @contextmanager
-def _served(chosen: Settings, task_function: str) -> Iterator[str]:
+def _served(chosen: Settings, workers: Any) -> Iterator[str]:
     address: list[str] = []
     failure: list[BaseException] = []
     ready = threading.Event()
@@ -46,7 +49,7 @@ def _served(chosen: Settings, task_function: str) -> Iterator[str]:
     stop = asyncio.Event()
 
     async def run() -> None:
-        async with running_server(chosen, LocalWorkers(chosen.worker_processes, task_function)) as name:
+        async with running_server(chosen, workers) as name:
             address.append(name)
             ready.set()
             await stop.wait()

@@ -1,4 +1,4 @@
-"""Commands beside serving: `robosc-server token`, `check-config` and `example-config`."""
+"""Commands beside serving: `robosc-server token`, `check-config`, `example-config` and `health`."""
 
 import argparse
 import json
@@ -42,9 +42,17 @@ def run_command(words: Sequence[str]) -> int | None:
         "token": new_token,
         "check-config": check_config,
         "example-config": print_example,
+        "health": _health,
     }
     command = commands.get(words[0]) if words else None
     return None if command is None else command(words[1:])
+
+
+def _health(argv: Sequence[str]) -> int:
+    # It stands beside the server, whose settings it reads from here.
+    from robosc_server import health_check
+
+    return health_check.main(argv)
 
 
 def new_token(argv: Sequence[str]) -> int:

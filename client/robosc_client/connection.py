@@ -2,8 +2,8 @@
 
 from robosc_client.convert.assembly import MAXIMUM_BYTES
 
-KEEPALIVE_MS = 330_000
-"""A connection on which nothing comes is tried after so long: a little less often than any server of gRPC forbids."""
+KEEPALIVE_MS = 60_000
+"""A connection on which nothing comes is tried after so long: not more often than servers put up with."""
 
 CHANNEL_OPTIONS: tuple[tuple[str, int], ...] = (
     # One message holds a whole supervisor; what surrounds it is little.

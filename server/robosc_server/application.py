@@ -13,7 +13,7 @@ from grpc_reflection.v1alpha import reflection
 
 from robosc import __version__
 from robosc_api.malformed import MalformedRequests
-from robosc_api.security import Guard, Rule, Scope, SecurityError, TokenFile, add_port
+from robosc_api.security import Guard, Rule, Scope, SecurityError, TokenFile, add_port, check_listening
 from robosc_server.desk import Desk
 from robosc_server.jobs import (
     JOB_METHODS,
@@ -29,7 +29,7 @@ from robosc_server.jobs import (
 from robosc_server.operations.drain import drain
 from robosc_server.operations.health import Health
 from robosc_server.operations.interceptor import CallInterceptor
-from robosc_server.operations.metrics import Metrics, MetricsEndpoint
+from robosc_server.operations.metrics import Metrics, MetricsEndpoint, check_metrics_address
 from robosc_server.operations.observed import ObservedWorkers
 from robosc_server.operations.quotas import Quotas
 from robosc_server.operations.settings import Settings
@@ -89,6 +89,10 @@ async def running_server(settings: Settings, workers: Workers | None = None) -> 
 
 async def _start(settings: Settings, given_workers: Workers | None, stack: AsyncExitStack) -> str:
     """Put the parts together; the stack takes them apart, the last one first."""
+    # What is wrong with the settings is told before anything is started.
+    check_listening(settings.address, settings.security)
+    if settings.metrics_address:
+        check_metrics_address(settings.metrics_address, beyond_loopback=settings.metrics_beyond_loopback)
     tokens = None if settings.tokens is None else TokenFile(settings.tokens)
     request_limits = RequestLimits(
         bundle_bytes=settings.bundle_bytes, bundle_files=settings.bundle_files, nodes=settings.task_nodes
@@ -121,7 +125,12 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
     synthesis = SynthesisService(
         Desk(results, scheduler, quotas, settings.task_limits, metrics), outgoing, request_limits, targets, version
     )
-    jobs = JobService(manager, lambda kind, request: accepted(kind, request, request_limits), admit=quotas.admit)
+    jobs = JobService(
+        manager,
+        lambda kind, request: accepted(kind, request, request_limits),
+        admit=quotas.admit,
+        send=outgoing.send_one,
+    )
 
     calls = CallInterceptor(metrics, tracing)
     services = {SERVICE_NAME: METHODS, JOB_SERVICE_NAME: JOB_METHODS}

@@ -1,3 +1,6 @@
+"""`robosc-client` and `robosc` side by side: what one prints and writes, the other one does."""
+
+import io
 import signal
 import subprocess
 import sys
@@ -10,24 +13,23 @@ import pytest
 from robosc.cli.main import main as robosc
 from robosc.language import load_bundle
 from robosc.model.structure import Deployment
-from robosc.supervisor import decode
+from robosc.supervisor import decode, encode
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.main import main as robosc_client
-from robosc_server.settings import Settings
+from support.answers import exploration, supervisor, synthesis, verification
+from support.fake_tasks import TASK_FUNCTION
 from support.models import EXAMPLE_DEPLOYMENTS
 from support.models import EXAMPLES as EXAMPLES_FOLDER
-from support.service import (
-    FAKE_WORKER,
-    PATIENCE_S,
-    Scripted,
-    eventually,
-    is_running,
-    scripted,
-    served,
-    server_process,
-)
+from support.mutants import change
+from support.scripted_service import scripted
+from support.service import PATIENCE_S, eventually, is_running, served, server_process
 
 EXAMPLES = sorted(EXAMPLES_FOLDER.glob("*/*.rscd"))
+NAVIGATION = EXAMPLES_FOLDER / "navigation" / "navigation.rscd"
+
+VERDICT = """{"status": "holds", "properties": [{"name": null, "property": "EF true", "holds": true, "run":
+{"kind": "witness", "states": [{"components": {}, "variables": {}, "communications": {}}], "events": [], "left": [],
+"loop": null}}]}"""
 
 ERRONEOUS = "robot R { component C { incoming message go with type: Missing } requirement jump needs C.x }"
 
@@ -105,7 +107,7 @@ def server() -> Any:
 @pytest.fixture(scope="module")
 def fake() -> Any:
     """Address of a server whose work does what the model's text says."""
-    with served(Settings(port=0, workers=2, max_bundle_bytes=1000), FAKE_WORKER) as address:
+    with served(TASK_FUNCTION, worker_processes=2, bundle_bytes=1000) as address:
         yield address
 
 
@@ -113,12 +115,14 @@ def fake() -> Any:
 def both(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], server: Any) -> Any:
     """Run a command here and on the server, each in a folder of its own; gives what each did."""
 
-    def run(*arguments: Any) -> Any:
+    def run(*arguments: Any, prepare: Any = None) -> Any:
         outcomes = []
         for name, program, more in (("here", robosc, []), ("there", robosc_client, ["--server", server])):
-            folder = tmp_path / name
+            folder = tmp_path / f"{name}-{len(list(tmp_path.iterdir()))}"
             folder.mkdir()
             monkeypatch.chdir(folder)
+            if prepare is not None:
+                prepare(folder)
             status = program([*map(str, arguments), *more])
             printed = capfd.readouterr()
             files = {
@@ -130,6 +134,18 @@ def both(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureF
         return outcomes
 
     return run
+
+
+@pytest.fixture(scope="module")
+def supervisors(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a right supervisor, a wrong one, one of another model, and what is none."""
+    folder = tmp_path_factory.mktemp("supervisors")
+    assert robosc(["synth", str(NAVIGATION), "-o", str(folder / "right.rsup")]) == 0
+    assert robosc(["synth", str(EXAMPLES[0]), "-o", str(folder / "other.rsup")]) == 0
+    right = decode((folder / "right.rsup").read_bytes())
+    (folder / "wrong.rsup").write_bytes(encode(change(right, added=())))
+    (folder / "none.rsup").write_bytes(b"{}")
+    return folder
 
 
 def write(folder: Any, text: str, name: str = "robot.rscd") -> Any:
@@ -178,6 +194,73 @@ class TestSameAsHere:
         assert here == there
         assert here[0] == 0
         assert len(here[3]) > 1
+
+    @pytest.mark.parametrize("how", [[], ["--json"], ["--dot"], ["--limit", "3"], ["--deployment", "layer"]])
+    def test_explore(self, both: Any, how: Any) -> None:
+        model = next(path for path in EXAMPLES if path.stem == "maze_solver")
+        here, there = both("explore", model, *how)
+        assert here == there
+        assert here[0] == (1 if "--limit" in how else 0)
+
+    @pytest.mark.parametrize(
+        ("which", "how", "status"),
+        [
+            ("right", [], 0),
+            ("right", ["--json", "--strict"], 0),
+            ("right", ["-q"], 0),
+            ("right", ["--deployment", "layer"], 1),
+            ("right", ["--limit", "10"], 1),
+            ("wrong", [], 1),
+            ("wrong", ["--json"], 1),
+            ("other", [], 1),
+            ("none", [], 1),
+            ("none", ["--json"], 1),
+        ],
+    )
+    def test_verify(self, both: Any, supervisors: Any, which: str, how: Any, status: int) -> None:
+        here, there = both("verify", supervisors / f"{which}.rsup", NAVIGATION, *how)
+        assert here == there
+        assert here[0] == status
+
+    @pytest.mark.parametrize("how", [[], ["--json"], ["-q"]])
+    @pytest.mark.parametrize(
+        ("which", "claims"),
+        [
+            (None, ["AG EF Navigator.idle", "named: invariant Navigator.failures < 2", "AF AX Navigator.idle"]),
+            (None, ["A[true U enabled(navigate.request)]", "EG !enabled(navigate.request)"]),
+            (None, ["AG nonsense"]),
+            (None, ["AG (", "EF true"]),
+            ("right", ["reachable Navigator.failures = 2"]),
+            ("right", ["AG nonsense"]),
+            ("wrong", ["EF true"]),
+        ],
+    )
+    def test_properties(self, both: Any, supervisors: Any, which: str | None, claims: Any, how: Any) -> None:
+        chosen = [part for claim in claims for part in ("--property", claim)]
+        given = [] if which is None else [supervisors / f"{which}.rsup"]
+        here, there = both("verify", *given, NAVIGATION, *chosen, *how)
+        assert here == there
+
+    @pytest.mark.parametrize("how", [[], ["--check"], ["--diff"], ["--json"], ["--json", "--diff"]])
+    def test_format(self, both: Any, tmp_path: Path, how: Any) -> None:
+        texts = {"a": "robot  R{ }", "b": "robot R { }\n", "c": "robot {", "d": "\ufeffrobot R{ // why\n}"}
+
+        def prepare(folder: Path) -> None:
+            for name, text in texts.items():
+                (folder / f"{name}.rscd").write_text(text, encoding="utf-8")
+
+        here, there = both("format", "a.rscd", "b.rscd", "c.rscd", "d.rscd", *how, prepare=prepare)
+        assert here == there
+        assert here[0] == 1
+        assert (here[3]["a.rscd"][0] == b"robot R { }\n") is (how in ([], ["--json"]))
+
+    def test_format_standard_input(self, both: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+        def prepare(folder: Path) -> None:
+            monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"robot  R{ }")))
+
+        here, there = both("format", "-", prepare=prepare)
+        assert here == there
+        assert here[:2] == (0, "robot R { }\n")
 
     def test_libraries(self, both: Any, tmp_path: Path) -> None:
         model, library = tmp_path / "robot", tmp_path / "parts"
@@ -273,7 +356,7 @@ class TestExitCodes:
     @pytest.mark.parametrize(
         "arguments",
         [
-            [],
+            ["--server", "localhost:1", "--profile", "lab"],
             ["--server", "localhost"],
             ["--server", "localhost:0"],
             ["--server", "localhost:65536"],
@@ -298,21 +381,76 @@ class TestExitCodes:
     @pytest.mark.parametrize(
         ("answer", "status", "words"),
         [
-            ({"status": pb.SYNTHESIS_STATUS_UNSUPPORTED_MODEL, "reason": "too strange"}, 1, "too strange"),
-            ({"status": pb.SYNTHESIS_STATUS_SUPERVISOR, "supervisor": b"{}"}, 3, "supervisor is refused"),
+            (synthesis(status=pb.SYNTHESIS_STATUS_UNSUPPORTED_MODEL, reason="too strange"), 1, "too strange"),
+            (supervisor(b"{}"), 3, "supervisor is refused"),
+            (supervisor(b"{}", supervisor_digest=bytes(32)), 3, "digest"),
         ],
     )
     def test_odd_answers(
         self, tmp_path: Path, capfd: pytest.CaptureFixture[str], answer: Any, status: Any, words: str
     ) -> None:
-        response = pb.SynthesizeResponse(result=pb.SynthesisResult(**answer))
-        with scripted(Scripted(synthesize=[response])) as address:
+        with scripted(Synthesize=[[answer]]) as (address, _):
             model = write(tmp_path, "robot R { }")
             outcome = self.run(capfd, "synth", model, "--server", address, "-o", tmp_path / "x.rsup")
         assert outcome[0] == status
         assert words in outcome[1]
         assert outcome[1].count("\n") == 1
         assert not (tmp_path / "x.rsup").exists()
+
+    @pytest.mark.parametrize(
+        ("command", "answers"),
+        [
+            (["explore"], {"Explore": [exploration()]}),
+            (["verify", "--property", "EF true"], {"Verify": [[verification('{"properties": []}')]]}),
+            (["verify", "--property", "EF true"], {"Verify": [[verification('{"properties": 7}')]]}),
+            (["verify", "--property", "EF true"], {"Verify": [[verification("{}")]]}),
+            (["verify", "--property", "EF true"], {"Verify": [[verification(VERDICT.replace("true", "false", 1))]]}),
+            (["verify", "--property", "EF true"], {"Verify": [[verification(VERDICT.replace('"left"', '"lost"'))]]}),
+            (["verify", "--property", "EF true"], {"Verify": [[verification(VERDICT.replace("[{", "[{}, {"))]]}),
+            (["verify", "--property", "EF true"], {"Verify": [[verification(VERDICT.replace("null}", "8}"))]]}),
+        ],
+    )
+    def test_documents_of_other_robots(
+        self, tmp_path: Path, capfd: pytest.CaptureFixture[str], command: Any, answers: Any
+    ) -> None:
+        with scripted(**answers) as (address, _):
+            model = write(tmp_path, "robot R { }")
+            status, error = self.run(capfd, command[0], model, *command[1:], "--server", address)
+        assert status == 3
+        assert "malformed" in error
+        assert error.count("\n") == 1
+
+    def test_a_given_supervisor_and_no_report(self, capfd: pytest.CaptureFixture[str], supervisors: Path) -> None:
+        for report in ("{}", '{"status": "passed"}', '{"checks": 7}'):
+            with scripted(Verify=[[verification(report)]]) as (address, _):
+                outcome = self.run(capfd, "verify", supervisors / "right.rsup", NAVIGATION, "--server", address)
+            assert outcome[0] == 3
+            assert "malformed" in outcome[1]
+
+    def test_nothing_moves_the_cursor(self, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+        """Whatever text comes from a server: neither stream gets a character that a terminal obeys."""
+        evil = "\x1b]0;owned\x07\x9b2J\u202e"
+        place = pb.Location(file=evil, line=1, column=1, length=1)
+        finding = pb.Diagnostic(
+            severity=pb.SEVERITY_WARNING, code=evil, message=evil, mend=evil, location=place,
+            related=[pb.RelatedPlace(message=evil, location=place)],
+        )  # fmt: skip
+        answers = {
+            "Check": [[pb.CheckResponse(diagnostics=[finding])]],
+            "Synthesize": [[synthesis(reason=evil, diagnostics=[finding])]],
+            "Verify": [[pb.VerifyResponse(result=pb.VerificationResult(status=5, reason=evil, report="{}"))]],
+            "ListTargets": [[pb.ListTargetsResponse(targets=[pb.Target(name=evil, description=evil)])]],
+            "GetVersion": [[pb.GetVersionResponse(version=evil, engines=[evil])]],
+        }
+        model = str(write(tmp_path, "robot R { }"))
+        commands = [["check", model], ["synth", model], ["verify", model, "--property", "EF true"]]
+        with scripted(**answers) as (address, _):
+            for command in [*commands, ["targets"], ["version"]]:
+                for more in ([], ["--json"]):
+                    robosc_client([*command, *more, "--server", address])
+                    printed = capfd.readouterr()
+                    for character in printed.out + printed.err:
+                        assert character.isprintable() or character == "\n"
 
 
 class TestPrograms:
@@ -343,10 +481,8 @@ class TestPrograms:
             process.send_signal(number)
             assert process.wait(PATIENCE_S) == 0
             assert process.stdout is not None
-            assert process.stderr is not None
             assert process.stdout.read() == ""
-            assert process.stderr.read() == ""
-        assert not any(is_running(pid) for pid in workers)
+        assert all(eventually(partial(has_ended, pid)) for pid in workers)
 
     def test_a_killed_server_leaves_no_workers(self) -> None:
         with server_process() as (process, _):

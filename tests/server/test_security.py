@@ -31,7 +31,7 @@ from robosc_server.tasks.task import Outcome, Result, Task, TaskLimits
 from robosc_server.workers import OnReport
 from support.certificates import Authority
 from support.job_workers import task_message
-from support.service import PATIENCE_S, bundle_of, served, server_process
+from support.service import PATIENCE_S, bundle_of, secured, served, server_process
 
 
 class Quick:
@@ -67,15 +67,7 @@ def secure(authority: Authority) -> ServerSecurity:
 
 @contextmanager
 def serving(security: ServerSecurity, **settings: Any) -> Iterator[str]:
-    with served(
-        given_workers=Quick(),
-        tls_certificate=security.certificate,
-        tls_key=security.key,
-        client_ca=security.client_ca,
-        tokens=security.tokens,
-        insecure_beyond_loopback=security.insecure_beyond_loopback,
-        **settings,
-    ) as address:
+    with served(given_workers=Quick(), **secured(security), **settings) as address:
         yield address
 
 

@@ -203,8 +203,7 @@ def _watch(arguments: argparse.Namespace, client: Client) -> int:
         for job in client.watch(arguments.job, deadline_s=arguments.deadline):
             shown.show(_line(job))
             if not arguments.json and (seen is None or job.state is not seen.state):
-                sys.stdout.write(f"{_line(job)}\n")
-                sys.stdout.flush()
+                shown.write(_line(job))
             seen = job
     if arguments.json and seen is not None:
         print_json({"job": job_json(seen)})

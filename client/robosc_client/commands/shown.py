@@ -27,7 +27,8 @@ class Shown:
 
             # What a server says is text, and no markup.
             columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
-            self._bar = Bar(*columns, console=Console(stderr=True), transient=True)
+            console = Console(stderr=True)
+            self._bar = Bar(*columns, console=console, transient=True, redirect_stdout=False, redirect_stderr=False)
             self._bar.start()
             self._line = self._bar.add_task("")
         return self
@@ -42,6 +43,15 @@ class Shown:
         """Replace the line."""
         if self._bar is not None and self._line is not None:
             self._bar.update(self._line, description=text[:_MAXIMUM])
+
+    def write(self, line: str) -> None:
+        """Write a line of the result to standard output, above the line that moves."""
+        if self._bar is not None:
+            self._bar.stop()
+        sys.stdout.write(f"{line}\n")
+        sys.stdout.flush()
+        if self._bar is not None:
+            self._bar.start()
 
     def tell(self, progress: Progress) -> None:
         """Replace the line by where the work is."""

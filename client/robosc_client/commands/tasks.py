@@ -122,7 +122,8 @@ def verify_task(arguments: argparse.Namespace, bundle: Bundle, supervisor: bytes
         engine=arguments.engine,
         allow_reordering=arguments.reorder,
         maximum_nodes=arguments.max_nodes,
-        maximum_states=arguments.limit or None,
+        # A request has no word for 0, which would be the server's own limit.
+        maximum_states=None if arguments.limit is None else max(arguments.limit, 1),
         is_strict=arguments.strict,
     )
 

@@ -1,0 +1,318 @@
+"""`submit`, `watch`, `get`, `cancel`, `list` and `bench` against a server that answers what a test has written."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import grpc
+import pytest
+
+from robosc.cli.main import main as robosc
+from robosc.signatures import make_key_pair, read_private_key, sign
+from robosc_api.v1 import jobs_pb2
+from robosc_api.v1 import synthesis_pb2 as pb
+from robosc_client.commands.bench import varied
+from robosc_client.load import Measured
+from robosc_client.main import main
+from support.answers import (
+    enveloped,
+    exploration,
+    generation,
+    job,
+    progress,
+    supervisor,
+    synthesis,
+    verification,
+    watched,
+)
+from support.models import EXAMPLES, bundle_of
+from support.scripted_service import PATIENCE_S, Refusal, scripted
+
+MODEL = str(EXAMPLES / "line_follower" / "line_follower.rscd")
+SUCCEEDED = jobs_pb2.JOB_STATE_SUCCEEDED
+
+
+def run(capfd: pytest.CaptureFixture[str], *arguments: Any) -> Any:
+    status = main([*map(str, arguments)])
+    printed = capfd.readouterr()
+    assert "Traceback" not in printed.err
+    return status, printed.out, printed.err
+
+
+class TestSubmit:
+    @pytest.mark.parametrize(
+        ("arguments", "kind"),
+        [
+            (["check", MODEL], "check"),
+            (["synth", MODEL, "--deployment", "layer", "--max-nodes", "9"], "synthesize"),
+            (["generate", MODEL, "--target", "ros2", "--package", "p"], "generate"),
+            (["explore", MODEL, "--limit", "7"], "explore"),
+            (["verify", MODEL, "--property", "EF true", "--strict"], "verify"),
+            (["format", MODEL], "format"),
+        ],
+    )
+    def test_tasks(self, capfd: pytest.CaptureFixture[str], arguments: Any, kind: str) -> None:
+        answer = jobs_pb2.SubmitJobResponse(job=job())
+        with scripted(SubmitJob=[[answer]]) as (address, script):
+            more = ["--label", "mine", "--idempotency-key", "k", "--keep", "60", "--server", address]
+            assert run(capfd, "submit", *arguments, *more) == (0, "job-1\n", "")
+            status, out, _ = run(capfd, "submit", *arguments, *more, "--json")
+            (request, _) = script.of("SubmitJob")
+        assert (status, json.loads(out)["existed"], json.loads(out)["job"]["id"]) == (0, False, "job-1")
+        assert (request.task.WhichOneof("request"), request.label, request.idempotency_key) == (kind, "mine", "k")
+        assert request.retention.seconds == 60
+        chosen = getattr(request.task, kind)
+        if kind == "synthesize":
+            assert (chosen.options.deployment, chosen.options.maximum_nodes) == (pb.DEPLOYMENT_LAYER, 9)
+        if kind == "explore":
+            assert chosen.maximum_states == 7
+        if kind == "verify":
+            assert (list(chosen.properties), chosen.strict) == (["EF true"], True)
+        if kind == "generate":
+            assert (chosen.target, chosen.generation.package) == ("ros2", "p")
+
+    def test_wrong_use(self, capfd: pytest.CaptureFixture[str]) -> None:
+        status, _, err = run(capfd, "submit", "verify", MODEL, "--server", "127.0.0.1:1")
+        assert status == 2
+        assert "--property" in err
+
+    def test_submitted_and_watched(self, capfd: pytest.CaptureFixture[str]) -> None:
+        answers = {
+            "SubmitJob": [[jobs_pb2.SubmitJobResponse(job=job(1, jobs_pb2.JOB_STATE_QUEUED))]],
+            "WatchJob": [watched(job(1, jobs_pb2.JOB_STATE_QUEUED, waiting_before=2), job(2), job(3, SUCCEEDED))],
+        }
+        with scripted(**answers) as (address, _):
+            status, out, _ = run(capfd, "submit", "check", MODEL, "--watch", "--server", address)
+        assert status == 0
+        assert [line.split()[1] for line in out.splitlines()] == ["queued", "running", "succeeded"]
+        assert "2 before it" in out
+
+
+class TestWatch:
+    def test_failed(self, capfd: pytest.CaptureFixture[str]) -> None:
+        with scripted(WatchJob=[watched(job(1), job(2, jobs_pb2.JOB_STATE_FAILED))]) as (address, _):
+            status, out, _ = run(capfd, "watch", "job-1", "--server", address)
+            assert status == 1
+            assert "too long [CPU_LIMIT]" in out
+            status, out, _ = run(capfd, "watch", "job-1", "--json", "--server", address)
+            assert status == 1
+            assert json.loads(out)["job"]["failure"] == {"reason": "CPU_LIMIT", "message": "too long"}
+
+    def test_a_line_moves_on_a_terminal(self, tmp_path: Path) -> None:
+        """And it is markup to nobody, and gone at the end."""
+        told = [job(number, progress=pb.Progress(stage="check", message=f"[bold]step {number}")) for number in (1, 2)]
+
+        def slowly(context: grpc.ServicerContext) -> Any:
+            for item in watched(*told, job(3, SUCCEEDED)):
+                yield item
+                time.sleep(0.3)
+
+        main_end, other_end = os.openpty()
+        with scripted(WatchJob=[[slowly]]) as (address, _):
+            command = [sys.executable, "-m", "robosc_client.main", "watch", "job-1", "--server", address]
+            process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=other_end, text=True)
+            os.close(other_end)
+            shown = b""
+            try:
+                while part := os.read(main_end, 4096):
+                    shown += part
+            except OSError:  # Linux's way to tell that nobody has the other end any more.
+                pass
+            os.close(main_end)
+            out, _ = process.communicate(timeout=PATIENCE_S)
+        assert process.returncode == 0
+        assert "succeeded" in out
+        assert b"[bold]step 2" in shown
+        assert shown.rstrip().endswith((b"\x1b[2K", b"\x1b[?25h", b"\x1b[1A"))
+
+
+class TestGet:
+    def answers(self, kind: str, messages: Any) -> Any:
+        found = job(9, SUCCEEDED)
+        return {"GetJob": [[jobs_pb2.GetJobResponse(job=found)]], "GetJobResult": [enveloped(kind, messages)]}
+
+    def test_where_it_is(self, capfd: pytest.CaptureFixture[str]) -> None:
+        message = job(4, progress=pb.Progress(stage="check", message="half"), label="mine")
+        with scripted(GetJob=[[jobs_pb2.GetJobResponse(job=message)]]) as (address, _):
+            assert run(capfd, "get", "job-1", "--server", address) == (
+                0, "job-1  running    synthesize  robot.rscd  mine  check: half\n", ""
+            )  # fmt: skip
+            document = json.loads(run(capfd, "get", "job-1", "--json", "--server", address)[1])["job"]
+        assert (document["state"], document["created"], document["ended"]) == (
+            "running",
+            "2023-11-14T22:13:20+00:00",
+            None,
+        )
+
+    @pytest.mark.parametrize(
+        ("kind", "messages", "status", "word"),
+        [
+            ("check", [pb.CheckResponse()], 0, '"errors": 0'),
+            ("synthesize", [synthesis()], 1, '"status": "empty"'),
+            ("synthesize", [supervisor()], 0, '"status": "supervisor"'),
+            ("generate", generation(), 0, "a/one.py"),
+            ("explore", exploration(), 0, '"transitions"'),
+            ("verify", [verification()], 0, '"holds"'),
+            ("format", [pb.FormatResponse(text="robot R { }\n")], 0, "robot R { }"),
+        ],
+    )
+    def test_results(
+        self, capfd: pytest.CaptureFixture[str], tmp_path: Path, kind: str, messages: Any, status: int, word: str
+    ) -> None:
+        with scripted(**self.answers(kind, messages)) as (address, _):
+            found, out, _ = run(capfd, "get", "job-1", "--result", "--json", "--server", address)
+            assert found == status
+            assert word in out
+            json.loads(out)
+            assert run(capfd, "get", "job-1", "--result", "--server", address)[0] == status
+            place = tmp_path / "out"
+            found, _, err = run(capfd, "get", "job-1", "-o", place, "--server", address)
+        if status or kind == "check":
+            assert found == 2
+            assert "--result" in err
+        else:
+            assert (found, place.exists()) == (0, True)
+        if kind == "generate":
+            assert (place / "a" / "one.py").stat().st_mode & 0o111
+        if kind == "explore":
+            assert len(json.loads(place.read_text())["states"]) == 2
+
+    def test_nothing_is_written_outside_of_the_folder(self, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+        """Not through links in the folder either; a link in a file's place is replaced, not followed."""
+        outside, folder = tmp_path / "outside", tmp_path / "out"
+        outside.mkdir()
+        folder.mkdir()
+        (outside / "file").write_text("mine")
+        (folder / "link").symlink_to(outside)
+        for path in ("link/x", "../outside/x", str(outside / "x"), "a/../../outside/x"):
+            with scripted(**self.answers("generate", generation({path: (b"x", True)}))) as (address, _):
+                assert run(capfd, "get", "job-1", "-o", folder, "--server", address)[0] in (1, 3)
+        (folder / "file").symlink_to(outside / "file")
+        with scripted(**self.answers("generate", generation({"file": (b"x", False)}))) as (address, _):
+            assert run(capfd, "get", "job-1", "-o", folder, "--force", "--server", address)[0] == 0
+        assert [item.name for item in outside.iterdir()] == ["file"]
+        assert (outside / "file").read_text() == "mine"
+        assert not (folder / "file").is_symlink()
+
+
+class TestSignatures:
+    @pytest.fixture
+    def made(self, tmp_path: Path) -> Any:
+        """A supervisor's file, and keys: `right` has signed it."""
+        for name in ("right", "wrong"):
+            make_key_pair(tmp_path / f"{name}.key", tmp_path / f"{name}.pub")
+        assert robosc(["synth", MODEL, "-o", str(tmp_path / "made.rsup")]) == 0
+        content = (tmp_path / "made.rsup").read_bytes()
+        return content, sign(content, read_private_key(tmp_path / "right.key"))
+
+    @pytest.mark.parametrize("command", ["synth", "get"])
+    def test_checked_and_kept(self, capfd: pytest.CaptureFixture[str], tmp_path: Path, made: Any, command: str) -> None:
+        content, signature = made
+        place = tmp_path / "there.rsup"
+        beside = tmp_path / "there.rsup.sig"
+        what = ["synth", MODEL] if command == "synth" else ["get", "job-1"]
+
+        def asked(answer: Any, *more: Any) -> Any:
+            answers = {
+                "Synthesize": [[answer]],
+                "GetJob": [[jobs_pb2.GetJobResponse(job=job(9, SUCCEEDED))]],
+                "GetJobResult": [enveloped("synthesize", [answer])],
+            }
+            with scripted(**answers) as (address, _):
+                return run(capfd, *what, "-o", place, "--server", address, *more)
+
+        trusted = ["--signed-by", tmp_path / "right.pub"]
+        assert asked(supervisor(content, signature=signature), *trusted)[0] == 0
+        assert (place.read_bytes(), beside.read_bytes()) == (content, signature)
+        assert robosc(["verify", str(place), "--signed-by", str(tmp_path / "right.pub")]) == 0
+        # Without one, that of an earlier supervisor must not stay.
+        assert asked(supervisor(content))[0] == 0
+        assert not beside.exists()
+        place.unlink()
+        for answer, keys in (
+            (supervisor(content), trusted),
+            (supervisor(content, signature=signature), ["--signed-by", tmp_path / "wrong.pub"]),
+            (supervisor(content, signature=b"x"), trusted),
+            (supervisor(content + b" ", signature=signature), trusted),
+        ):
+            status, _, err = asked(answer, *keys)
+            assert status in (1, 3)
+            assert err
+            assert not place.exists()
+            assert not beside.exists()
+
+
+class TestListAndCancel:
+    def test_list(self, capfd: pytest.CaptureFixture[str]) -> None:
+        page = [jobs_pb2.ListJobsResponse(jobs=[job(id=f"job-{n}") for n in range(5)], next_page_token="more")]
+        with scripted(ListJobs=[page, page]) as (address, script):
+            chosen = ["--state", "running", "--state", "queued", "--kind", "check", "--all", "--most", "5"]
+            status, out, _ = run(capfd, "list", *chosen, "--server", address)
+            assert (status, len(out.splitlines())) == (0, 5)
+            (request,) = script.of("ListJobs")
+            assert len(json.loads(run(capfd, "list", *chosen, "--json", "--server", address)[1])["jobs"]) == 5
+        assert (list(request.states), request.kind, request.all_owners, request.page_size) == ([2, 1], 1, True, 5)
+
+    def test_cancel(self, capfd: pytest.CaptureFixture[str]) -> None:
+        ended = jobs_pb2.CancelJobResponse(job=job(2, jobs_pb2.JOB_STATE_CANCELLED))
+        with scripted(CancelJob=[[ended]]) as (address, _):
+            status, out, _ = run(capfd, "cancel", "job-1", "--server", address)
+        assert status == 0
+        assert "cancelled" in out
+
+    def test_no_such_job(self, capfd: pytest.CaptureFixture[str]) -> None:
+        with scripted(GetJob=[[Refusal(grpc.StatusCode.NOT_FOUND, "there is no job x", "NO_SUCH_JOB")]]) as (
+            address,
+            _,
+        ):
+            status, _, err = run(capfd, "get", "x", "--server", address)
+        assert status == 3
+        assert "there is no job x" in err
+
+
+class TestBench:
+    def test_counted(self, capfd: pytest.CaptureFixture[str]) -> None:
+        answers = {"Check": [[pb.CheckResponse()]], "Synthesize": [[progress(), supervisor()]]}
+        with scripted(**answers) as (address, script):
+            for task, method in (("check", "Check"), ("synth", "Synthesize")):
+                for more in ([], ["--uncached"]):
+                    script.requests.clear()
+                    options = ["--task", task, "-c", "4", "--connections", "2", "-n", "20", *more, "--server", address]
+                    status, out, _ = run(capfd, "bench", MODEL, "--json", *options)
+                    document = json.loads(out)
+                    assert (status, document["calls"], document["errors"]) == (0, 20, {})
+                    assert document["milliseconds"]["p50"] <= document["milliseconds"]["p99"]
+                    texts = {request.bundle.main.text for request in script.of(method)}
+                    assert len(script.of(method)) == 20
+                    assert len(texts) == (20 if more else 1)
+            assert "a second" in run(capfd, "bench", MODEL, "-d", "0.2", "--server", address)[1]
+
+    def test_errors_by_reason(self, capfd: pytest.CaptureFixture[str]) -> None:
+        refusal = Refusal(grpc.StatusCode.RESOURCE_EXHAUSTED, "busy", "SERVER_BUSY", 1.0)
+        with scripted(Check=[[pb.CheckResponse()], [refusal]]) as (address, _):
+            status, out, _ = run(capfd, "bench", MODEL, "-n", "10", "--json", "--server", address)
+        assert status == 3
+        assert (json.loads(out)["calls"], json.loads(out)["errors"]) == (1, {"SERVER_BUSY": 9})
+
+    def test_a_model_is_varied_in_a_comment_alone(self) -> None:
+        bundle = bundle_of("robot R { }")
+        texts = {varied(bundle, number).main.text for number in range(10)}
+        assert len(texts) == 10
+        assert all(text.startswith("robot R { }\n// ") and text.count("\n") == 2 for text in texts)
+
+    def test_percentiles(self) -> None:
+        measured = Measured(2.0, tuple(float(number) for number in range(1, 101)), 0, {})
+        assert [measured.percentile_s(percent) for percent in (50, 90, 99, 100)] == [50, 90, 99, 100]
+        assert Measured(1.0, (5.0,), 0, {}).percentile_s(50) == 5.0
+        assert Measured(1.0, (), 0, {}).document()["milliseconds"]["p50"] is None
+        assert measured.calls_per_second == 50
+
+    def test_wrong_use(self, capfd: pytest.CaptureFixture[str]) -> None:
+        for options in (["-c", "0"], ["-n", "0"], ["-n", "1", "-d", "1"], ["-d", "0"], ["--task", "fly"]):
+            with pytest.raises(SystemExit) as left:
+                main(["bench", MODEL, "--server", "127.0.0.1:1", *options])
+            assert left.value.code == 2

@@ -1,0 +1,158 @@
+"""Servers by name: what is kept, what is refused, and whom a token is sent to."""
+
+import io
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from robosc_api.security import Credentials
+from robosc_api.v1 import synthesis_pb2 as pb
+from robosc_client.commands.connection import target_of
+from robosc_client.main import main, make_parser
+from robosc_client.profiles import profiles_file, read_profiles
+from support.scripted_service import scripted
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder for settings of its own, and nothing in the environment."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "settings"))
+    for name in ("ROBOSC_PROFILE", "ROBOSC_CA", "ROBOSC_TOKEN_FILE"):
+        monkeypatch.delenv(name, raising=False)
+    return tmp_path / "settings" / "robosc"
+
+
+def run(capfd: pytest.CaptureFixture[str], *arguments: Any) -> Any:
+    status = main([*map(str, arguments)])
+    printed = capfd.readouterr()
+    assert "Traceback" not in printed.err
+    return status, printed.out, printed.err
+
+
+def target(*arguments: str) -> Any:
+    """Whom a command asks, and what it shows."""
+    return target_of(make_parser().parse_args(["version", *arguments]))
+
+
+def test_added_listed_shown_removed(capfd: pytest.CaptureFixture[str], tmp_path: Path, folder: Path) -> None:
+    ca = tmp_path / "ca.pem"
+    assert run(capfd, "profile", "add", "lab", "--server", "lab.example:50051", "--ca", ca)[0] == 0
+    assert run(capfd, "profile", "add", "home", "--server", "[::1]:1", "--tls", "--json")[0] == 0
+    assert run(capfd, "profile", "list") == (0, f"* {'lab':20} lab.example:50051\n  {'home':20} [::1]:1\n", "")
+    status, out, _ = run(capfd, "profile", "list", "--json")
+    assert (status, json.loads(out)["default"], list(json.loads(out)["profiles"])) == (0, "lab", ["lab", "home"])
+    assert json.loads(run(capfd, "profile", "show", "lab", "--json")[1]) == {
+        "name": "lab", "default": True, "server": "lab.example:50051", "ca": str(ca)
+    }  # fmt: skip
+    assert "server       [::1]:1\n" in run(capfd, "profile", "show", "home")[1]
+    assert run(capfd, "profile", "add", "lab", "--server", "lab:1")[0] == 2
+    assert run(capfd, "profile", "add", "home", "--server", "lab:2", "--force", "--default")[0] == 0
+    assert read_profiles().default == "home"
+    assert run(capfd, "profile", "remove", "home")[0] == 0
+    assert (read_profiles().default, list(read_profiles().by_name)) == (None, ["lab"])
+    assert run(capfd, "profile", "remove", "home")[0] == 2
+    assert run(capfd, "profile", "show", "home")[0] == 2
+    assert profiles_file() == folder / "client.toml"
+    assert profiles_file().stat().st_mode & 0o777 == 0o600
+
+
+def test_a_token_is_kept_for_its_owner_alone(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, folder: Path
+) -> None:
+    monkeypatch.setattr(sys, "stdin", io.StringIO("secret-token\n"))
+    status, out, err = run(capfd, "profile", "add", "lab", "--server", "127.0.0.1:1", "--token")
+    assert status == 0
+    assert "secret" not in out + err
+    file = folder / "tokens" / "lab"
+    assert (file.read_text(), file.stat().st_mode & 0o777) == ("secret-token\n", 0o600)
+    assert file.parent.stat().st_mode & 0o777 == 0o700
+    assert target()[1].token_file == file
+    assert run(capfd, "profile", "remove", "lab")[0] == 0
+    assert not file.exists()
+    for text in ("", "two words", "x" * 5000, "é"):
+        monkeypatch.setattr(sys, "stdin", io.StringIO(text))
+        assert run(capfd, "profile", "add", "lab", "--server", "127.0.0.1:1", "--token")[0] == 2
+    assert not read_profiles().by_name
+
+
+def test_comments_stay(capfd: pytest.CaptureFixture[str]) -> None:
+    profiles_file().parent.mkdir(parents=True)
+    profiles_file().write_text('# mine\n[profiles.lab]  # in the cellar\nserver = "lab:1"\n', encoding="utf-8")
+    assert run(capfd, "profile", "add", "home", "--server", "home:1")[0] == 0
+    text = profiles_file().read_text(encoding="utf-8")
+    assert "# mine" in text
+    assert "# in the cellar" in text
+    assert set(read_profiles().by_name) == {"lab", "home"}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "server = 1", "default = 'x'", "[profiles.lab]", "[profiles.lab]\nserver = 'x'", "profiles = 3", "[", "\udcff",
+        "[profiles.'a b']\nserver = 'x:1'", "[profiles.lab]\nserver = 'x:1'\ncolour = 'red'",
+        "x = '" + "x" * 70_000 + "'", "[profiles.lab]\nserver = 'x:1'\ntls = 1",
+        "[profiles.lab]\nserver = 'x:1'\nca = 5", "a = " + "[" * 5000,
+    ],
+)  # fmt: skip
+def test_odd_files(capfd: pytest.CaptureFixture[str], text: str) -> None:
+    profiles_file().parent.mkdir(parents=True)
+    profiles_file().write_bytes(text.encode("utf-8", "surrogateescape"))
+    for command in (["profile", "list"], ["version"], ["profile", "add", "x", "--server", "x:1"]):
+        status, out, err = run(capfd, *command)
+        assert (status, out) == (2, "")
+        assert str(profiles_file()) in err
+        assert err.count("\n") == 1
+
+
+def test_which_server_is_asked(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+    status, _, err = run(capfd, "version")
+    assert status == 2
+    assert "no server is named" in err
+    for name in ("a", "b", "c"):
+        assert run(capfd, "profile", "add", name, "--server", f"{name}:1")[0] == 0
+    assert target()[0] == "a:1"
+    monkeypatch.setenv("ROBOSC_PROFILE", "b")
+    assert target()[0] == "b:1"
+    assert target("--profile", "c")[0] == "c:1"
+    assert target("--server", "d:1")[0] == "d:1"
+    assert run(capfd, "version", "--profile", "none")[0] == 2
+
+
+def test_whom_a_token_is_sent_to(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """The environment's is for a server that is named; a profile has its own, or none."""
+    environment, own, given = (tmp_path / name for name in ("environment", "own", "given"))
+    monkeypatch.setenv("ROBOSC_TOKEN_FILE", str(environment))
+    monkeypatch.setenv("ROBOSC_CA", str(environment))
+    assert run(capfd, "profile", "add", "own", "--server", "a:1", "--token-file", own)[0] == 0
+    assert run(capfd, "profile", "add", "none", "--server", "b:1", "--tls")[0] == 0
+    assert target("--server", "c:1") == ("c:1", Credentials(ca=environment, token_file=environment))
+    assert target("--profile", "own") == ("a:1", Credentials(token_file=own))
+    assert target("--profile", "none") == ("b:1", Credentials(is_secure=True))
+    assert target("--profile", "own", "--token-file", str(given)) == ("a:1", Credentials(token_file=given))
+
+
+def test_what_a_profile_says_is_relative_to_its_file() -> None:
+    profiles_file().parent.mkdir(parents=True)
+    profiles_file().write_text("[profiles.lab]\nserver = 'x:1'\nca = 'ca.pem'\n", encoding="utf-8")
+    assert target("--profile", "lab")[1].ca == profiles_file().parent / "ca.pem"
+
+
+def test_without_a_home(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", "relative")
+    monkeypatch.setattr(Path, "home", lambda: (_ for _ in ()).throw(RuntimeError))
+    assert run(capfd, "version")[0] == 2
+    with scripted(GetVersion=[[pb.GetVersionResponse(version="1")]]) as (address, _):
+        assert run(capfd, "version", "--server", address)[0] == 0
+
+
+def test_a_folder_that_cannot_be_written(capfd: pytest.CaptureFixture[str], folder: Path) -> None:
+    folder.parent.mkdir(parents=True)
+    folder.write_text("a file")
+    status, _, err = run(capfd, "profile", "add", "lab", "--server", "x:1")
+    assert status == 2
+    assert "Not a directory" in err

@@ -29,7 +29,7 @@ from robosc_server.jobs import (
 from robosc_server.operations.drain import drain
 from robosc_server.operations.health import Health
 from robosc_server.operations.interceptor import CallInterceptor
-from robosc_server.operations.metrics import Metrics, MetricsEndpoint
+from robosc_server.operations.metrics import Metrics, MetricsEndpoint, check_metrics_address
 from robosc_server.operations.observed import ObservedWorkers
 from robosc_server.operations.quotas import Quotas
 from robosc_server.operations.settings import Settings
@@ -89,6 +89,9 @@ async def running_server(settings: Settings, workers: Workers | None = None) -> 
 
 async def _start(settings: Settings, given_workers: Workers | None, stack: AsyncExitStack) -> str:
     """Put the parts together; the stack takes them apart, the last one first."""
+    # What is wrong with the settings is told before anything is started.
+    if settings.metrics_address:
+        check_metrics_address(settings.metrics_address, beyond_loopback=settings.metrics_beyond_loopback)
     finish = _finish(settings)
     tokens = None if settings.tokens is None else TokenFile(settings.tokens)
     request_limits = RequestLimits(
@@ -109,7 +112,6 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         options=[*_OPTIONS, ("grpc.max_receive_message_length", request_limits.request_bytes)],
         maximum_concurrent_rpcs=_MAXIMUM_CALLS,
     )
-    # What is wrong with files and addresses is told before anything else is started.
     address = add_port(server, settings.address, settings.security)
     stack.push_async_callback(server.stop, None)
     store = await asyncio.to_thread(open_store, settings.state_dir, settings.database_url)

@@ -79,7 +79,9 @@ def test_only_what_an_image_needs_is_sent_to_its_build() -> None:
 
 
 def test_the_wheel_has_all_that_the_images_copy_for_it() -> None:
-    packages = tomllib.loads((TOP / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]
+    packages = tomllib.loads((TOP / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]["wheel"][
+        "packages"
+    ]
     for file in DOCKERFILES:
         copied = [item.text.split()[0] for item in parse_dockerfile(file.read_text())[0].all("COPY")]
         assert all(any(package == one or package.startswith(f"{one}/") for one in copied) for package in packages)

@@ -11,12 +11,12 @@ import grpc
 import pytest
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection_pb2, reflection_pb2_grpc
+from robosc_server.settings import Settings
 
 from robosc_api.security import Credentials, Scope, ServerSecurity, make_token
 from robosc_client import Client, CredentialsError, RequestRefusedError, ServerUnavailableError
 from robosc_client.main import main as robosc_client
 from robosc_server.main import AddressError, main
-from robosc_server.settings import Settings
 from support.certificates import Authority
 from support.service import FAKE_WORKER, PATIENCE_S, bundle_of, served, server_process
 

@@ -9,8 +9,11 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 # Another environment: colcon wants older packages than ours.
 COLCON := .venv-colcon
+# What looks at the files of deploy/, and what its images are made of.
+CHECKERS := .venv-checkers
+WHEELS := out/wheels
 
-.PHONY: demo test mutants fuzz lint format bindings lock benchmark environment colcon clean help
+.PHONY: demo test mutants fuzz lint format bindings lock benchmark environment colcon checkers images clean help
 
 help:
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -25,6 +28,19 @@ colcon: $(COLCON)/.ready ## make .venv-colcon: builds ROS 2 packages without an 
 
 $(COLCON)/.ready: deploy/requirements-colcon.txt deploy/make_colcon_environment.sh | $(READY)
 	PYTHON=$(BIN)/python sh deploy/make_colcon_environment.sh $(COLCON)
+
+checkers: $(CHECKERS)/.ready ## make .venv-checkers: linters of container files, Kubernetes, Prometheus
+
+$(CHECKERS)/.ready: deploy/requirements-checkers.txt deploy/make_checkers.sh | $(READY)
+	PYTHON=$(BIN)/python sh deploy/make_checkers.sh $(CHECKERS)
+	@touch $@
+
+images: $(WHEELS)/.ready ## fetch what the images are made of, and build them without an engine, for their tests
+
+$(WHEELS)/.ready: deploy/requirements-build.txt deploy/requirements-server.txt deploy/requirements-bridge.txt | $(READY)
+	PYTHON=$(BIN)/python sh deploy/make_image_wheels.sh $(WHEELS)
+	PYTHONPATH=tests $(BIN)/python -m support.containers
+	@touch $@
 
 demo: $(READY) ## lead a simulated robot out of a maze, from model to serial bytes; DEMO='--scene maze-spiral' and so on
 	$(BIN)/python deploy/demo/demo.py $(DEMO)
@@ -80,9 +96,13 @@ lock: $(READY) ## choose new versions and write the locks
 	$(BIN)/pip-compile --quiet --upgrade --strip-extras --allow-unsafe --generate-hashes \
 	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host \
 	  --output-file deploy/requirements-colcon.txt deploy/requirements-colcon.in
+	$(BIN)/pip-compile --quiet --upgrade --strip-extras --allow-unsafe --generate-hashes --no-annotate \
+	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host \
+	  --output-file deploy/requirements-checkers.txt deploy/requirements-checkers.in
+	$(BIN)/python deploy/lock_images.py
 
 benchmark: $(READY) ## print the tables of tests/benchmarks
 	$(BIN)/python tests/benchmarks/run.py
 
 clean: ## remove the environment and everything generated
-	rm -rf $(VENV) $(COLCON) out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) $(COLCON) $(CHECKERS) out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -101,7 +101,10 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
     workers: Any = given_workers or open_workers(settings.workers, settings.worker_processes)
     await stack.enter_async_context(workers)
     observed = ObservedWorkers(workers, metrics, tracing)
-    scheduler = Scheduler(observed, QueueLimits(settings.waiting_tasks, settings.waiting_tasks_per_caller))
+    quotas = Quotas(tokens)
+    scheduler = Scheduler(
+        observed, QueueLimits(settings.waiting_tasks, settings.waiting_tasks_per_caller), accounts=quotas
+    )
     results = await stack.enter_async_context(Results(store, settings.memory_cache_bytes, _finish(settings)))
     manager = await stack.enter_async_context(
         JobManager(
@@ -113,13 +116,17 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
             JobLimits(retention_s=settings.retention_seconds, results_bytes=settings.results_bytes),
         )
     )
-    quotas = Quotas(tokens)
     outgoing = Outgoing(2 * settings.result_bytes, _UNREAD_RESULTS * settings.result_bytes)
     targets, version = await asyncio.to_thread(_descriptions, settings, request_limits)
     synthesis = SynthesisService(
         Desk(results, scheduler, quotas, settings.task_limits, metrics), outgoing, request_limits, targets, version
     )
-    jobs = JobService(manager, lambda kind, request: accepted(kind, request, request_limits), admit=quotas.admit)
+    jobs = JobService(
+        manager,
+        lambda kind, request: accepted(kind, request, request_limits),
+        admit=quotas.admit,
+        send=outgoing.send_one,
+    )
 
     calls = CallInterceptor(metrics, tracing)
     services = {SERVICE_NAME: METHODS, JOB_SERVICE_NAME: JOB_METHODS}
@@ -142,6 +149,8 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         waiting=lambda: scheduler.waiting,
         running=lambda: scheduler.running,
         jobs=lambda: {str(state): count for state, count in manager.counts.items()},
+        conditions=health.conditions,
+        restarts=lambda: getattr(workers, "restarts", 0),  # Those of a cluster are its own.
     )
     address = add_port(server, settings.address, settings.security)
     await stack.enter_async_context(

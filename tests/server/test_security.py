@@ -11,14 +11,15 @@ import grpc
 import pytest
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection_pb2, reflection_pb2_grpc
-from robosc_server.settings import Settings
 
 from robosc_api.security import Credentials, Scope, ServerSecurity, make_token
 from robosc_client import Client, CredentialsError, RequestRefusedError, ServerUnavailableError
 from robosc_client.main import main as robosc_client
-from robosc_server.main import AddressError, main
+from robosc_server.application import StartError
+from robosc_server.main import main
 from support.certificates import Authority
-from support.service import FAKE_WORKER, PATIENCE_S, bundle_of, served, server_process
+from support.fake_tasks import TASK_FUNCTION as FAKE
+from support.service import PATIENCE_S, bundle_of, secured, served, server_process
 
 
 @pytest.fixture(scope="module")
@@ -39,13 +40,13 @@ def secure(authority: Authority) -> ServerSecurity:
 
 @contextmanager
 def serving(security: ServerSecurity) -> Iterator[str]:
-    with served(Settings(port=0, workers=1, security=security), FAKE_WORKER) as address:
+    with served(FAKE, **secured(security)) as address:
         yield address
 
 
 def check(address: str, **credentials: Path | bool) -> None:
     with Client(address, Credentials(**credentials)) as client:  # type: ignore[arg-type]
-        assert client.check(bundle_of("")) == ()
+        assert len(client.check(bundle_of(""))) == 1
 
 
 def token_in(folder: Path, *scopes: Scope) -> tuple[Path, Path]:
@@ -203,15 +204,13 @@ class TestTokens:
 class TestWhereItListens:
     @pytest.mark.parametrize("host", ["0.0.0.0", "::"])
     def test_beyond_this_machine_only_with_tls(self, host: str) -> None:
-        settings = Settings(host=host, port=0, workers=1)
-        with pytest.raises(AddressError, match="can be reached from other machines"), served(settings, FAKE_WORKER):
+        with pytest.raises(StartError, match="can be reached from other machines"), served(FAKE, host=host):
             pass
 
     def test_unless_it_is_told_otherwise(self, secure: ServerSecurity, authority: Authority) -> None:
-        settings = Settings(host="0.0.0.0", port=0, workers=1, security=ServerSecurity(insecure_beyond_loopback=True))
-        with served(settings, FAKE_WORKER) as address:
+        with served(FAKE, host="0.0.0.0", insecure_beyond_loopback=True) as address:
             check(address.replace("0.0.0.0", "127.0.0.1"))
-        with served(Settings(host="0.0.0.0", port=0, workers=1, security=secure), FAKE_WORKER) as address:
+        with served(FAKE, host="0.0.0.0", **secured(secure)) as address:
             check(address.replace("0.0.0.0", "127.0.0.1"), ca=authority.file)
 
     def test_files_that_do_not_fit_are_told_at_the_start(
@@ -235,7 +234,7 @@ class TestWhereItListens:
             (ServerSecurity(tokens=tmp_path / "none"), "No such file"),
         ]
         for security, words in cases:
-            with pytest.raises(AddressError, match=words), serving(security):
+            with pytest.raises(StartError, match=words), serving(security):
                 pass
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from robosc.source import Bundle, SourceFile
+from robosc_api.security import ServerSecurity
 from robosc_server.application import running_server
 from robosc_server.operations.settings import Settings
 from robosc_server.workers.local import TASK_FUNCTION, LocalWorkers
@@ -32,9 +33,20 @@ def served(task_function: str = TASK_FUNCTION, /, **settings: Any) -> Iterator[s
         **settings: Those that are not as usual.
     """
     with tempfile.TemporaryDirectory() as folder:
-        usual = {"port": 0, "worker_processes": 1, "state_dir": Path(folder), "drain_seconds": 0.5}
+        usual: dict[str, Any] = {"port": 0, "worker_processes": 1, "state_dir": Path(folder), "drain_seconds": 0.5}
         with _served(Settings(**(usual | settings)), task_function) as address:
             yield address
+
+
+def secured(security: ServerSecurity) -> dict[str, Any]:
+    """The settings of a server that is secured like this."""
+    return {
+        "tls_certificate": security.certificate,
+        "tls_key": security.key,
+        "client_ca": security.client_ca,
+        "tokens": security.tokens,
+        "insecure_beyond_loopback": security.insecure_beyond_loopback,
+    }
 
 
 @contextmanager

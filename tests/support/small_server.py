@@ -97,7 +97,7 @@ class ReadLog:
 
     def lines(self, event: str | None = None) -> list[dict[str, Any]]:
         """The lines as JSON; those of one event, or all."""
-        lines = [json.loads(line) for line in self.text.splitlines()]
+        lines = [json.loads(line) for line in self.text.split("\n") if line]
         return [line for line in lines if event is None or line["event"] == event]
 
 

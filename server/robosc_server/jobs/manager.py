@@ -11,12 +11,13 @@ import logging
 import math
 import secrets
 import time
+import traceback
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterable, Mapping
 from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Any, Self
 
-from robosc_server.failures import RefusedError
+from robosc_server.failures import RefusedError, for_callers
 from robosc_server.jobs.callers import Caller
 from robosc_server.jobs.limits import JobLimits
 from robosc_server.jobs.results import Results
@@ -338,9 +339,7 @@ class JobManager:
         try:
             outcome = await self._outcome(carried)
         except Exception:
-            fault = secrets.token_hex(4)
-            outcome = Failure(Reason.INTERNAL_FAULT, f"internal error {fault}, see the server's log")
-            _log.exception("fault %s: job %s cannot be carried on", fault, carried.record.id)
+            outcome = Failure(Reason.INTERNAL_FAULT, "a fault of the server", traceback.format_exc())
         self._give_place_back(carried)
         if outcome is not None:
             await self._end(carried, outcome)
@@ -386,8 +385,8 @@ class JobManager:
     async def _end(self, carried: _Carried, outcome: Outcome) -> None:
         """Have the end of a job kept, however long that takes."""
         job_id = carried.record.id
-        if isinstance(outcome, Failure) and outcome.details:
-            _log.error("job %s failed (%s): %s", job_id, outcome.reason, outcome.details)
+        if isinstance(outcome, Failure):
+            outcome = for_callers(outcome)
         while True:
             try:
                 ended = await self._store.end(job_id, self._replica, outcome)

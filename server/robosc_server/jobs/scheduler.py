@@ -10,6 +10,7 @@ import time
 from collections import OrderedDict, deque
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 from robosc_server.failures import RefusedError
 from robosc_server.tasks.task import Outcome, Reason, Task, TaskLimits
@@ -35,6 +36,16 @@ class QueueLimits:
 
     waiting: int = 1000
     waiting_per_caller: int = 100
+
+
+class Accounts(Protocol):
+    """What single callers may take, and have taken."""
+
+    def waiting(self, caller: str) -> int | None:
+        """How many tasks of a caller may wait; None: as many as anybody's."""
+
+    def spent(self, caller: str, seconds: float) -> None:
+        """Note for how long a worker was taken by a task of a caller."""
 
 
 class Place:
@@ -68,10 +79,17 @@ class Scheduler:
         workers: Who does the tasks.
         limits: How many may wait.
         clock: Seconds of a monotonic clock.
+        accounts: Of single callers; None: all may take the same.
     """
 
-    def __init__(self, workers: Workers, limits: QueueLimits, clock: Callable[[], float] = time.monotonic) -> None:
-        self._workers, self._limits, self._clock = workers, limits, clock
+    def __init__(
+        self,
+        workers: Workers,
+        limits: QueueLimits,
+        clock: Callable[[], float] = time.monotonic,
+        accounts: Accounts | None = None,
+    ) -> None:
+        self._workers, self._limits, self._clock, self._accounts = workers, limits, clock, accounts
         self._ring: OrderedDict[str, deque[Place]] = OrderedDict()
         self._waiting = 0
         self._running = 0
@@ -137,13 +155,17 @@ class Scheduler:
             raise RefusedError(Reason.SHUTTING_DOWN, "the server ends; ask another one, or later", retry_after_s=1.0)
         if self._waiting or self._running >= self._workers.capacity:
             line = self._ring.get(caller)
-            if line is not None and len(line) >= self._limits.waiting_per_caller:
+            if line is not None and len(line) >= self._waiting_of(caller):
                 after_s = self._retry_after_s(len(line) * len(self._ring))
                 raise RefusedError(Reason.SERVER_BUSY, "too many requests of yours wait already", after_s)
             if self._waiting >= self._limits.waiting:
                 after_s = self._retry_after_s(self._waiting)
                 raise RefusedError(Reason.SERVER_BUSY, "the server has too much to do; try again later", after_s)
         return self.enter_anyway(caller)
+
+    def _waiting_of(self, caller: str) -> int:
+        own = None if self._accounts is None else self._accounts.waiting(caller)
+        return self._limits.waiting_per_caller if own is None else own
 
     def enter_anyway(self, caller: str) -> Place:
         """A place for a task that was accepted before: no bound holds."""
@@ -159,6 +181,8 @@ class Scheduler:
             took_s = self._clock() - place._begun_s
             self._mean_s = took_s if self._mean_s is None else self._mean_s + _WEIGHT * (took_s - self._mean_s)
             place._begun_s = None
+            if self._accounts is not None:
+                self._accounts.spent(place.caller, took_s)
             self._running -= 1
             self._give_turns()
             return

@@ -22,6 +22,7 @@ from robosc_api.security.listening import read
 from robosc_server.operations.metrics import check_metrics_address
 from robosc_server.operations.settings import Settings, shown
 from robosc_server.signing import SigningError, read_signing_key
+from robosc_server.store.opening import DATABASE_FILE
 
 _CONNECT_S = 5.0
 _SOON_DAYS = 14
@@ -160,10 +161,13 @@ def _signing(settings: Settings) -> Iterator[tuple[Grade, str]]:
 
 
 def _database(settings: Settings) -> Iterator[tuple[Grade, str]]:
-    if settings.database_url is not None:
-        yield _postgresql(settings.database_url)
+    url = settings.database_url
+    if url is None:
+        yield _sqlite(settings.state_dir.absolute() / DATABASE_FILE)
+    elif url.startswith("sqlite:///"):
+        yield _sqlite(Path(url.removeprefix("sqlite:///")).absolute())
     else:
-        yield _folder(settings.state_dir.absolute())
+        yield _postgresql(url)
 
 
 def _postgresql(text: str) -> tuple[Grade, str]:
@@ -189,22 +193,22 @@ def _postgresql(text: str) -> tuple[Grade, str]:
     return Grade.OK, f"{name}: PostgreSQL {version}"
 
 
-def _folder(folder: Path) -> tuple[Grade, str]:
-    """Whether the state folder can be used, or made."""
+def _sqlite(file: Path) -> tuple[Grade, str]:
+    """Whether the file can be used, or made."""
+    folder = file.parent
     there = next(place for place in (folder, *folder.parents) if place.exists())
     if not there.is_dir():
         return Grade.ERROR, f"{there} is no folder"
     if not os.access(there, os.W_OK | os.X_OK):
         return Grade.ERROR, f"{there} cannot be written"
-    if there != folder:
-        return Grade.OK, f"{folder} will be made"
-    for file in sorted(folder.glob("*.sqlite3")):
-        try:
-            with contextlib.closing(sqlite3.connect(f"{file.as_uri()}?mode=ro", uri=True, timeout=1.0)) as connection:
-                connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
-        except sqlite3.Error as error:
-            return Grade.ERROR, f"{file}: {error}"
-    return Grade.OK, f"SQLite in {folder}"
+    if not file.exists():
+        return Grade.OK, f"{file} will be made"
+    try:
+        with contextlib.closing(sqlite3.connect(f"{file.as_uri()}?mode=ro", uri=True, timeout=1.0)) as connection:
+            connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+    except sqlite3.Error as error:
+        return Grade.ERROR, f"{file}: {error}"
+    return Grade.OK, f"SQLite in {file}"
 
 
 def _workers(settings: Settings) -> Iterator[tuple[Grade, str]]:

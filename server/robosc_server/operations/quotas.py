@@ -88,16 +88,16 @@ class Quotas:
                 raise _exceeded(f"the token may ask for {account.tasks.size} tasks in a minute", wait_s)
             account.tasks.take(1.0, now_s)
 
-    def spent(self, caller: str, cpu_s: float) -> None:
+    def spent(self, caller: str, seconds: float) -> None:
         """Count what a task has taken.
 
         Args:
             caller: Name of the token that it was for.
-            cpu_s: Seconds of a processor's time.
+            seconds: For how long it has had a worker, and so a processor, for itself.
         """
         account = self._account(caller)
         if account is not None and account.seconds is not None:
-            account.seconds.take(cpu_s, self._clock())
+            account.seconds.take(seconds, self._clock())
 
     def waiting(self, caller: str) -> int | None:
         """How many tasks of a token may wait; None: as many as anybody's."""

@@ -86,8 +86,10 @@ def _workers(text: str) -> str:
 
 def _database(text: str) -> str:
     # Not the text itself in the message: it may hold a password.
-    if text.partition("://")[0] not in ("postgresql", "postgresql+psycopg") or "://" not in text:
-        raise PydanticCustomError("database", "postgresql://USER:PASSWORD@HOST:PORT/NAME is needed")
+    scheme, separator, rest = text.partition("://")
+    is_known = scheme in ("postgresql", "postgresql+psycopg") or (scheme == "sqlite" and len(rest) > 1)
+    if not separator or not is_known:
+        raise PydanticCustomError("database", "postgresql://USER:PASSWORD@HOST:PORT/NAME or sqlite:///FILE is needed")
     return text
 
 
@@ -218,7 +220,8 @@ class Settings(BaseModel):
     )
     database_url: Annotated[str, AfterValidator(_database)] | None = _setting(
         None,
-        "database for jobs and results that several servers may share: postgresql://USER:PASSWORD@HOST:PORT/NAME",
+        "database for jobs and results: postgresql://USER:PASSWORD@HOST:PORT/NAME, which several servers may share, or"
+        " sqlite:///FILE",
         _KEEPING,
         metavar="URL",
         told="SQLite in state_dir",

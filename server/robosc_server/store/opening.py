@@ -22,7 +22,7 @@ from robosc_server.store.errors import StoreError
 from robosc_server.store.schema import prepare
 from robosc_server.store.store import Store
 
-_FILE = "jobs.sqlite"
+DATABASE_FILE = "jobs.sqlite"
 _LOG_BYTES = 16 * 2**20
 _BUSY_S = 5.0
 
@@ -52,7 +52,7 @@ def open_store(state_dir: Path, database_url: str | None = None, wall_clock: Cal
     Raises:
         StoreError: It cannot be used.
     """
-    path = state_dir / _FILE
+    path = state_dir / DATABASE_FILE
     if database_url:
         try:
             url = make_url(database_url)

@@ -1,5 +1,6 @@
 """Quotas against an obvious twin, and their messages."""
 
+import asyncio
 from pathlib import Path
 
 import pytest
@@ -8,8 +9,10 @@ from hypothesis import strategies as st
 
 from robosc_api.security import Quota, Scope, TokenFile, make_token
 from robosc_server.failures import RefusedError
+from robosc_server.jobs.scheduler import QueueLimits, Scheduler
 from robosc_server.operations.quotas import Bucket, Quotas
 from robosc_server.tasks.task import Reason
+from support.job_workers import ScriptedWorkers
 
 
 class Clock:
@@ -119,3 +122,23 @@ def test_without_tokens_there_are_no_quotas() -> None:
     quotas.admit("127.0.0.1")
     quotas.spent("127.0.0.1", 1e9)
     assert quotas.waiting("127.0.0.1") is None
+
+
+def test_the_line_before_the_workers_keeps_to_a_tokens_own_bound_and_notes_what_it_takes(tmp_path: Path) -> None:
+    clock = Clock()
+    quotas = quotas_for(tmp_path, clock, little=Quota(waiting=1), timed=Quota(cpu_seconds_per_hour=60))
+
+    async def run() -> None:
+        scheduler = Scheduler(ScriptedWorkers(1), QueueLimits(waiting_per_caller=3), clock, quotas)
+        at_work = scheduler.enter("timed")
+        scheduler.enter("little")
+        with pytest.raises(RefusedError, match="too many requests of yours"):
+            scheduler.enter("little")
+        for _ in range(3):
+            scheduler.enter("anybody")
+        quotas.admit("timed")
+        clock.now_s += 90.0
+        scheduler.leave(at_work)
+        assert refused(quotas, "timed").retry_after_s == pytest.approx(30 * 60)
+
+    asyncio.run(run())

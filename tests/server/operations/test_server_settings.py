@@ -106,7 +106,7 @@ def test_every_problem_is_told_with_its_place(
         f"{file}: metrics_address: HOST:PORT is needed",
         f"{file}: tls_key: a text is needed",
         "$ROBOSC_SERVER_TASK_NODES: it should be greater than or equal to 1",
-        "--database-url: postgresql://USER:PASSWORD@HOST:PORT/NAME is needed",
+        "--database-url: postgresql://USER:PASSWORD@HOST:PORT/NAME or sqlite:///FILE is needed",
         "--result-bytes: a number of bytes such as 1048576 or 1MiB is needed",
         "--host: a name or address is needed",
     }
@@ -124,6 +124,8 @@ def test_every_problem_is_told_with_its_place(
         ("--workers", "celery://x:1"),
         ("--tracing-endpoint", "localhost:4317"),
         ("--log-level", "trace"),
+        ("--database-url", "sqlite://"),
+        ("--database-url", "mysql://host/name"),
         ("--drain-seconds", "-1"),
         ("--result-bytes", "9" * 18),
     ],

@@ -1,0 +1,189 @@
+"""`robosc-server check-config`, `example-config` and `token`."""
+
+import datetime
+import json
+import os
+import re
+import socket
+import sqlite3
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from robosc_api.security import Quota, Scope, make_token
+from robosc_api.security.tokens import parse_tokens
+from robosc_server.operations.commands import run_command
+from robosc_server.operations.example import example_file
+from robosc_server.operations.settings import Settings, settings_from, variable_of
+from support.certificates import Authority
+
+
+@pytest.fixture(autouse=True)
+def clean(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    for name in (*Settings.model_fields, "config"):
+        monkeypatch.delenv(variable_of(name), raising=False)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+
+
+class Checked:
+    """What `check-config --json` said."""
+
+    def __init__(self, capsys: pytest.CaptureFixture[str], *words: str) -> None:
+        self.status = run_command(["check-config", "--json", "--port", "0", *words])
+        self.text = capsys.readouterr().out
+        self.document: dict[str, Any] = json.loads(self.text)
+
+    def of(self, part: str) -> list[tuple[str, str]]:
+        return [(found["grade"], found["message"]) for found in self.document["findings"] if found["part"] == part]
+
+    def grade(self, part: str) -> str:
+        grades = [grade for grade, _ in self.of(part)]
+        return max(grades, key=["ok", "warning", "error"].index)
+
+
+def test_a_server_without_any_settings_could_start(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    checked = Checked(capsys)
+    assert checked.status == 0
+    assert checked.document["ok"] is True
+    assert {found["part"] for found in checked.document["findings"]} == {
+        "listening", "certificates", "tokens", "signing", "database", "workers", "metrics", "tracing",
+    }  # fmt: skip
+    assert not (tmp_path / "robosc-server").exists(), "nothing is made"
+    assert run_command(["check-config", "--port", "0"]) == 0
+    assert re.search(r"^ok +certificates: no TLS$", capsys.readouterr().out, re.MULTILINE)
+
+
+def test_where_each_value_comes_from(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "server.toml"
+    file.write_text('task_nodes = 5\nretention_seconds = 60\ndatabase_url = "postgresql://u:password@127.0.0.1:1/n"\n')
+    monkeypatch.setenv("ROBOSC_SERVER_RETENTION_SECONDS", "70")
+    checked = Checked(capsys, "--config", str(file))
+    settings = checked.document["settings"]
+    assert settings["task_nodes"] == {"value": 5, "source": f"{file}: task_nodes", "default": "20000000"}
+    assert settings["retention_seconds"]["value"] == 70
+    assert settings["retention_seconds"]["source"] == "$ROBOSC_SERVER_RETENTION_SECONDS"
+    assert settings["port"]["source"] == "--port"
+    assert settings["host"]["source"] == "default"
+    assert set(settings) == set(Settings.model_fields)
+    assert checked.status == 1
+    assert checked.grade("database") == "error"
+    assert "password" not in checked.text
+
+
+def test_wrong_settings(capsys: pytest.CaptureFixture[str]) -> None:
+    checked = Checked(capsys, "--task-nodes", "0", "--workers", "x")
+    assert checked.status == 2
+    assert checked.document["ok"] is False
+    assert len(checked.document["problems"]) == 2
+    assert run_command(["check-config", "--task-nodes", "0"]) == 2
+    assert "--task-nodes: it should be" in capsys.readouterr().err
+
+
+def test_certificates(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    authority = Authority(tmp_path)
+    certificate, key = authority.sign("server", days=100)
+    words = ["--tls-certificate", str(certificate), "--tls-key", str(key)]
+    assert Checked(capsys, *words).grade("certificates") == "ok"
+    assert Checked(capsys, *words[:2]).of("listening")[0][0] == "error"
+    soon, soon_key = authority.sign("soon", days=3)
+    assert Checked(capsys, words[0], str(soon), words[2], str(soon_key)).grade("certificates") == "warning"
+    old, old_key = authority.sign("old", days=-1)
+    checked = Checked(capsys, words[0], str(old), words[2], str(old_key))
+    assert checked.status == 1
+    yesterday = datetime.datetime.now(datetime.UTC) - datetime.timedelta(days=1)
+    assert f"{old}: has expired at {yesterday:%Y-%m-%d}" in checked.of("certificates")[0][1]
+    checked = Checked(capsys, *words[:3], str(soon_key))
+    assert "cannot be used" in checked.of("certificates")[0][1]
+    (tmp_path / "empty").touch()
+    checked = Checked(capsys, *words, "--client-ca", str(tmp_path / "empty"))
+    assert "no certificates in PEM" in checked.of("certificates")[0][1]
+
+
+def test_tokens(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "tokens"
+    file.write_text(make_token("watcher", (Scope.WATCH,))[1])
+    file.chmod(0o600)
+    assert "nobody is let in" in Checked(capsys, "--tokens", str(file)).of("tokens")[0][1]
+    file.write_text(make_token("caller", (Scope.SYNTHESIZE,))[1])
+    assert Checked(capsys, "--tokens", str(file)).grade("tokens") == "ok"
+    file.write_text("wrong")
+    assert Checked(capsys, "--tokens", str(file)).status == 1
+
+
+def test_addresses(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "without TLS" in Checked(capsys, "--host", "0.0.0.0").of("listening")[0][1]
+    open_to_all = Checked(capsys, "--host", "0.0.0.0", "--insecure-beyond-loopback")
+    assert (open_to_all.status, open_to_all.grade("listening")) == (0, "warning")
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        checked = Checked(capsys, "--port", str(port), "--metrics-address", f"127.0.0.1:{port}")
+        assert (checked.status, checked.grade("listening"), checked.grade("metrics")) == (0, "warning", "warning")
+    assert Checked(capsys, "--host", "192.0.2.1", "--insecure-beyond-loopback").status == 1
+    assert Checked(capsys, "--metrics-address", "0.0.0.0:0").status == 1
+    assert Checked(capsys, "--metrics-address", "0.0.0.0:0", "--metrics-beyond-loopback").status == 0
+
+
+def test_who_is_asked_beside(capsys: pytest.CaptureFixture[str]) -> None:
+    assert Checked(capsys, "--workers", "dask://127.0.0.1:1").grade("workers") == "error"
+    assert Checked(capsys, "--tracing-endpoint", "http://127.0.0.1:1").grade("tracing") == "warning"
+    with socket.create_server(("127.0.0.1", 0)) as there:
+        port = there.getsockname()[1]
+        assert Checked(capsys, "--workers", f"dask://127.0.0.1:{port}").grade("workers") == "ok"
+        assert Checked(capsys, "--tracing-endpoint", f"http://127.0.0.1:{port}").grade("tracing") == "ok"
+    assert Checked(capsys, "--worker-processes", "1000", "--task-memory-bytes", "1TiB").grade("workers") == "warning"
+
+
+def test_the_state_folder(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.touch()
+    assert Checked(capsys, "--state-dir", str(file)).status == 1
+    assert Checked(capsys, "--state-dir", str(file / "below")).status == 1
+    state = tmp_path / "state"
+    state.mkdir()
+    (state / "jobs.sqlite3").write_bytes(b"no database at all, and long enough for somebody to look" * 100)
+    assert "not a database" in Checked(capsys, "--state-dir", str(state)).of("database")[0][1]
+    (state / "jobs.sqlite3").unlink()
+    sqlite3.connect(state / "jobs.sqlite3").close()
+    assert Checked(capsys, "--state-dir", str(state)).status == 0
+    if os.getuid() != 0:
+        state.chmod(0o500)
+        assert Checked(capsys, "--state-dir", str(state)).status == 1
+
+
+def test_a_signing_key(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "key"
+    assert Checked(capsys, "--signing-key", str(file)).status == 1
+    file.write_text("no key")
+    assert Checked(capsys, "--signing-key", str(file)).status == 1
+
+
+def test_the_example_holds_every_setting_with_its_default(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command(["example-config"]) == 0
+    text = capsys.readouterr().out
+    assert text == example_file()
+    assert tomllib.loads(text) == {}
+    file = tmp_path / "server.toml"
+    file.write_text(re.sub(r"^#(?=[a-z])", "", text, flags=re.MULTILINE))
+    assert list(tomllib.loads(file.read_text())) == list(Settings.model_fields)
+    settings = settings_from({}, file)
+    for name, field in Settings.model_fields.items():
+        if field.default is not None and field.default_factory is None:
+            assert getattr(settings, name) == field.default, name
+
+
+def test_a_token_with_quotas(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command(["token", "laptop", "--scope", "synthesize", "--scope", "admin", "--per-minute", "60"]) == 0
+    captured = capsys.readouterr()
+    (entry,) = parse_tokens(captured.err.splitlines()[-1], "line")
+    assert captured.out.startswith("robosc_")
+    assert (entry.scopes, entry.quota) == ({Scope.SYNTHESIZE, Scope.ADMIN}, Quota(per_minute=60))
+    assert run_command(["token", "not a name"]) == 2
+
+
+def test_what_is_no_command_means_to_serve() -> None:
+    assert run_command([]) is None
+    assert run_command(["--port", "0"]) is None

@@ -1,0 +1,39 @@
+"""The manual of the server against what it describes."""
+
+import re
+from pathlib import Path
+
+from prometheus_client.parser import text_string_to_metric_families
+
+from robosc_server.operations.example import settings_table
+from robosc_server.operations.metrics import Metrics
+from robosc_server.operations.settings import Settings, default_text, flag_of, variable_of, words_of
+
+PAGE = (Path(__file__).parents[3] / "docs" / "server.md").read_text("utf-8")
+
+
+def test_every_setting_stands_in_the_manual_as_it_is_defined() -> None:
+    _, _, rest = PAGE.partition("<!-- settings: from the definition -->\n\n")
+    table, _, _ = rest.partition("\n<!-- end of settings -->")
+    assert table == settings_table()
+    for name in Settings.model_fields:
+        row = f"| `{flag_of(name)}` | `{name}` | `{variable_of(name)}` | {words_of(name)} | {default_text(name)} |"
+        assert table.count(row) == 1
+
+
+def test_every_metric_stands_in_the_manual() -> None:
+    told = set(re.findall(r"^\| `(robosc_server_[a-z_]+)` \|", PAGE, re.MULTILINE))
+    metrics = Metrics("1")
+    metrics.follow(jobs=lambda: {"queued": 1}, conditions=lambda: {"store": True})
+    families = text_string_to_metric_families(metrics.text().decode())
+    counted = {
+        f"{family.name}_total" if family.type == "counter" else family.name
+        for family in families
+        if family.name.startswith("robosc_") and not family.name.endswith("_created")
+    }
+    assert told == {name.removesuffix("_info") + "_info" if "info" in name else name for name in counted}
+
+
+def test_no_row_of_a_table_is_broken() -> None:
+    for name in Settings.model_fields:
+        assert "|" not in words_of(name) + default_text(name)

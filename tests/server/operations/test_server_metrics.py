@@ -1,0 +1,189 @@
+"""Metrics over HTTP as Prometheus asks for them."""
+
+import asyncio
+import urllib.error
+import urllib.request
+from collections.abc import Awaitable, Callable
+
+import pytest
+from prometheus_client.parser import text_string_to_metric_families
+
+from robosc_api.security import SecurityError
+from robosc_server.operations.metrics import Metrics, MetricsEndpoint, metric_names
+from robosc_server.operations.observed import ObservedWorkers
+from robosc_server.tasks.task import Failure, Outcome, Reason, Result, Task, TaskKind, TaskLimits
+from support.small_server import PATIENCE_S
+
+
+def samples(text: str) -> dict[tuple[str, frozenset[tuple[str, str]]], float]:
+    return {
+        (sample.name, frozenset(sample.labels.items())): sample.value
+        for family in text_string_to_metric_families(text)
+        for sample in family.samples
+    }
+
+
+def value(metrics: Metrics, name: str, **labels: str) -> float:
+    return samples(metrics.text().decode())[name, frozenset(labels.items())]
+
+
+def asked(metrics: Metrics, test: Callable[[str], Awaitable[None]]) -> None:
+    async def run() -> None:
+        async with MetricsEndpoint(metrics, "127.0.0.1:0") as endpoint:
+            await test(endpoint.address)
+
+    asyncio.run(asyncio.wait_for(run(), PATIENCE_S))
+
+
+async def sent(address: str, request: bytes) -> bytes:
+    host, _, port = address.rpartition(":")
+    reader, writer = await asyncio.open_connection(host, int(port))
+    writer.write(request)
+    answer = await reader.read()
+    writer.close()
+    return answer
+
+
+def test_prometheus_can_read_them() -> None:
+    metrics = Metrics("1.2")
+    metrics.follow(
+        waiting=lambda: 3,
+        running=lambda: 2,
+        jobs=lambda: {"queued": 5},
+        conditions=lambda: {"store": False},
+        restarts=lambda: 7,
+    )
+    metrics.cache_hit("memory")
+    metrics.cache_miss()
+
+    async def test(address: str) -> None:
+        def get() -> tuple[str, str]:
+            with urllib.request.urlopen(f"http://{address}/metrics", timeout=PATIENCE_S) as answer:
+                return answer.headers["Content-Type"], answer.read().decode()
+
+        kind, text = await asyncio.to_thread(get)
+        assert kind.startswith("text/plain; version=")
+        found = samples(text)
+        for name, labels, expected in [
+            ("robosc_server_info", {"version": "1.2"}, 1),
+            ("robosc_server_tasks_waiting", {}, 3),
+            ("robosc_server_tasks_running", {}, 2),
+            ("robosc_server_jobs", {"state": "queued"}, 5),
+            ("robosc_server_condition", {"name": "store"}, 0),
+            ("robosc_server_worker_restarts_total", {}, 7),
+            ("robosc_server_result_lookups_total", {"found": "memory"}, 1),
+            ("robosc_server_result_lookups_total", {"found": "store"}, 0),
+        ]:
+            assert found[name, frozenset(labels.items())] == expected
+        assert ("process_resident_memory_bytes", frozenset()) in found
+
+    asked(metrics, test)
+
+
+@pytest.mark.parametrize(
+    ("request_line", "status"),
+    [
+        (b"GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n", b"200 OK"),
+        (b"HEAD /metrics?x=1 HTTP/1.0\r\n\r\n", b"200 OK"),
+        (b"GET / HTTP/1.1\r\n\r\n", b"404 Not Found"),
+        (b"POST /metrics HTTP/1.1\r\nContent-Length: 5\r\n\r\nhello", b"405 Method Not Allowed"),
+        (b"nonsense\r\n\r\n", b"400 Bad Request"),
+        (b"\x16\x03\x01\r\n\r\n", b"400 Bad Request"),
+    ],
+)
+def test_requests_of_all_kinds(request_line: bytes, status: bytes) -> None:
+    async def test(address: str) -> None:
+        answer = await sent(address, request_line)
+        assert answer.startswith(b"HTTP/1.1 " + status)
+        assert (b"robosc_server" in answer) is request_line.startswith(b"GET /metrics")
+
+    asked(Metrics("1"), test)
+
+
+def test_a_head_without_end_is_dropped() -> None:
+    async def test(address: str) -> None:
+        with pytest.raises(ConnectionError):
+            assert await sent(address, b"GET /metrics HTTP/1.1\r\n" + b"X: y\r\n" * 20_000) == b""
+            raise ConnectionError
+
+    asked(Metrics("1"), test)
+
+
+def test_who_keeps_connections_open_leaves_others_none_for_a_while_and_then_is_dropped(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("robosc_server.operations.metrics._HEAD_SECONDS", 0.2)
+
+    async def test(address: str) -> None:
+        host, _, port = address.rpartition(":")
+        silent = [await asyncio.open_connection(host, int(port)) for _ in range(40)]
+        for reader, writer in silent:
+            with pytest.raises(ConnectionError):
+                assert await reader.read() == b""
+                raise ConnectionError
+            writer.close()
+        assert b"200 OK" in await sent(address, b"GET /metrics HTTP/1.1\r\n\r\n")
+
+    asked(Metrics("1"), test)
+
+
+def test_where_other_machines_reach_it_only_if_it_is_told() -> None:
+    async def opened(*, beyond_loopback: bool) -> None:
+        async with MetricsEndpoint(Metrics("1"), "0.0.0.0:0", beyond_loopback=beyond_loopback) as endpoint:
+            assert not endpoint.address.endswith(":0")
+
+    with pytest.raises(SecurityError, match="metrics_beyond_loopback"):
+        asyncio.run(opened(beyond_loopback=False))
+    asyncio.run(opened(beyond_loopback=True))
+
+
+def test_an_address_in_use_is_told() -> None:
+    async def test(address: str) -> None:
+        with pytest.raises(SecurityError, match="cannot listen"):
+            async with MetricsEndpoint(Metrics("1"), address):
+                pass
+
+    asked(Metrics("1"), test)
+
+
+def test_tasks_are_counted_by_how_they_ended() -> None:
+    class Scripted:
+        capacity = 1
+
+        async def run(self, task: Task, limits: TaskLimits, on_report: object) -> Outcome:
+            assert observed.running == 1
+            match task.request:
+                case b"result":
+                    return Result(())
+                case b"failure":
+                    return Failure(Reason.MEMORY_LIMIT, "too much")
+                case _:
+                    await asyncio.Event().wait()
+                    raise AssertionError
+
+    metrics = Metrics("1")
+    observed = ObservedWorkers(Scripted(), metrics)
+
+    async def drop(report: object) -> None:
+        pass
+
+    async def run() -> None:
+        for request in (b"result", b"failure", b"stuck"):
+            task = Task(TaskKind.CHECK, request, "0" * 64, "name")
+            running = asyncio.create_task(observed.run(task, TaskLimits(), drop))
+            if request == b"stuck":
+                await asyncio.sleep(0)
+                running.cancel()
+            await asyncio.wait([running])
+        assert observed.running == 0
+
+    asyncio.run(run())
+    for outcome in ("RESULT", "MEMORY_LIMIT", "CANCELLED"):
+        assert value(metrics, "robosc_server_tasks_total", kind="check", outcome=outcome) == 1
+    assert value(metrics, "robosc_server_task_seconds_count", kind="check") == 3
+
+
+def test_every_name_begins_as_it_should() -> None:
+    ours = {name for name in metric_names() if not name.startswith(("process_", "python_"))}
+    assert all(name.startswith("robosc_server") for name in ours)
+    assert {"robosc_server_calls", "robosc_server_jobs", "robosc_server_task_seconds"} <= ours

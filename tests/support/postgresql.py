@@ -1,0 +1,166 @@
+"""A real PostgreSQL server from Debian's packages, in a folder of its own, which tests start, stop and kill."""
+
+import contextlib
+import itertools
+import os
+import pwd
+import shutil
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+PATIENCE_S = 60.0
+_USER = "postgres"
+
+
+@cache
+def _programs() -> Path | None:
+    """Where the newest server's programs are."""
+    found = sorted(Path("/usr/lib/postgresql").glob("*/bin/postgres"), key=lambda path: int(path.parts[-3]))
+    return found[-1].parent if found else None
+
+
+def skip_without_postgresql() -> None:
+    """Skip the test where there is no PostgreSQL, or nobody to run it as."""
+    if _programs() is None:
+        pytest.skip("PostgreSQL is not installed (Debian's package: postgresql)")
+    if os.getuid() == 0:
+        try:
+            pwd.getpwnam(_USER)
+        except KeyError:
+            pytest.skip(f"there is no user {_USER}, and PostgreSQL does not run as root")
+
+
+class Postgresql:
+    """One server, on a port of the loopback interface.
+
+    Args:
+        folder: Empty; for its data.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._process: subprocess.Popen[bytes] | None = None
+        self._numbers = itertools.count()
+        with socket.socket() as listener:
+            listener.bind(("127.0.0.1", 0))
+            self._port = listener.getsockname()[1]
+        self._as: Mapping[str, int] = {}
+        if os.getuid() == 0:
+            user = pwd.getpwnam(_USER)
+            os.chown(folder, user.pw_uid, user.pw_gid)
+            self._as = {"user": user.pw_uid, "group": user.pw_gid}
+
+    @property
+    def url(self) -> str:
+        """Of its first database."""
+        return f"postgresql://{_USER}@127.0.0.1:{self._port}/postgres"
+
+    def new_database(self) -> str:
+        """The URL of a database with nothing in it."""
+        name = f"test{next(self._numbers)}"
+        self._run("createdb", "-h", "127.0.0.1", "-p", str(self._port), "-U", _USER, name)
+        return self.url.removesuffix("postgres") + name
+
+    def make(self) -> None:
+        """Make its data."""
+        self._run("initdb", "--auth", "trust", "--username", _USER, "--no-sync", "--pgdata", str(self._data))
+
+    def start(self) -> None:
+        """Start it, and wait until it answers."""
+        programs = _programs()
+        assert programs is not None and self._process is None
+        options = {
+            "listen_addresses": "127.0.0.1",
+            "port": str(self._port),
+            "unix_socket_directories": "",
+            "shared_buffers": "16MB",
+            "max_connections": "40",
+            # What is committed survives a kill of its processes without it, and the machine's disk is busy.
+            "fsync": "off",
+        }
+        settings = [word for name, value in options.items() for word in ("-c", f"{name}={value}")]
+        with (self._folder / "log").open("ab") as log:
+            self._process = subprocess.Popen(
+                [programs / "postgres", "-D", self._data, *settings],
+                stdout=log,
+                stderr=log,
+                cwd=self._folder,
+                start_new_session=True,
+                **self._as,
+            )
+        end = time.monotonic() + PATIENCE_S
+        while self._try("pg_isready", "-q", "-h", "127.0.0.1", "-p", str(self._port)):
+            assert self._process.poll() is None, (self._folder / "log").read_text()
+            assert time.monotonic() < end, (self._folder / "log").read_text()
+            time.sleep(0.02)
+
+    def stop(self) -> None:
+        """Stop it at once, as an operator would; its clients lose their connections."""
+        self._end(signal.SIGINT)
+
+    def freeze(self) -> None:
+        """Stop all its processes where they are: it takes connections, and does not answer."""
+        self._signal_all(signal.SIGSTOP)
+
+    def thaw(self) -> None:
+        """Have them go on."""
+        self._signal_all(signal.SIGCONT)
+
+    def end(self) -> None:
+        """End it, whatever it does."""
+        if self._process is not None:
+            self.thaw()
+            self._end(signal.SIGQUIT)
+
+    @property
+    def _data(self) -> Path:
+        return self._folder / "data"
+
+    def _signal_all(self, number: int) -> None:
+        assert self._process is not None
+        # Its processes are all children of the first; each has a session of its own.
+        children = Path(f"/proc/{self._process.pid}/task/{self._process.pid}/children").read_text().split()
+        for pid in (self._process.pid, *map(int, children)):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, number)
+
+    def _end(self, number: int) -> None:
+        assert self._process is not None
+        self._process.send_signal(number)
+        self._process.wait(PATIENCE_S)
+        self._process = None
+
+    def _run(self, program: str, *arguments: str) -> None:
+        programs = _programs()
+        assert programs is not None
+        subprocess.run([programs / program, *arguments], check=True, capture_output=True, cwd=self._folder, **self._as)
+
+    def _try(self, program: str, *arguments: str) -> int:
+        programs = _programs()
+        assert programs is not None
+        return subprocess.run([programs / program, *arguments], check=False, capture_output=True).returncode
+
+
+@contextmanager
+def postgresql() -> Iterator[Postgresql]:
+    """A server that runs; ended at the end."""
+    skip_without_postgresql()
+    # Not where only root comes: the server runs as somebody else.
+    folder = Path(tempfile.mkdtemp(prefix="postgresql-", dir="/tmp"))
+    server = Postgresql(folder)
+    try:
+        server.make()
+        server.start()
+        yield server
+    finally:
+        server.end()
+        shutil.rmtree(folder, ignore_errors=True)

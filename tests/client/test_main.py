@@ -418,7 +418,15 @@ class TestExitCodes:
         answers = {
             "Check": [[pb.CheckResponse(diagnostics=[finding])]],
             "Synthesize": [[synthesis(reason=evil, diagnostics=[finding])]],
-            "Verify": [[pb.VerifyResponse(result=pb.VerificationResult(status=5, reason=evil, report="{}"))]],
+            "Verify": [
+                [
+                    pb.VerifyResponse(
+                        result=pb.VerificationResult(
+                            status=pb.VERIFICATION_STATUS_NO_SUPERVISOR, reason=evil, report="{}"
+                        )
+                    )
+                ]
+            ],
             "ListTargets": [[pb.ListTargetsResponse(targets=[pb.Target(name=evil, description=evil)])]],
             "GetVersion": [[pb.GetVersionResponse(version=evil, engines=[evil])]],
         }

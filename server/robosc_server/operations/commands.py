@@ -1,4 +1,4 @@
-"""Commands beside serving: `robosc-server token`, `check-config` and `example-config`."""
+"""Commands beside serving: `robosc-server health`, `token`, `check-config` and `example-config`."""
 
 import argparse
 import json
@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from robosc_api.security import Scope, SecurityError, add_token_arguments, written_token
+from robosc_server.health_check import main as health
 from robosc_server.operations.check import Finding, Grade, check_settings
 from robosc_server.operations.example import example_file
 from robosc_server.operations.settings import (
@@ -39,6 +40,7 @@ def run_command(words: Sequence[str]) -> int | None:
         The exit status; None: it begins with no command, and so means to serve.
     """
     commands: dict[str, Callable[[Sequence[str]], int]] = {
+        "health": health,
         "token": new_token,
         "check-config": check_config,
         "example-config": print_example,

@@ -3,7 +3,7 @@
 Usage: run.py [NAME...]      (all of them without an argument)
 
 Names: cold-start, conditions, execution, language, synthesis; of the bridge: decoders, drive-bases, live-view,
-live-view-pixels, loop-period, maze, reaction, endurance, twin.
+live-view-pixels, loop-period, maze, reaction, endurance, twin; of the synthesis server: isolation.
 """
 
 import sys
@@ -12,10 +12,12 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parent / "bridge"))
+sys.path.insert(0, str(Path(__file__).parent / "service"))
 
 import decoders
 import drive_bases
 import endurance
+import isolation
 import live_view
 import live_view_pixels
 import loop_period
@@ -36,6 +38,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "drive-bases": drive_bases.table,
     "endurance": endurance.table,
     "execution": execution.table,
+    "isolation": isolation.table,
     "language": language.table,
     "live-view": live_view.table,
     "live-view-pixels": live_view_pixels.table,

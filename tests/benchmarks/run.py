@@ -2,8 +2,8 @@
 
 Usage: run.py [NAME...]      (all of them without an argument)
 
-Names: cold-start, conditions, execution, language, synthesis; of the bridge: decoders, drive-bases, live-view,
-live-view-pixels, loop-period, maze, reaction, endurance, twin.
+Names: cold-start, conditions, execution, language, synthesis; of the service: service-load; of the bridge: decoders,
+drive-bases, live-view, live-view-pixels, loop-period, maze, reaction, endurance, twin.
 """
 
 import sys
@@ -28,6 +28,7 @@ import conditions
 import execution
 import language
 import synthesis
+from service import load
 
 TABLES: dict[str, Callable[[], str]] = {
     "cold-start": cold_start.table,
@@ -42,6 +43,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "loop-period": loop_period.table,
     "maze": maze.table,
     "reaction": reaction.table,
+    "service-load": load.table,
     "synthesis": synthesis.table,
     "twin": twin.table,
 }

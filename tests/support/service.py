@@ -14,6 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import structlog
+
 from robosc.source import Bundle, SourceFile
 from robosc_api.security import ServerSecurity
 from robosc_server.application import running_server
@@ -33,6 +35,8 @@ def served(task_function: str = TASK_FUNCTION, /, *, given_workers: Any = None, 
         given_workers: Who does the tasks instead, not started yet; None: processes of this machine.
         **settings: Those that are not as usual.
     """
+    # Its log goes where pytest hears it, and not to whatever was standard output when the first line was written.
+    structlog.configure(logger_factory=structlog.stdlib.LoggerFactory(), cache_logger_on_first_use=False)
     with tempfile.TemporaryDirectory() as folder:
         usual: dict[str, Any] = {"port": 0, "worker_processes": 1, "state_dir": Path(folder), "drain_seconds": 0.5}
         chosen = Settings(**(usual | settings))

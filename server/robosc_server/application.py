@@ -132,6 +132,7 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
             results,
             settings.task_limits,
             JobLimits(retention_s=settings.retention_seconds, results_bytes=settings.results_bytes),
+            tracing=tracing,
         )
     )
     outgoing = Outgoing(2 * settings.result_bytes, _UNREAD_RESULTS * settings.result_bytes)

@@ -137,7 +137,12 @@ def run(folder: Path, model_path: Path) -> list[str]:
         environment = ros_environment(folder, stack.enter_context(own_domain()))
         server_log = folder / "server.log"
         server = stack.enter_context(
-            process("the server", [tool("robosc-server"), "--port", "0"], environment, server_log)
+            process(
+                "the server",
+                [tool("robosc-server"), "--port", "0", "--state-dir", str(folder / "server")],
+                environment,
+                server_log,
+            )
         )
         address = wait_for_line(server, server_log, r"listening on (\S+:\d+)$", "the server")[1]
         say(f"robosc-server listens on {address}")

@@ -170,7 +170,8 @@ def running(setting: Setting) -> Iterator[Rig]:
     if any(folder.iterdir()):
         raise ScenarioError(f"{folder} is not empty")
     with ExitStack() as stack:
-        server = stack.enter_context(Program("server", ("-m", "robosc_server.main", "--port", "0"), folder))
+        server_words = ["-m", "robosc_server.main", "--port", "0", "--state-dir", str(folder / "server")]
+        server = stack.enter_context(Program("server", server_words, folder))
         simulator, ports = _simulator(stack, setting)
         synthesis_server = server.wait_for(r"listening on (\S+:\d+)$")[1]
         client = stack.enter_context(_client(setting, synthesis_server))

@@ -297,7 +297,7 @@ class TestJobsOfOthers:
                 try:
                     call(request, metadata=metadata, timeout=PATIENCE_S)
                 except grpc.RpcError as error:
-                    return str(error.code().name)  # type: ignore[attr-defined]
+                    return str(error.code().name)
                 return "OK"
 
             request = jobs_pb2.SubmitJobRequest(task=task_message("a model"))

@@ -181,7 +181,7 @@ def test_a_token_with_quotas(capsys: pytest.CaptureFixture[str]) -> None:
     captured = capsys.readouterr()
     (entry,) = parse_tokens(captured.err.splitlines()[-1], "line")
     assert captured.out.startswith("robosc_")
-    assert (entry.scopes, entry.quota) == ({Scope.SYNTHESIZE, Scope.ADMIN}, Quota(per_minute=60))
+    assert (entry.scopes, entry.quota) == (frozenset({Scope.SYNTHESIZE, Scope.ADMIN}), Quota(per_minute=60))
     assert run_command(["token", "not a name"]) == 2
 
 

@@ -45,7 +45,7 @@ def test_a_job_is_one_trace_from_its_submission_to_the_worker(tmp_path: Path) ->
     collector = Collector()
     with ThreadPoolExecutor(2) as threads:
         takes = grpc.server(threads)
-        trace_service_pb2_grpc.add_TraceServiceServicer_to_server(collector, takes)
+        trace_service_pb2_grpc.add_TraceServiceServicer_to_server(collector, takes)  # type: ignore[no-untyped-call]
         port = takes.add_insecure_port("127.0.0.1:0")
         takes.start()
         try:

@@ -39,7 +39,7 @@ images: $(WHEELS)/.ready ## fetch what the images are made of, and build them wi
 
 $(WHEELS)/.ready: deploy/requirements-build.txt deploy/requirements-server.txt deploy/requirements-bridge.txt | $(READY)
 	PYTHON=$(BIN)/python sh deploy/make_image_wheels.sh $(WHEELS)
-	PYTHONPATH=tests $(BIN)/python -m support.containers $(WHEELS)
+	PYTHONPATH=tests $(BIN)/python -m support.containers
 	@touch $@
 
 demo: $(READY) ## lead a simulated robot out of a maze, from model to serial bytes; DEMO='--scene maze-spiral' and so on

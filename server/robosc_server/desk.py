@@ -1,6 +1,6 @@
 """Where an accepted task gets its result: one that is kept, or what a worker makes of it."""
 
-from robosc_server.failures import refused
+from robosc_server.failures import RefusedError, for_callers
 from robosc_server.jobs import Results, Scheduler
 from robosc_server.operations.metrics import Metrics
 from robosc_server.operations.quotas import Quotas
@@ -49,5 +49,6 @@ class Desk:
         self._quotas.admit(caller)
         outcome = await self._scheduler.run(task, caller, self._limits, on_report)
         if isinstance(outcome, Failure):
-            raise refused(outcome)
+            told = for_callers(outcome)
+            raise RefusedError(told.reason, told.message)
         return self._results.keep(task.key, task.kind, outcome)

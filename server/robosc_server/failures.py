@@ -63,13 +63,13 @@ async def abort(context: Any, error: RefusedError) -> NoReturn:
     raise AssertionError("unreachable: abort raises")
 
 
-def refused(failure: Failure) -> RefusedError:
-    """How a task that ended without a result is told to its caller; what only the log should know goes there."""
+def for_callers(failure: Failure) -> Failure:
+    """A failure as it is told to callers; what only the log should know goes there, under an id that they are told."""
     if not failure.details:
-        return RefusedError(failure.reason, failure.message)
+        return failure
     # How a worker died is the kernel's to tell; an exception in it may quote the model.
     fault = tell_fault(failure.details, failure.reason, is_ours=failure.reason is Reason.WORKER_DIED)
-    return RefusedError(failure.reason, f"{failure.message}; {fault_words(fault)}")
+    return Failure(failure.reason, f"{failure.message}; {fault_words(fault)}")
 
 
 def fault_words(identity: str) -> str:

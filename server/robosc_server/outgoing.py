@@ -45,13 +45,17 @@ class Outgoing:
         Raises:
             RefusedError: Too much that was sent before is not read yet.
         """
-        size = sum(map(len, messages))
-        if size > SMALL_BYTES:
-            self._count(context, size)
+        self._count(context, sum(map(len, messages)))
         for message in messages:
             await context.write(message)
 
+    async def send_one(self, context: Any, message: bytes) -> None:
+        """Send one of the messages of a result; see `send`."""
+        await self.send(context, (message,))
+
     def _count(self, context: Any, size: int) -> None:
+        if size <= SMALL_BYTES:
+            return
         caller = caller_of(context)
         unread = self._unread[caller]
         if unread and unread + size > self._per_caller_bytes:

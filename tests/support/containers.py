@@ -1,8 +1,8 @@
 """Containers without an engine: a Dockerfile is built and its program run in namespaces of the kernel, by util-linux.
 
-The base image is this machine's own /usr with its Python at /usr/local; everything else is what the Dockerfile says: its
-RUN instructions, its user, its paths. The root is read-only, the network is its own, no capability is left, and the
-program is process 1, as in an engine. Packages come from a folder of wheels that `make image-wheels` has filled.
+The base image is this machine's own /usr with its Python at /usr/local; everything else is what the Dockerfile says:
+its RUN instructions, its user, its paths. The root is read-only, the network is its own, no capability is left, and the
+program is process 1, as in an engine. Packages come from a folder of wheels that `make images` has filled.
 """
 
 import contextlib
@@ -16,6 +16,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -42,7 +43,7 @@ def why_not(wheels: Path) -> str:
         return "no namespaces can be made here"
     if sys.base_prefix == "/usr":
         return "the interpreter is the system's own; the base image is imitated with one beside it"
-    return "" if wheels.is_dir() else "no wheels are there: make image-wheels"
+    return "" if wheels.is_dir() else "no wheels are there: make images"
 
 
 @dataclass(frozen=True)
@@ -104,10 +105,12 @@ def _carry_out(stage: Stage, root: Path, roots: Mapping[str, Path], wheels: Path
                 _inside(root, place).mkdir(parents=True, exist_ok=True)
             case "COPY":
                 *sources, target = shlex.split(item.text)
-                goal = _inside(root, os.path.join(place, target))
+                goal = _inside(root, str(Path(place, target)))
                 if "from" in item.flags:
                     (source,) = sources
-                    shutil.copytree(_inside(roots[item.flags["from"]], source), goal, symlinks=True, copy_function=_link)
+                    shutil.copytree(
+                        _inside(roots[item.flags["from"]], source), goal, symlinks=True, copy_function=_link
+                    )
                     continue
                 for source, file in context_files(TOP, sources, ignored):
                     relative = file.relative_to(TOP / source) if (TOP / source).is_dir() else file.name
@@ -191,6 +194,7 @@ def _plan(root: Path, command: Sequence[str], environment: Mapping[str, str], fo
         "volumes": [],
         "temporary": [],
         "is_writable": False,
+        "is_memory_sealed": False,
         "folder": folder,
         "command": list(command),
         "environment": dict(environment),
@@ -238,6 +242,7 @@ class Start:
         temporary: Places within for files that are forgotten.
         folder: Where it starts.
         hosts: Names of the machine itself.
+        is_memory_sealed: Whether no memory may be written and executed (MemoryDenyWriteExecute of systemd).
     """
 
     command: Sequence[str]
@@ -245,9 +250,10 @@ class Start:
     user: tuple[int, int] = (10001, 10001)
     files: Mapping[str, Path] = field(default_factory=dict)
     volumes: Mapping[str, Path] = field(default_factory=dict)
-    temporary: Sequence[str] = ("/tmp",)  # noqa: S108
+    temporary: Sequence[str] = ("/tmp",)
     folder: str = "/"
     hosts: Sequence[str] = ()
+    is_memory_sealed: bool = False
 
 
 class Container:
@@ -271,6 +277,7 @@ class Container:
         plan["binds"] = [(str(file), place) for place, file in start.files.items()]
         plan["volumes"] = [(str(folder), place) for place, folder in start.volumes.items()]
         plan["temporary"] = list(start.temporary)
+        plan["is_memory_sealed"] = start.is_memory_sealed
         command = ["unshare", "--mount", "--propagation", "private", "--pid", "--fork", "--kill-child", *_starter(plan)]
         self._output = output
         with output.open("wb") as stream:
@@ -303,6 +310,10 @@ class Container:
             assert self._outer.poll() is None, self.output
             time.sleep(0.05)
 
+    def wait(self, limit_s: float) -> int:
+        """Its exit status, waiting for its end."""
+        return self._outer.wait(limit_s)
+
     def stop(self, limit_s: float) -> int:
         """Tell it to end, and wait; returns its exit status."""
         os.kill(self.pid, signal.SIGTERM)
@@ -322,8 +333,29 @@ def _host_path(root: Path, path: str) -> str:
     return ":".join([*places, "/usr/bin", "/usr/sbin"])
 
 
+def wheels_of(name: str) -> Path:
+    """Where the packages of an image lie, once `make images` has fetched them."""
+    return TOP / "out" / "wheels" / name
+
+
 def seconds(text: str) -> float:
     """A duration as Docker writes it."""
     match = re.fullmatch(r"(\d+)(s|m)", text)
     assert match, text
     return int(match[1]) * {"s": 1, "m": 60}[match[2]]
+
+
+def main() -> int:
+    """Build every image once, so that the next time is a matter of seconds; returns the exit status."""
+    for name in ("server", "bridge"):
+        reason = why_not(wheels_of(name))
+        if reason:
+            sys.stderr.write(f"{name}: {reason}\n")
+            return 0
+        with tempfile.TemporaryDirectory() as folder:
+            build(name, wheels_of(name), Path(folder))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

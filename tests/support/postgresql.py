@@ -96,7 +96,8 @@ class Postgresql:
                 stderr=log,
                 cwd=self._folder,
                 start_new_session=True,
-                **self._as,
+                user=self._as.get("user"),
+                group=self._as.get("group"),
             )
         end = time.monotonic() + PATIENCE_S
         while self._try("pg_isready", "-q", "-h", "127.0.0.1", "-p", str(self._port)):
@@ -143,7 +144,14 @@ class Postgresql:
     def _run(self, program: str, *arguments: str) -> None:
         programs = _programs()
         assert programs is not None
-        subprocess.run([programs / program, *arguments], check=True, capture_output=True, cwd=self._folder, **self._as)
+        subprocess.run(
+            [programs / program, *arguments],
+            check=True,
+            capture_output=True,
+            cwd=self._folder,
+            user=self._as.get("user"),
+            group=self._as.get("group"),
+        )
 
     def _try(self, program: str, *arguments: str) -> int:
         programs = _programs()

@@ -11,17 +11,19 @@ import logging
 import math
 import secrets
 import time
+import traceback
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterable, Mapping
 from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Any, Self
 
-from robosc_server.failures import RefusedError
+from robosc_server.failures import RefusedError, for_callers
 from robosc_server.jobs.callers import Caller
 from robosc_server.jobs.limits import JobLimits
 from robosc_server.jobs.results import Results
 from robosc_server.jobs.scheduler import Place, Scheduler
 from robosc_server.jobs.watching import Watchers
+from robosc_server.operations.tracing import NO_TRACING, Tracing
 from robosc_server.store import JobFilter, JobRecord, JobState, Store, StoreUnavailableError
 from robosc_server.store.records import STEP, messages_of
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, Task, TaskKind, TaskLimits
@@ -70,6 +72,7 @@ class JobManager:
         task_limits: What one task may take.
         limits: What jobs may take.
         clock: Seconds of a monotonic clock, for leases.
+        tracing: Where a span of each job goes.
     """
 
     def __init__(
@@ -81,8 +84,10 @@ class JobManager:
         task_limits: TaskLimits,
         limits: JobLimits,
         clock: Callable[[], float] = time.monotonic,
+        tracing: Tracing = NO_TRACING,
     ) -> None:
         self._store, self._scheduler, self._workers, self._results = store, scheduler, workers, results
+        self._tracing = tracing
         self._task_limits, self._limits, self._clock = task_limits, limits, clock
         self._replica = _new_id()
         self._carried: dict[str, _Carried] = {}
@@ -336,11 +341,10 @@ class JobManager:
     async def _carry(self, carried: _Carried) -> None:
         """Bring a job to its end, as often as the database or the workers are away."""
         try:
-            outcome = await self._outcome(carried)
+            with self._tracing.span("job", {"job.id": carried.record.id, "task.kind": carried.record.kind.value}):
+                outcome = await self._outcome(carried)
         except Exception:
-            fault = secrets.token_hex(4)
-            outcome = Failure(Reason.INTERNAL_FAULT, f"internal error {fault}, see the server's log")
-            _log.exception("fault %s: job %s cannot be carried on", fault, carried.record.id)
+            outcome = Failure(Reason.INTERNAL_FAULT, "a fault of the server", traceback.format_exc())
         self._give_place_back(carried)
         if outcome is not None:
             await self._end(carried, outcome)
@@ -386,8 +390,8 @@ class JobManager:
     async def _end(self, carried: _Carried, outcome: Outcome) -> None:
         """Have the end of a job kept, however long that takes."""
         job_id = carried.record.id
-        if isinstance(outcome, Failure) and outcome.details:
-            _log.error("job %s failed (%s): %s", job_id, outcome.reason, outcome.details)
+        if isinstance(outcome, Failure):
+            outcome = for_callers(outcome)
         while True:
             try:
                 ended = await self._store.end(job_id, self._replica, outcome)

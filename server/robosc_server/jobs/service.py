@@ -1,23 +1,18 @@
-"""The RPCs of jobs: conversion at the border, and every refusal as one gRPC status."""
+"""The RPCs of jobs: conversion at the border; what is refused is raised, and told by what stands around every call."""
 
-import logging
-import secrets
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 import grpc
 import grpc.aio
 
 from robosc_api.v1 import jobs_pb2 as pb
-from robosc_server.failures import RefusedError, abort
+from robosc_server.failures import RefusedError
 from robosc_server.jobs import convert
 from robosc_server.jobs.callers import Caller, caller_of
 from robosc_server.jobs.manager import JobManager
 from robosc_server.store import JobRecord
 from robosc_server.tasks.task import Reason, Task, TaskKind
-
-_log = logging.getLogger(__name__)
 
 _ID_CHARACTERS = 64
 
@@ -28,6 +23,10 @@ def _anybody(caller: str) -> None:
     """Let each caller ask for as much as it likes."""
 
 
+async def _write(context: Context, message: bytes) -> None:
+    await context.write(message)
+
+
 class JobService(convert.JobServiceServicer):
     """Submits, tells about and cancels jobs.
 
@@ -36,6 +35,7 @@ class JobService(convert.JobServiceServicer):
         accept: Looks at a request and makes a task of it, or raises RefusedError.
         identify: Who calls.
         admit: Counts a job that somebody asks for, or raises RefusedError; is given the caller's name.
+        send: Sends a message of a result, serialized.
     """
 
     def __init__(
@@ -44,76 +44,67 @@ class JobService(convert.JobServiceServicer):
         accept: Callable[[TaskKind, bytes], Task],
         identify: Callable[[Context], Caller] = caller_of,
         admit: Callable[[str], None] = _anybody,
+        send: Callable[[Context, bytes], Awaitable[None]] = _write,
     ) -> None:
-        self._manager, self._accept, self._identify, self._admit = manager, accept, identify, admit
+        self._manager, self._accept, self._identify, self._admit, self._send = manager, accept, identify, admit, send
 
     async def SubmitJob(  # noqa: N802  # named by the .proto file
         self, request: pb.SubmitJobRequest, context: Context
     ) -> pb.SubmitJobResponse:
         """Accept a task."""
-        async with _translated(context):
-            idempotency_key = convert.checked_idempotency_key(request.idempotency_key)
-            label, retention_s = convert.checked_label(request.label), convert.retention_s_of(request)
-            task = self._accept(*convert.kind_and_request(request.task))
-            caller = self._identify(context)
-            self._admit(caller.name)
-            record, existed = await self._manager.submit(
-                task, caller, idempotency_key=idempotency_key, label=label, retention_s=retention_s
-            )
-            return pb.SubmitJobResponse(job=self._job(record), existed=existed)
-        raise AssertionError("unreachable: a failed request is aborted")
+        idempotency_key = convert.checked_idempotency_key(request.idempotency_key)
+        label, retention_s = convert.checked_label(request.label), convert.retention_s_of(request)
+        task = self._accept(*convert.kind_and_request(request.task))
+        caller = self._identify(context)
+        self._admit(caller.name)
+        record, existed = await self._manager.submit(
+            task, caller, idempotency_key=idempotency_key, label=label, retention_s=retention_s
+        )
+        return pb.SubmitJobResponse(job=self._job(record), existed=existed)
 
     async def GetJob(  # noqa: N802
         self, request: pb.GetJobRequest, context: Context
     ) -> pb.GetJobResponse:
         """Tell where a job is."""
-        async with _translated(context):
-            record = await self._manager.get(_checked_id(request.id), self._identify(context))
-            return pb.GetJobResponse(job=self._job(record))
-        raise AssertionError("unreachable: a failed request is aborted")
+        record = await self._manager.get(_checked_id(request.id), self._identify(context))
+        return pb.GetJobResponse(job=self._job(record))
 
     async def WatchJob(  # noqa: N802
         self, request: pb.WatchJobRequest, context: Context
     ) -> None:
         """Tell where a job is, until it has ended."""
-        async with _translated(context):
-            caller = self._identify(context)
-            async for record in self._manager.watch(_checked_id(request.id), caller, request.after_revision):
-                await context.write(pb.WatchJobResponse(job=self._job(record)))
+        caller = self._identify(context)
+        async for record in self._manager.watch(_checked_id(request.id), caller, request.after_revision):
+            await context.write(pb.WatchJobResponse(job=self._job(record)))
 
     async def CancelJob(  # noqa: N802
         self, request: pb.CancelJobRequest, context: Context
     ) -> pb.CancelJobResponse:
         """End a job."""
-        async with _translated(context):
-            record = await self._manager.cancel(_checked_id(request.id), self._identify(context))
-            return pb.CancelJobResponse(job=self._job(record))
-        raise AssertionError("unreachable: a failed request is aborted")
+        record = await self._manager.cancel(_checked_id(request.id), self._identify(context))
+        return pb.CancelJobResponse(job=self._job(record))
 
     async def ListJobs(  # noqa: N802
         self, request: pb.ListJobsRequest, context: Context
     ) -> pb.ListJobsResponse:
         """List jobs, the youngest first."""
-        async with _translated(context):
-            caller = self._identify(context)
-            if request.all_owners and not caller.is_admin:
-                raise RefusedError(Reason.PERMISSION_DENIED, "jobs of all owners are for the scope 'admin'")
-            chosen = convert.filter_of(request, caller.name)
-            size = convert.page_size_of(request)
-            # One more than asked for tells whether there are more.
-            found = await self._manager.list_jobs(chosen, convert.place_of(request.page_token, chosen), size + 1)
-            token = convert.page_token(found[size - 1], chosen) if len(found) > size else ""
-            return pb.ListJobsResponse(jobs=map(self._job, found[:size]), next_page_token=token)
-        raise AssertionError("unreachable: a failed request is aborted")
+        caller = self._identify(context)
+        if request.all_owners and not caller.is_admin:
+            raise RefusedError(Reason.PERMISSION_DENIED, "jobs of all owners are for the scope 'admin'")
+        chosen = convert.filter_of(request, caller.name)
+        size = convert.page_size_of(request)
+        # One more than asked for tells whether there are more.
+        found = await self._manager.list_jobs(chosen, convert.place_of(request.page_token, chosen), size + 1)
+        token = convert.page_token(found[size - 1], chosen) if len(found) > size else ""
+        return pb.ListJobsResponse(jobs=map(self._job, found[:size]), next_page_token=token)
 
     async def GetJobResult(  # noqa: N802
         self, request: pb.GetJobResultRequest, context: Context
     ) -> None:
         """Send the result of a job."""
-        async with _translated(context):
-            record, messages = await self._manager.result(_checked_id(request.id), self._identify(context))
-            async for message in messages:
-                await context.write(convert.result_response(record.kind, message))
+        record, messages = await self._manager.result(_checked_id(request.id), self._identify(context))
+        async for message in messages:
+            await self._send(context, convert.result_response(record.kind, message))
 
     def _job(self, record: JobRecord) -> pb.Job:
         return convert.job_of(record, self._manager.waiting_before(record))
@@ -148,19 +139,3 @@ def _checked_id(text: str) -> str:
     if not 0 < len(text) <= _ID_CHARACTERS or not text.isascii() or not text.isprintable():
         raise RefusedError(Reason.NO_SUCH_JOB, "there is no job of that id that is yours")
     return text
-
-
-@asynccontextmanager
-async def _translated(context: Context) -> AsyncIterator[None]:
-    """End the RPC with the right status for what goes wrong inside."""
-    try:
-        yield
-    except RefusedError as error:
-        await abort(context, error)
-    except grpc.aio.AbortError:
-        raise
-    except Exception:
-        fault = secrets.token_hex(4)
-        _log.exception("fault %s", fault)
-        message = f"internal error {fault}, please report it with the server's log"
-        await abort(context, RefusedError(Reason.INTERNAL_FAULT, message))

@@ -5,9 +5,10 @@ one comes first, and the other finds that there is nothing left to do.
 """
 
 from collections.abc import Collection
+from functools import cache
 from typing import Any
 
-from sqlalchemy import Connection, Row, and_, delete, func, insert, or_, select, tuple_, update
+from sqlalchemy import Connection, Row, and_, bindparam, delete, func, insert, or_, select, tuple_, update
 
 from robosc_server.store.records import ACTIVE, STEP, JobFilter, JobRecord, JobState
 from robosc_server.store.result_rows import insert_result
@@ -19,6 +20,40 @@ _SERVER_DIED = "the server died while it was at this job, more than once"
 
 MAXIMUM_ATTEMPTS = 2
 """Begun so often and interrupted each time, a job has failed."""
+
+# Statements that are used often, made once: making one costs more than what the database does with it.
+_IS_KEPT = or_(JOBS.c.expires_us.is_(None), JOBS.c.expires_us > bindparam("now"))
+_IS_ACTIVE = or_(*(JOBS.c.state == state for state in sorted(ACTIVE)))
+_FIND = select(JOBS).where(JOBS.c.id == bindparam("job"), _IS_KEPT)
+_OF_KEY = and_(JOBS.c.owner == bindparam("by"), JOBS.c.idempotency_key == bindparam("with"))
+_FIND_BY_KEY = select(JOBS).where(_OF_KEY, _IS_KEPT)
+_FREE_KEY = delete(JOBS).where(_OF_KEY, JOBS.c.expires_us <= bindparam("now"))
+_SOME_OF_OWNER = select(JOBS.c.id).where(JOBS.c.owner == bindparam("by")).limit(bindparam("bound")).subquery()
+_COUNT = select(func.count()).select_from(_SOME_OF_OWNER)
+_INSERT = insert(JOBS)
+_COLUMNS_OF_NEW = (
+    "id owner kind state revision key main_file label idempotency_key retention_us created_us attempts is_from_store"
+    " replica"
+).split()
+_LOCK = select(JOBS).where(JOBS.c.id == bindparam("job")).with_for_update()
+_REQUEST = select(REQUESTS.c.content).where(REQUESTS.c.job == bindparam("of"))
+_INSERT_REQUEST = insert(REQUESTS)
+_DROP_REQUEST = delete(REQUESTS).where(REQUESTS.c.job == bindparam("of"))
+# Locked against being swept, where rows are: until a job refers to it.
+_LOCK_RESULT = select(RESULTS.c.key).where(RESULTS.c.key == bindparam("of"))
+_LOCK_RESULT = _LOCK_RESULT.with_for_update(read=True, key_share=True)
+_ACTIVE_IDS = select(JOBS.c.id).where(_IS_ACTIVE, JOBS.c.replica == bindparam("by"))
+
+
+_NO_PROGRESS = {"stage": None, "progress": None}
+
+
+@cache
+def _change_of(names: tuple[str, ...]) -> Any:
+    """The statement that gives columns of a job new values."""
+    values: dict[str, Any] = {name: bindparam(f"new_{name}") for name in names}
+    changed = update(JOBS).where(JOBS.c.id == bindparam("job"))
+    return changed.values(revision=JOBS.c.revision + STEP, **values).returning(*JOBS.c)
 
 
 def record_of(row: Row[Any]) -> JobRecord:
@@ -51,14 +86,13 @@ def record_of(row: Row[Any]) -> JobRecord:
 
 def find(connection: Connection, job_id: str, now_us: int) -> JobRecord | None:
     """A job that is still kept."""
-    row = connection.execute(select(JOBS).where(JOBS.c.id == job_id, _is_kept(now_us))).one_or_none()
+    row = connection.execute(_FIND, {"job": job_id, "now": now_us}).one_or_none()
     return None if row is None else record_of(row)
 
 
 def find_by_key(connection: Connection, owner: str, idempotency_key: str, now_us: int) -> JobRecord | None:
     """The job that was accepted with an idempotency key."""
-    chosen = select(JOBS).where(JOBS.c.owner == owner, JOBS.c.idempotency_key == idempotency_key, _is_kept(now_us))
-    row = connection.execute(chosen).one_or_none()
+    row = connection.execute(_FIND_BY_KEY, {"by": owner, "with": idempotency_key, "now": now_us}).one_or_none()
     return None if row is None else record_of(row)
 
 
@@ -87,7 +121,7 @@ def listed(
         limit: How many at most.
         now_us: The time.
     """
-    query = select(JOBS).where(_is_kept(now_us))
+    query = select(JOBS).where(_IS_KEPT)
     if chosen.owner is not None:
         query = query.where(JOBS.c.owner == chosen.owner)
     if chosen.states:
@@ -97,13 +131,7 @@ def listed(
     if after is not None:
         query = query.where(tuple_(JOBS.c.created_us, JOBS.c.id) < after)
     query = query.order_by(JOBS.c.created_us.desc(), JOBS.c.id.desc()).limit(limit)
-    return [record_of(row) for row in connection.execute(query)]
-
-
-def count_of(connection: Connection, owner: str, limit: int) -> int:
-    """How many jobs of an owner there are, counted up to a limit."""
-    some = select(JOBS.c.id).where(JOBS.c.owner == owner).limit(limit).subquery()
-    return connection.scalar(select(func.count()).select_from(some)) or 0
+    return [record_of(row) for row in connection.execute(query, {"now": now_us})]
 
 
 def counts_by_state(connection: Connection) -> dict[JobState, int]:
@@ -135,37 +163,16 @@ def accept(
         if there is not None:
             return there, True
         # One that has expired and is not swept yet.
-        connection.execute(
-            delete(JOBS).where(
-                JOBS.c.owner == record.owner,
-                JOBS.c.idempotency_key == record.idempotency_key,
-                JOBS.c.expires_us <= now_us,
-            )
-        )
-    if count_of(connection, record.owner, bound) >= bound:
+        freed = {"by": record.owner, "with": record.idempotency_key, "now": now_us}
+        connection.execute(_FREE_KEY, freed)
+    if connection.execute(_COUNT, {"by": record.owner, "bound": bound}).scalar_one() >= bound:
         return None
-    connection.execute(
-        insert(JOBS).values(
-            id=record.id,
-            owner=record.owner,
-            kind=record.kind,
-            state=record.state,
-            revision=record.revision,
-            key=record.key,
-            main_file=record.main_file,
-            label=record.label,
-            idempotency_key=record.idempotency_key,
-            retention_us=record.retention_us,
-            created_us=record.created_us,
-            attempts=0,
-            is_from_store=False,
-            replica=record.replica,
-        )
-    )
+    new = {name: getattr(record, name) for name in _COLUMNS_OF_NEW}
+    connection.execute(_INSERT, new)
     ended = _end_from_store(connection, record, result, now_us)
     if ended is not None:
         return ended, False
-    connection.execute(insert(REQUESTS).values(job=record.id, content=request))
+    connection.execute(_INSERT_REQUEST, {"job": record.id, "content": request})
     return record, False
 
 
@@ -175,24 +182,15 @@ def begin(connection: Connection, job_id: str, replica: str, now_us: int) -> tup
     Returns:
         The job and its request; None: it does not wait any more, or is another server's.
     """
-    waits = and_(JOBS.c.id == job_id, JOBS.c.replica == replica, JOBS.c.state == JobState.QUEUED)
-    row = connection.execute(select(JOBS).where(waits).with_for_update()).one_or_none()
-    if row is None:
+    record = _locked(connection, job_id)
+    if record is None or record.replica != replica or record.state is not JobState.QUEUED:
         return None
-    ended = _end_from_store(connection, record_of(row), None, now_us)
+    ended = _end_from_store(connection, record, None, now_us)
     if ended is not None:
         return ended, b""
-    record = _changed(
-        connection,
-        waits,
-        state=JobState.RUNNING,
-        attempts=JOBS.c.attempts + 1,
-        started_us=now_us,
-        stage=None,
-        progress=None,
-    )
-    request = connection.scalar(select(REQUESTS.c.content).where(REQUESTS.c.job == job_id))
-    return None if record is None else (record, bytes(request or b""))
+    attempts = record.attempts + 1
+    begun = _changed(connection, job_id, **_NO_PROGRESS, state=JobState.RUNNING, attempts=attempts, started_us=now_us)
+    return begun, bytes(connection.scalar(_REQUEST, {"of": job_id}) or b"")
 
 
 def put_back(connection: Connection, ids: Collection[str], replica: str, next_replica: str | None) -> list[JobRecord]:
@@ -205,18 +203,11 @@ def put_back(connection: Connection, ids: Collection[str], replica: str, next_re
         next_replica: Whose they will be; None: whoever finds them first.
     """
     found = []
-    for job_id in ids:
-        record = _changed(
-            connection,
-            and_(JOBS.c.id == job_id, JOBS.c.replica == replica, JOBS.c.state == JobState.RUNNING),
-            state=JobState.QUEUED,
-            attempts=JOBS.c.attempts - 1,
-            replica=next_replica,
-            stage=None,
-            progress=None,
-        )
-        if record is not None:
-            found.append(record)
+    for job_id in sorted(ids):  # The same order in each server: none waits for one that waits for it.
+        record = _locked(connection, job_id)
+        if record is not None and record.replica == replica and record.state is JobState.RUNNING:
+            values: dict[str, Any] = {"state": JobState.QUEUED, "attempts": record.attempts - 1}
+            found.append(_changed(connection, job_id, **_NO_PROGRESS, **values, replica=next_replica))
     return found
 
 
@@ -229,27 +220,27 @@ def give_up_waiting(connection: Connection, replica: str) -> None:
 
 def succeed(connection: Connection, job_id: str, replica: str, result: Result, now_us: int) -> JobRecord | None:
     """Keep the result of a job that runs; None: it does not any more, or is another server's."""
-    row = connection.execute(select(JOBS).where(_is_active(job_id, replica)).with_for_update()).one_or_none()
-    if row is None:
+    record = _locked(connection, job_id)
+    if record is None or record.replica != replica or record.state.has_ended:
         return None
-    record = record_of(row)
     insert_result(connection, record.key, record.kind, result, now_us)
     return _end(connection, record, JobState.SUCCEEDED, now_us, result_key=record.key)
 
 
 def fail(connection: Connection, job_id: str, replica: str, failure: Failure, now_us: int) -> JobRecord | None:
     """End a job without a result; None: it has ended before, or is another server's."""
-    row = connection.execute(select(JOBS).where(_is_active(job_id, replica)).with_for_update()).one_or_none()
-    return None if row is None else _fail(connection, record_of(row), failure, now_us)
+    record = _locked(connection, job_id)
+    if record is None or record.replica != replica or record.state.has_ended:
+        return None
+    return _fail(connection, record, failure, now_us)
 
 
 def cancel(connection: Connection, job_id: str, now_us: int) -> JobRecord | None:
     """End a job, whoever is at it; None: there is none. One that has ended stays as it is."""
-    row = connection.execute(select(JOBS).where(JOBS.c.id == job_id).with_for_update()).one_or_none()
-    if row is None:
-        return None
-    record = record_of(row)
-    return record if record.state.has_ended else _end(connection, record, JobState.CANCELLED, now_us)
+    record = _locked(connection, job_id)
+    if record is None or record.state.has_ended:
+        return record
+    return _end(connection, record, JobState.CANCELLED, now_us)
 
 
 def note_progress(connection: Connection, replica: str, progress: dict[str, tuple[int, Report]]) -> None:
@@ -269,13 +260,13 @@ def note_progress(connection: Connection, replica: str, progress: dict[str, tupl
 
 def active_of(connection: Connection, replica: str) -> list[JobRecord]:
     """The jobs of a server that have not ended, the oldest first."""
-    query = select(JOBS).where(JOBS.c.state.in_(sorted(ACTIVE)), JOBS.c.replica == replica)
+    query = select(JOBS).where(_IS_ACTIVE, JOBS.c.replica == replica)
     return [record_of(row) for row in connection.execute(query.order_by(JOBS.c.created_us, JOBS.c.id))]
 
 
 def active_ids_of(connection: Connection, replica: str) -> set[str]:
     """The ids of the jobs of a server that have not ended."""
-    return set(connection.scalars(select(JOBS.c.id).where(JOBS.c.state.in_(sorted(ACTIVE)), JOBS.c.replica == replica)))
+    return set(connection.scalars(_ACTIVE_IDS, {"by": replica}))
 
 
 def has_orphans(connection: Connection) -> bool:
@@ -302,11 +293,7 @@ def take_orphans(connection: Connection, ours: str, now_us: int) -> list[JobReco
         if record.state is JobState.RUNNING and record.attempts >= MAXIMUM_ATTEMPTS:
             taken.append(_fail(connection, record, Failure(Reason.SERVER_DIED, _SERVER_DIED), now_us))
             continue
-        changed = _changed(
-            connection, JOBS.c.id == record.id, state=JobState.QUEUED, replica=ours, stage=None, progress=None
-        )
-        if changed is not None:
-            taken.append(changed)
+        taken.append(_changed(connection, record.id, **_NO_PROGRESS, state=JobState.QUEUED, replica=ours))
     return taken
 
 
@@ -319,31 +306,26 @@ def sweep(connection: Connection, now_us: int, limit: int) -> int:
     return len(ids)
 
 
-def _is_kept(now_us: int) -> Any:
-    return or_(JOBS.c.expires_us.is_(None), JOBS.c.expires_us > now_us)
-
-
 def _is_orphan() -> Any:
     is_somebodys = select(REPLICAS.c.id).where(REPLICAS.c.id == JOBS.c.replica).exists()
-    return and_(JOBS.c.state.in_(sorted(ACTIVE)), ~is_somebodys)
+    return and_(_IS_ACTIVE, ~is_somebodys)
 
 
-def _is_active(job_id: str, replica: str) -> Any:
-    return and_(JOBS.c.id == job_id, JOBS.c.replica == replica, JOBS.c.state.in_(sorted(ACTIVE)))
-
-
-def _changed(connection: Connection, which: Any, **values: Any) -> JobRecord | None:
-    """Change a job that is in some condition, and how it is then; None: it is not."""
-    changed = update(JOBS).where(which).values(revision=JOBS.c.revision + STEP, **values).returning(*JOBS.c)
-    row = connection.execute(changed).one_or_none()
+def _locked(connection: Connection, job_id: str) -> JobRecord | None:
+    """A job that nobody else changes before the end of the transaction."""
+    row = connection.execute(_LOCK, {"job": job_id}).one_or_none()
     return None if row is None else record_of(row)
+
+
+def _changed(connection: Connection, job_id: str, **values: Any) -> JobRecord:
+    """Change a job that is locked, and how it is then."""
+    new = {f"new_{name}": value for name, value in values.items()}
+    return record_of(connection.execute(_change_of(tuple(values)), {"job": job_id, **new}).one())
 
 
 def _end_from_store(connection: Connection, record: JobRecord, result: Result | None, now_us: int) -> JobRecord | None:
     """End a job with the result of an earlier task; None: there is none."""
-    # Locked against being swept, where rows are: until the job refers to it.
-    there = select(RESULTS.c.key).where(RESULTS.c.key == record.key).with_for_update(read=True, key_share=True)
-    if connection.scalar(there) is None:
+    if connection.scalar(_LOCK_RESULT, {"of": record.key}) is None:
         if result is None:
             return None
         insert_result(connection, record.key, record.kind, result, now_us)
@@ -356,18 +338,9 @@ def _fail(connection: Connection, record: JobRecord, failure: Failure, now_us: i
 
 
 def _end(connection: Connection, record: JobRecord, state: JobState, now_us: int, **values: Any) -> JobRecord:
-    connection.execute(delete(REQUESTS).where(REQUESTS.c.job == record.id))
-    ended = _changed(
-        connection,
-        JOBS.c.id == record.id,
-        state=state,
-        ended_us=now_us,
-        expires_us=now_us + record.retention_us,
-        replica=None,
-        **values,
-    )
-    assert ended is not None  # noqa: S101  # its row is locked
-    return ended
+    connection.execute(_DROP_REQUEST, {"of": record.id})
+    times: dict[str, Any] = {"ended_us": now_us, "expires_us": now_us + record.retention_us}
+    return _changed(connection, record.id, **values, **times, state=state, replica=None)
 
 
 def clean(text: str) -> str:

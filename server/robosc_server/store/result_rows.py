@@ -3,44 +3,52 @@
 from collections.abc import Collection
 from typing import Any
 
-from sqlalchemy import Connection, delete, func, insert, select, update
+from sqlalchemy import Connection, bindparam, delete, func, insert, select, update
 from sqlalchemy.dialects import postgresql, sqlite
 
 from robosc_server.store.records import blocks_of
 from robosc_server.store.schema import BLOCKS, JOBS, RESULTS
 from robosc_server.tasks.task import Result, TaskKind
 
+# Made once: making a statement costs more than what the database does with it.
+_INSERT = {
+    "postgresql": postgresql.insert(RESULTS).on_conflict_do_nothing(),
+    "sqlite": sqlite.insert(RESULTS).on_conflict_do_nothing(),
+}
+_INSERT_BLOCK = insert(BLOCKS)
+_KIND = select(RESULTS.c.kind).where(RESULTS.c.key == bindparam("of"))
+_BLOCK = select(BLOCKS.c.content).where(BLOCKS.c.key == bindparam("of"), BLOCKS.c.number == bindparam("at"))
+_ALL_BLOCKS = select(BLOCKS.c.content).where(BLOCKS.c.key == bindparam("of")).order_by(BLOCKS.c.number)
+
 
 def insert_result(connection: Connection, key: str, kind: TaskKind, result: Result, now_us: int) -> None:
     """Keep a result, unless there is one of that key."""
     size = sum(map(len, result.messages))
-    dialect = postgresql if connection.dialect.name == "postgresql" else sqlite
-    made: Any = dialect.insert(RESULTS).values(key=key, kind=kind, size=size, used_us=now_us)
-    if connection.execute(made.on_conflict_do_nothing()).rowcount:
+    new = {"key": key, "kind": kind, "size": size, "used_us": now_us}
+    if connection.execute(_INSERT[connection.dialect.name], new).rowcount:
         for number, block in enumerate(blocks_of(result.messages)):
-            connection.execute(insert(BLOCKS).values(key=key, number=number, content=block))
+            connection.execute(_INSERT_BLOCK, {"key": key, "number": number, "content": block})
 
 
 def count_blocks(connection: Connection, key: str) -> int | None:
     """How many blocks a result has; None: there is none."""
-    if connection.scalar(select(RESULTS.c.key).where(RESULTS.c.key == key)) is None:
+    if connection.scalar(_KIND, {"of": key}) is None:
         return None
     return connection.scalar(select(func.count()).select_from(BLOCKS).where(BLOCKS.c.key == key))
 
 
 def read_block(connection: Connection, key: str, number: int) -> bytes | None:
     """One block of a result; None: it is not there."""
-    content = connection.scalar(select(BLOCKS.c.content).where(BLOCKS.c.key == key, BLOCKS.c.number == number))
+    content = connection.scalar(_BLOCK, {"of": key, "at": number})
     return None if content is None else bytes(content)
 
 
 def read_blocks(connection: Connection, key: str) -> tuple[TaskKind, list[bytes]] | None:
     """What a result is of, and all its blocks; None: there is none."""
-    kind = connection.scalar(select(RESULTS.c.kind).where(RESULTS.c.key == key))
+    kind = connection.scalar(_KIND, {"of": key})
     if kind is None:
         return None
-    query = select(BLOCKS.c.content).where(BLOCKS.c.key == key).order_by(BLOCKS.c.number)
-    return TaskKind(kind), [bytes(content) for content in connection.scalars(query)]
+    return TaskKind(kind), [bytes(content) for content in connection.scalars(_ALL_BLOCKS, {"of": key})]
 
 
 def touch(connection: Connection, keys: Collection[str], now_us: int) -> None:

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from robosc_server.settings import Settings
 
 from robosc.language import load_bundle
 from robosc.model.structure import Deployment

@@ -1,5 +1,6 @@
 """Dockerfiles, the file of compose and the locks of the images, looked at by linters and by rules of our own."""
 
+import importlib
 import re
 import subprocess
 import sys
@@ -79,7 +80,9 @@ def test_only_what_an_image_needs_is_sent_to_its_build() -> None:
 
 
 def test_the_wheel_has_all_that_the_images_copy_for_it() -> None:
-    packages = tomllib.loads((TOP / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]
+    packages = tomllib.loads((TOP / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]["wheel"][
+        "packages"
+    ]
     for file in DOCKERFILES:
         copied = [item.text.split()[0] for item in parse_dockerfile(file.read_text())[0].all("COPY")]
         assert all(any(package == one or package.startswith(f"{one}/") for one in copied) for package in packages)
@@ -88,7 +91,7 @@ def test_the_wheel_has_all_that_the_images_copy_for_it() -> None:
 def test_the_locks_of_the_images_are_lines_of_the_lock(tmp_path: Path) -> None:
     sys.path.insert(0, str(TOP / "deploy"))
     try:
-        import lock_images
+        lock_images = importlib.import_module("lock_images")
     finally:
         sys.path.pop(0)
     entries = lock_images.locked((TOP / "requirements.lock").read_text())

@@ -1,7 +1,7 @@
 """Containers without an engine: a Dockerfile is built and its program run in namespaces of the kernel, by util-linux.
 
-The base image is this machine's own /usr with its Python at /usr/local; everything else is what the Dockerfile says: its
-RUN instructions, its user, its paths. The root is read-only, the network is its own, no capability is left, and the
+The base image is this machine's own /usr with its Python at /usr/local; everything else is what the Dockerfile says:
+its RUN instructions, its user, its paths. The root is read-only, the network is its own, no capability is left, and the
 program is process 1, as in an engine. Packages come from a folder of wheels that `make images` has filled.
 """
 
@@ -105,7 +105,7 @@ def _carry_out(stage: Stage, root: Path, roots: Mapping[str, Path], wheels: Path
                 _inside(root, place).mkdir(parents=True, exist_ok=True)
             case "COPY":
                 *sources, target = shlex.split(item.text)
-                goal = _inside(root, os.path.join(place, target))
+                goal = _inside(root, str(Path(place, target)))
                 if "from" in item.flags:
                     (source,) = sources
                     shutil.copytree(

@@ -4,6 +4,7 @@ import io
 import signal
 import subprocess
 import sys
+import threading
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -313,9 +314,9 @@ class TestExitCodes:
         assert "at most 1000" in error
 
     def test_fault(self, tmp_path: Path, capfd: pytest.CaptureFixture[str], fake: Any) -> None:
-        status, error = self.run(capfd, "check", write(tmp_path, "fault"), "--server", fake)
+        status, error = self.run(capfd, "check", write(tmp_path, "raise"), "--server", fake)
         assert status == 3
-        assert "internal error" in error.splitlines()[-1]
+        assert "failed (internal)" in error.splitlines()[-1]
 
     @pytest.mark.parametrize("arguments", [["--engine", "abacus"], ["--target", "toaster"]])
     def test_unknown_names(
@@ -449,16 +450,25 @@ class TestPrograms:
         assert "Traceback" not in outcome.stderr
 
     @pytest.mark.parametrize("command", [["check"], ["synth"], ["generate", "--target", "ros2", "-o", "out"]])
-    def test_interrupted_client(self, tmp_path: Path, fake: Any, command: Any) -> None:
-        note = tmp_path / "pid"
-        model = write(tmp_path, f"stuck, see {note}")
-        command = [sys.executable, "-m", "robosc_client.main", command[0], str(model), *command[1:], "--server", fake]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-            assert eventually(lambda: note.exists() and note.read_text().endswith("\n"))
-            process.send_signal(signal.SIGINT)
-            output, error = process.communicate(timeout=PATIENCE_S)
-        assert (process.returncode, output, error) == (130, "", "robosc-client: interrupted\n")
-        assert eventually(lambda: not is_running(int(note.read_text())))
+    def test_interrupted_client(self, tmp_path: Path, command: Any) -> None:
+        begun, ended = threading.Event(), threading.Event()
+
+        def stuck(context: Any) -> None:
+            context.add_callback(ended.set)
+            begun.set()
+            ended.wait(PATIENCE_S)
+
+        model = write(tmp_path, "robot R { }")
+        with scripted(Check=[[stuck]], Synthesize=[[stuck]], Generate=[[stuck]]) as (address, _):
+            words = ["-m", "robosc_client.command", command[0], str(model), *command[1:], "--server", address]
+            with subprocess.Popen(
+                [sys.executable, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            ) as process:
+                assert begun.wait(PATIENCE_S)
+                process.send_signal(signal.SIGINT)
+                output, error = process.communicate(timeout=PATIENCE_S)
+            assert (process.returncode, output, error) == (130, "", "robosc-client: interrupted\n")
+            assert ended.wait(PATIENCE_S)
 
     @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
     def test_server_stops_gracefully(self, number: Any, capfd: pytest.CaptureFixture[str]) -> None:

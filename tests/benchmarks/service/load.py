@@ -31,7 +31,7 @@ WATCHERS = 1_000
 
 _SECONDS = 3.0
 _CONNECTIONS = 20
-_WARM_UP = 200
+_WARM_UP = 20
 _SERVICE = "/robosc_api.v1.SynthesisService/"
 _IDLE_S = 5.0
 

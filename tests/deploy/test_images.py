@@ -1,8 +1,8 @@
 """Dockerfiles, the file of compose and the locks of the images, looked at by linters and by rules of our own."""
 
 import re
+import runpy
 import subprocess
-import sys
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -79,21 +79,19 @@ def test_only_what_an_image_needs_is_sent_to_its_build() -> None:
 
 
 def test_the_wheel_has_all_that_the_images_copy_for_it() -> None:
-    packages = tomllib.loads((TOP / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]
+    packages = tomllib.loads((TOP / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]["wheel"][
+        "packages"
+    ]
     for file in DOCKERFILES:
         copied = [item.text.split()[0] for item in parse_dockerfile(file.read_text())[0].all("COPY")]
         assert all(any(package == one or package.startswith(f"{one}/") for one in copied) for package in packages)
 
 
-def test_the_locks_of_the_images_are_lines_of_the_lock(tmp_path: Path) -> None:
-    sys.path.insert(0, str(TOP / "deploy"))
-    try:
-        import lock_images
-    finally:
-        sys.path.pop(0)
-    entries = lock_images.locked((TOP / "requirements.lock").read_text())
-    for name, needed in lock_images.wanted().items():
-        lock = lock_images.locked((TOP / "deploy" / f"requirements-{name}.txt").read_text())
+def test_the_locks_of_the_images_are_lines_of_the_lock() -> None:
+    program = runpy.run_path(str(TOP / "deploy" / "lock_images.py"))
+    entries = program["locked"]((TOP / "requirements.lock").read_text())
+    for name, needed in program["wanted"]().items():
+        lock = program["locked"]((TOP / "deploy" / f"requirements-{name}.txt").read_text())
         assert lock == {package: entries[package] for package in needed}, f"{name}: python deploy/lock_images.py"
 
 

@@ -164,9 +164,7 @@ def test_the_unit_checks_answers_and_ends(image: Image, network: Network, secret
 
 
 @pytest.mark.skipif(not has_kustomize(), reason="there is no kubectl, which knows Kustomize")
-def test_the_pod_answers_its_probes_and_ends(
-    image: Image, network: Network, secrets: Secrets, tmp_path: Path
-) -> None:
+def test_the_pod_answers_its_probes_and_ends(image: Image, network: Network, secrets: Secrets, tmp_path: Path) -> None:
     pod = named("overlays/single", "Deployment", "robosc-server")["spec"]["template"]["spec"]
     security, specification = pod["securityContext"], container_of("overlays/single", "robosc-server")
     (config,) = of_kind("overlays/single", "ConfigMap")

@@ -17,13 +17,14 @@ PROTO = Path(__file__).parents[2] / "proto"
 RELEASED = PROTO / "released" / "robosc_api_v1.binpb"
 OURS = "robosc_api/"
 
-_WELL_KNOWN = Path(grpc_tools.__file__).with_name("_proto")
+WELL_KNOWN = Path(grpc_tools.__file__).with_name("_proto")
+"""Files of protobuf itself."""
 
 
 def compiled(folder: Path, target: Path) -> FileDescriptorSet:
     """The descriptors of all .proto files below a folder, with their comments; also written to `target`."""
     names = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*.proto"))
-    options = [f"-I{folder}", f"-I{_WELL_KNOWN}", "--include_imports", "--include_source_info"]
+    options = [f"-I{folder}", f"-I{WELL_KNOWN}", "--include_imports", "--include_source_info"]
     status = protoc.main(["protoc", *options, f"--descriptor_set_out={target}", *names])
     assert status == 0, "protoc has told why on standard error"
     return FileDescriptorSet.FromString(target.read_bytes())

@@ -23,7 +23,16 @@ def node_tool(name: str) -> Path:
 
 def buf() -> Path:
     """The checker of interfaces, for this kind of machine; the test is skipped where it is not installed."""
-    found = sorted(PACKAGES.glob("@bufbuild/buf-*/bin/buf"))
+    return _native("@bufbuild/buf-*/bin/buf")
+
+
+def tsc() -> Path:
+    """The compiler of TypeScript, for this kind of machine; the test is skipped where it is not installed."""
+    return _native("@typescript/typescript-*/lib/tsc")
+
+
+def _native(pattern: str) -> Path:
+    found = sorted(PACKAGES.glob(pattern))
     if not found:
         pytest.skip(_MISSING)
     return found[0]

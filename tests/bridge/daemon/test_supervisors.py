@@ -24,9 +24,8 @@ from robosc_bridge.daemon.supervisors import (
     obtain,
     trusted_keys,
 )
-from robosc_server.settings import Settings
 from support.certificates import Authority
-from support.service import served
+from support.service import secured, served
 
 GATE = """robot Carrier {
     component Gate {
@@ -452,7 +451,7 @@ def test_a_server_with_tls_and_tokens_is_asked_as_the_configuration_says(tmp_pat
     """
     credentials = credentials_of(parse(text.encode(), "test.yaml").configuration.supervisor)
     model = written(tmp_path)
-    with served(Settings(port=0, workers=1, security=security)) as address:
+    with served(**secured(security)) as address:
         assert obtain(Source(model, CONTROLLER, address, credentials=credentials)) == supervisor_of(model)
         without = Source(model, CONTROLLER, address, credentials=replace(credentials, token_file=None))
         assert "a valid token is needed" in refusal(without)

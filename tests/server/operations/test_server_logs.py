@@ -10,7 +10,7 @@ import structlog
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robosc_server.failures import refused
+from robosc_server.failures import for_callers
 from robosc_server.operations.logs import tell_fault
 from robosc_server.operations.request_ids import REQUEST_ID
 from robosc_server.operations.settings import LogFormat, LogLevel
@@ -100,8 +100,8 @@ def test_what_the_system_says_is_told() -> None:
 
 def test_how_a_worker_died_is_logged_and_an_exception_in_it_is_not() -> None:
     with logged(LogLevel.INFO) as log:
-        died = refused(Failure(Reason.WORKER_DIED, "it died", "ended by signal 11"))
-        fault = refused(Failure(Reason.INTERNAL_FAULT, "a fault", f"Traceback\nKeyError: {MARKER}"))
+        died = for_callers(Failure(Reason.WORKER_DIED, "it died", "ended by signal 11"))
+        fault = for_callers(Failure(Reason.INTERNAL_FAULT, "a fault", f"Traceback\nKeyError: {MARKER}"))
     assert "ended by signal 11" in log.text
     assert MARKER not in log.text
     assert [line["reason"] for line in log.lines("fault")] == ["WORKER_DIED", "INTERNAL_FAULT"]

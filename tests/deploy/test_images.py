@@ -1,9 +1,8 @@
 """Dockerfiles, the file of compose and the locks of the images, looked at by linters and by rules of our own."""
 
-import importlib
 import re
+import runpy
 import subprocess
-import sys
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -88,15 +87,11 @@ def test_the_wheel_has_all_that_the_images_copy_for_it() -> None:
         assert all(any(package == one or package.startswith(f"{one}/") for one in copied) for package in packages)
 
 
-def test_the_locks_of_the_images_are_lines_of_the_lock(tmp_path: Path) -> None:
-    sys.path.insert(0, str(TOP / "deploy"))
-    try:
-        lock_images = importlib.import_module("lock_images")
-    finally:
-        sys.path.pop(0)
-    entries = lock_images.locked((TOP / "requirements.lock").read_text())
-    for name, needed in lock_images.wanted().items():
-        lock = lock_images.locked((TOP / "deploy" / f"requirements-{name}.txt").read_text())
+def test_the_locks_of_the_images_are_lines_of_the_lock() -> None:
+    program = runpy.run_path(str(TOP / "deploy" / "lock_images.py"))
+    entries = program["locked"]((TOP / "requirements.lock").read_text())
+    for name, needed in program["wanted"]().items():
+        lock = program["locked"]((TOP / "deploy" / f"requirements-{name}.txt").read_text())
         assert lock == {package: entries[package] for package in needed}, f"{name}: python deploy/lock_images.py"
 
 

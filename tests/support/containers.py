@@ -1,7 +1,7 @@
 """Containers without an engine: a Dockerfile is built and its program run in namespaces of the kernel, by util-linux.
 
-The base image is this machine's own /usr with its Python at /usr/local; everything else is what the Dockerfile says:
-its RUN instructions, its user, its paths. The root is read-only, the network is its own, no capability is left, and the
+The base image is this machine's own /usr with its Python at /usr/local; all else is what the Dockerfile says: its RUN
+instructions, its user, its paths. The root is read-only, the network is its own, no capability is left, and the
 program is process 1, as in an engine. Packages come from a folder of wheels that `make images` has filled.
 """
 
@@ -10,7 +10,6 @@ import fcntl
 import hashlib
 import json
 import os
-import re
 import shlex
 import shutil
 import signal
@@ -28,7 +27,7 @@ from support.dockerfiles import Ignored, Stage, context_files, parse_dockerfile
 TOP = Path(__file__).parents[2]
 IMAGES = TOP / "deploy" / "images"
 CACHE = TOP / "out" / "images"
-PATIENCE_S = 30.0
+PATIENCE_S = 120.0
 
 _BASE_PATH = "/usr/local/bin:/usr/local/sbin:/usr/sbin:/usr/bin:/sbin:/bin"
 _TOOLS = ("unshare", "nsenter", "mount", "setpriv", "ip", "ldconfig")
@@ -105,7 +104,7 @@ def _carry_out(stage: Stage, root: Path, roots: Mapping[str, Path], wheels: Path
                 _inside(root, place).mkdir(parents=True, exist_ok=True)
             case "COPY":
                 *sources, target = shlex.split(item.text)
-                goal = _inside(root, str(Path(place, target)))
+                goal = _inside(root, str(Path(place) / target))
                 if "from" in item.flags:
                     (source,) = sources
                     shutil.copytree(
@@ -271,8 +270,9 @@ class Container:
             os.chown(folder, user, group)
             _inside(image.root, place).mkdir(parents=True, exist_ok=True)
         (image.root / "etc/hosts").write_text(" ".join(["127.0.0.1", "localhost", *start.hosts]) + "\n")
-        program = shutil.which(start.command[0], path=_host_path(image.root, self._environment["PATH"]))
-        assert program is not None, f"there is no {start.command[0]} in the image"
+        places = [""] if start.command[0].startswith("/") else self._environment["PATH"].split(":")
+        programs = [_inside(image.root, str(Path(place, start.command[0]))) for place in places]
+        assert any(program.exists() for program in programs), f"there is no {start.command[0]} in the image"
         plan = _plan(image.root, [*self._rights, *start.command], self._environment, start.folder)
         plan["binds"] = [(str(file), place) for place, file in start.files.items()]
         plan["volumes"] = [(str(folder), place) for place, folder in start.volumes.items()]
@@ -327,22 +327,9 @@ class Container:
         self._outer.wait()
 
 
-def _host_path(root: Path, path: str) -> str:
-    """Where programs of the image lie on this machine."""
-    places = [str(root / place.lstrip("/")) for place in path.split(":")]
-    return ":".join([*places, "/usr/bin", "/usr/sbin"])
-
-
 def wheels_of(name: str) -> Path:
     """Where the packages of an image lie, once `make images` has fetched them."""
     return TOP / "out" / "wheels" / name
-
-
-def seconds(text: str) -> float:
-    """A duration as Docker writes it."""
-    match = re.fullmatch(r"(\d+)(s|m)", text)
-    assert match, text
-    return int(match[1]) * {"s": 1, "m": 60}[match[2]]
 
 
 def main() -> int:

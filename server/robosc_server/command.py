@@ -1,0 +1,19 @@
+"""The installed command `robosc-server`: what is asked again and again, beside a server, loads no server."""
+
+import sys
+from typing import NoReturn
+
+
+def entry() -> NoReturn:
+    """Run the command and leave with its exit status."""
+    if sys.argv[1:2] == ["health"]:
+        from robosc_server import health_check
+
+        sys.exit(health_check.main(sys.argv[2:]))
+    from robosc_server.main import main
+
+    sys.exit(main())
+
+
+if __name__ == "__main__":
+    entry()

@@ -1,0 +1,117 @@
+"""Asking a service for its health by its own configuration: with and without TLS, well and not well."""
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+
+import grpc
+import pytest
+from grpc_health.v1 import health, health_pb2, health_pb2_grpc
+
+from robosc_api.health import ask_health, local_address
+from robosc_api.security import SecurityError, ServerSecurity, add_port
+from robosc_bridge.health_check import main as bridge_health
+from robosc_server.health_check import main as server_health
+from support.certificates import Authority
+
+Status = health_pb2.HealthCheckResponse
+IN_THE_CLEAR = ServerSecurity()
+
+
+@contextmanager
+def answering(status: int, security: ServerSecurity = IN_THE_CLEAR) -> Iterator[str]:
+    """A service that is as it is said to be; yields its address."""
+    servicer = health.HealthServicer()
+    servicer.set("", status)
+    with ThreadPoolExecutor(2) as threads:
+        server = grpc.server(threads)
+        health_pb2_grpc.add_HealthServicer_to_server(servicer, server)
+        address = add_port(server, "127.0.0.1:0", security)
+        server.start()
+        try:
+            yield address
+        finally:
+            server.stop(None).wait()
+
+
+@pytest.fixture
+def secure(tmp_path: Path) -> ServerSecurity:
+    certificate, key = Authority(tmp_path).sign("server")
+    return ServerSecurity(certificate=certificate, key=key)
+
+
+@pytest.mark.parametrize(
+    ("listening", "asked"),
+    [("0.0.0.0:1", "127.0.0.1:1"), ("[::]:2", "[::1]:2"), ("10.0.0.1:3", "10.0.0.1:3"), ("robot:4", "robot:4")],
+)
+def test_what_listens_everywhere_is_asked_here(listening: str, asked: str) -> None:
+    assert local_address(listening) == asked
+
+
+def test_answers_are_told_apart() -> None:
+    with answering(Status.SERVING) as address:
+        well = ask_health(address, timeout_s=10)
+        other = ask_health(address, "robosc_api.v1.None", timeout_s=10)
+    assert (well.is_there, well.is_serving, well.words) == (True, True, "SERVING")
+    assert (other.is_there, other.is_serving) == (True, False)
+    with answering(Status.NOT_SERVING) as address:
+        ill = ask_health(address, timeout_s=10)
+    assert (ill.is_there, ill.is_serving, ill.words) == (True, False, "NOT_SERVING")
+    nobody = ask_health(address, timeout_s=10)
+    assert (nobody.is_there, nobody.is_serving) == (False, False) and nobody.words.startswith("UNAVAILABLE")
+
+
+def test_the_programs_own_certificate_is_believed_and_no_other(secure: ServerSecurity, tmp_path: Path) -> None:
+    other, _ = Authority(tmp_path, "other").sign("other")
+    with answering(Status.SERVING, secure) as address:
+        assert ask_health(address, timeout_s=10, certificate=secure.certificate).is_serving
+        assert not ask_health(address, timeout_s=10, certificate=other).is_there
+        assert not ask_health(address, timeout_s=10).is_there
+
+
+def test_whoever_wants_a_certificate_is_shown_its_own(tmp_path: Path) -> None:
+    authority = Authority(tmp_path)
+    certificate, key = authority.sign("server")
+    security = ServerSecurity(certificate=certificate, key=key, client_ca=authority.file)
+    with answering(Status.SERVING, security) as address:
+        assert ask_health(address, timeout_s=10, certificate=certificate, shown=(certificate, key)).is_serving
+        assert not ask_health(address, timeout_s=10, certificate=certificate).is_there
+
+
+def test_a_file_that_is_no_certificate_is_one_clear_error(tmp_path: Path) -> None:
+    file = tmp_path / "server.pem"
+    file.write_text("no certificate\n")
+    with pytest.raises(SecurityError, match=r"server\.pem"):
+        ask_health("127.0.0.1:1", timeout_s=1, certificate=file)
+
+
+@pytest.mark.parametrize(("status", "code", "alive"), [(Status.SERVING, 0, 0), (Status.NOT_SERVING, 1, 0)])
+def test_the_commands_say_it_by_their_status(
+    status: int, code: int, alive: int, secure: ServerSecurity, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with answering(status, secure) as address:
+        port = address.rpartition(":")[2]
+        server = tmp_path / "server.toml"
+        server.write_text(f'port = {port}\ntls_certificate = "{secure.certificate}"\ntls_key = "{secure.key}"\n')
+        assert server_health(["--config", str(server)]) == code
+        assert server_health(["--config", str(server), "--alive"]) == alive
+        bridge = tmp_path / "robot.yaml"
+        bridge.write_text(
+            "robot: burger\ndrive: {driver: opencr, port: /dev/none}\nchannels: {}\n"
+            f"remote: {{grpc_address: '127.0.0.1:{port}', tls_certificate: {secure.certificate}, "
+            f"tls_key: {secure.key}}}\n"
+        )
+        assert bridge_health(["health", "--config", str(bridge)]) == code
+        assert bridge_health(["health", "--config", str(bridge), "--alive"]) == alive
+    assert server_health(["--config", str(server), "--alive"]) == 1
+    capsys.readouterr()
+
+
+def test_wrong_use_is_one_clear_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "robot.yaml"
+    file.write_text("robot: burger\ndrive: {driver: opencr, port: /dev/none}\nchannels: {}\n")
+    assert bridge_health(["health", "--config", str(file)]) == 2
+    assert "remote.grpc_address is not set" in capsys.readouterr().err
+    assert server_health(["--port", "many"]) == 2
+    assert capsys.readouterr().err == "robosc-server: --port: a whole number is needed\n"

@@ -56,6 +56,8 @@ _BY_FILE = (
     "tests/robosc/targets/cpp/",
     "tests/server/jobs/test_job_faults.py",
     "tests/server/jobs/test_job_replicas.py",
+    "tests/server/test_reflection_client.py",
+    "tests/server/test_typescript_client.py",
     "tests/server/workers/",
 )
 

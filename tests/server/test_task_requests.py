@@ -237,7 +237,7 @@ class TestHostileBytes:
         library = pb.CheckRequest(bundle=pb.Bundle(libraries=[pb.SourceFile(name="a")])).SerializeToString()
         assert "two files" in refusal(TaskKind.CHECK, first + library + library).message
 
-    @settings(max_examples=300, deadline=None)
+    @settings(max_examples=150, deadline=None)
     @given(st.sampled_from(list(TaskKind)), st.binary(max_size=200), st.integers(0, 2**32))
     def test_any_bytes_are_accepted_or_refused(self, kind: TaskKind, noise: bytes, seed: int) -> None:
         broken = bytearray(small_request(kind, "robot R {}").SerializeToString())
@@ -383,7 +383,7 @@ def pairs(draw: Any) -> tuple[Any, Any]:
 
 
 class TestKeys:
-    @settings(max_examples=600, deadline=None)
+    @settings(max_examples=150, deadline=None)
     @given(st.sampled_from(list(TaskKind)), pairs(), st.integers(0, 1000))
     def test_equal_exactly_where_requests_mean_the_same(
         self, kind: TaskKind, both: tuple[dict[str, Any], dict[str, Any]], seed: int
@@ -396,6 +396,65 @@ class TestKeys:
                 assert "neither" in error.message
                 return
         assert (keys[0] == keys[1]) == (meaning_of(kind, both[0]) == meaning_of(kind, both[1]))
+
+    def test_one_change_is_enough_for_another_key(self) -> None:
+        library = pb.Bundle(libraries=[pb.SourceFile(name="a", text="x")])
+        bundles = [
+            pb.Bundle(),
+            pb.Bundle(main=pb.SourceFile(text="y")),
+            pb.Bundle(main=pb.SourceFile(name="other.rscd")),
+            pb.Bundle(searched=["x"]),
+            pb.Bundle(searched=["y"]),
+            pb.Bundle(searched=["x", "y"]),
+            pb.Bundle(searched=["y", "x"]),
+            pb.Bundle(interfaces=library.libraries),
+            library,
+            pb.Bundle(libraries=[pb.SourceFile(name="a", text="y")]),
+            pb.Bundle(libraries=[pb.SourceFile(name="b", text="x")]),
+        ]
+        options = [
+            pb.SynthesisOptions(deployment=pb.DEPLOYMENT_LAYER),
+            pb.SynthesisOptions(engine="autoref"),
+            pb.SynthesisOptions(allow_livelock=True),
+            pb.SynthesisOptions(allow_reordering=True),
+            pb.SynthesisOptions(maximum_nodes=5),
+        ]
+        claims: list[dict[str, Any]] = [
+            {"supervisor": b"x"},
+            {"supervisor": b"y"},
+            {"supervisor": b"x", "options": pb.SynthesisOptions(deployment=pb.DEPLOYMENT_CONTROLLER)},
+            {"supervisor": b"x", "strict": True},
+            {"supervisor": b"x", "maximum_states": 5},
+            {"properties": ["x"]},
+            {"properties": ["y"]},
+            {"property_files": [pb.SourceFile(name="a", text="x")]},
+            {"property_files": [pb.SourceFile(name="a", text="y")]},
+            {"property_files": [pb.SourceFile(name="b", text="x")]},
+        ]
+        heard: list[dict[str, Any]] = [{"options": item} for item in options if not item.allow_livelock]
+        changes: dict[TaskKind, list[dict[str, Any]]] = {
+            TaskKind.CHECK: [],
+            TaskKind.SYNTHESIZE: [{"options": item} for item in options],
+            TaskKind.GENERATE: [
+                *({"options": item} for item in options),
+                {"target": "c99"},
+                {"generation": pb.GenerateOptions(package="x")},
+                {"generation": pb.GenerateOptions(publish_state=True)},
+                {"generation": pb.GenerateOptions(log_events=True)},
+                {"generation": pb.GenerateOptions(supervised=pb.SupervisedController())},
+                {"generation": pb.GenerateOptions(supervised=pb.SupervisedController(executable="x"))},
+                {"generation": pb.GenerateOptions(supervised=pb.SupervisedController(launch_file="x"))},
+            ],
+            TaskKind.EXPLORE: [{"maximum_states": 5}, *heard],
+            TaskKind.VERIFY: [*claims, *heard],
+        }
+        for kind, fields in changes.items():
+            keys = []
+            for change in [*({"bundle": bundle} for bundle in bundles), *fields]:
+                request = small_request(kind)
+                request.MergeFrom(MESSAGES[kind](**change))
+                keys.append(key_of(kind, request))
+            assert len(set(keys)) == len(bundles) + len(fields), kind
 
     def test_another_version_gives_another_key(self, monkeypatch: pytest.MonkeyPatch) -> None:
         request = small_request(TaskKind.CHECK)

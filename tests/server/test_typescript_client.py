@@ -51,7 +51,7 @@ def test_what_the_server_is(answers: Any) -> None:
 
 def test_findings_and_layout(answers: Any) -> None:
     assert answers["findings"] == [["syntax-error", 1, 10]]
-    assert answers["formatted"] == "robot R {\n}\n"
+    assert answers["formatted"] == "robot R { }\n"
 
 
 def test_the_supervisor_is_that_of_the_command_line(answers: Any, tmp_path: Path, told: Any) -> None:

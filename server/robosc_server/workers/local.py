@@ -64,25 +64,25 @@ class LocalWorkers:
         Raises:
             WorkersError: No process can be had.
         """
-        limit = asyncio.timeout(limits.seconds)
-        try:
-            async with limit:
-                for _ in range(_ATTEMPTS):
-                    with contextlib.suppress(TemplateLostError):
-                        return await self._run_once(task, limits, on_report)
-        except TimeoutError:
-            if not limit.expired():
-                raise
-            return Failure(Reason.TIME_LIMIT, OUT_OF_TIME)
+        for _ in range(_ATTEMPTS):
+            with contextlib.suppress(TemplateLostError):
+                return await self._run_once(task, limits, on_report)
         raise WorkersError("the process that starts workers ended twice under one task")
 
     async def _run_once(self, task: Task, limits: TaskLimits, on_report: OnReport) -> Outcome:
         worker = await self._supply.take()
+        limit = asyncio.timeout(limits.seconds)
+        is_answered = False
         try:
-            outcome = await worker.run(task, limits, on_report)
-        except BaseException:
+            async with limit:
+                outcome = await worker.run(task, limits, on_report)
+            is_answered = True
+            return outcome
+        except TimeoutError:
+            if not limit.expired():
+                raise
+            return Failure(Reason.TIME_LIMIT, OUT_OF_TIME)
+        finally:
             burial = self._supply.bury(worker)
-            await asyncio.wait([burial], timeout=_GONE_S)
-            raise
-        self._supply.bury(worker)
-        return outcome
+            if not is_answered:  # Whoever gives a task up can count on its end.
+                await asyncio.wait([burial], timeout=_GONE_S)

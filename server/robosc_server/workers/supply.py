@@ -20,9 +20,8 @@ from robosc_server.workers.template import PACKET_BYTES
 _LOG = logging.getLogger(__name__)
 
 START_S = 60.0
-"""How long a template may take until its first worker stands ready."""
+"""How long a template may take until its first worker stands ready, also on a machine with too much to do."""
 
-_WAIT_S = 10.0
 _PAUSES_S = (0.0, 0.0, 0.2, 1.0, 5.0)
 _HOPELESS = 3
 _DEAD_SPARE_PAUSE_S = 0.2
@@ -86,7 +85,7 @@ class Supply:
         Raises:
             WorkersError: None can be had.
         """
-        end = time.monotonic() + _WAIT_S
+        end = time.monotonic() + START_S
         while (worker := self._living()) is None:
             if self._is_closed:
                 raise WorkersError("the server's workers have ended")
@@ -96,7 +95,7 @@ class Supply:
                 async with asyncio.timeout(end - time.monotonic()):
                     await self._change()
             except TimeoutError:
-                raise WorkersError(self.fault or f"no worker process stood ready within {_WAIT_S:.0f} s") from None
+                raise WorkersError(self.fault or f"no worker process stood ready within {START_S:.0f} s") from None
         self._ask_for(1)
         return worker
 

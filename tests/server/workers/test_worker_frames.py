@@ -27,12 +27,14 @@ def read(content: bytes, limits: TaskLimits = LIMITS) -> tuple[list[Report], Out
     """What a whole answer says, and None where it ends too early."""
     reader = AnswerReader(limits)
     reports: list[Report] = []
-    while len(content) >= HEADER.size:
-        announced = reader.announced(content[: HEADER.size])
+    place = 0
+    while len(content) >= place + HEADER.size:
+        announced = reader.announced(content[place : place + HEADER.size])
         if isinstance(announced, Failure):
             return reports, announced
         tag, length = announced
-        payload, content = content[HEADER.size :][:length], content[HEADER.size + length :]
+        begin, place = place + HEADER.size, place + HEADER.size + length
+        payload = content[begin:place]
         if len(payload) < length:
             break
         told = reader.read(tag, payload)

@@ -54,6 +54,8 @@ _BY_FILE = (
     "tests/bridge/view/test_page_",
     "tests/end_to_end/",
     "tests/robosc/targets/cpp/",
+    "tests/server/jobs/test_job_faults.py",
+    "tests/server/jobs/test_job_replicas.py",
     "tests/server/test_reflection_client.py",
     "tests/server/test_typescript_client.py",
     "tests/server/workers/",

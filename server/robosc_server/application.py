@@ -29,7 +29,7 @@ from robosc_server.jobs import (
 from robosc_server.operations.drain import drain
 from robosc_server.operations.health import Health
 from robosc_server.operations.interceptor import CallInterceptor
-from robosc_server.operations.metrics import Metrics, MetricsEndpoint
+from robosc_server.operations.metrics import Metrics, MetricsEndpoint, check_metrics_address
 from robosc_server.operations.observed import ObservedWorkers
 from robosc_server.operations.quotas import Quotas
 from robosc_server.operations.settings import Settings
@@ -89,6 +89,10 @@ async def running_server(settings: Settings, workers: Workers | None = None) -> 
 
 async def _start(settings: Settings, given_workers: Workers | None, stack: AsyncExitStack) -> str:
     """Put the parts together; the stack takes them apart, the last one first."""
+    # What is wrong with the settings is told before anything is started.
+    if settings.metrics_address:
+        check_metrics_address(settings.metrics_address, beyond_loopback=settings.metrics_beyond_loopback)
+    finish = _finish(settings)
     tokens = None if settings.tokens is None else TokenFile(settings.tokens)
     request_limits = RequestLimits(
         bundle_bytes=settings.bundle_bytes, bundle_files=settings.bundle_files, nodes=settings.task_nodes
@@ -96,6 +100,20 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
     metrics = Metrics(__version__)
     tracing = open_tracing(settings.tracing_endpoint, __version__)
     stack.push_async_callback(asyncio.to_thread, tracing.close)
+    calls = CallInterceptor(metrics, tracing)
+    services = {SERVICE_NAME: METHODS, JOB_SERVICE_NAME: JOB_METHODS}
+    guard = Guard(
+        {f"/{service}/{name}": _RULE for service, names in services.items() for name in names},
+        tokens,
+        has_client_certificates=settings.client_ca is not None,
+    )
+    server = grpc.aio.server(
+        interceptors=[calls, guard, MalformedRequests(JOB_SERVICE_NAME)],
+        options=[*_OPTIONS, ("grpc.max_receive_message_length", request_limits.request_bytes)],
+        maximum_concurrent_rpcs=_MAXIMUM_CALLS,
+    )
+    address = add_port(server, settings.address, settings.security)
+    stack.push_async_callback(server.stop, None)
     store = await asyncio.to_thread(open_store, settings.state_dir, settings.database_url)
     stack.push_async_callback(asyncio.to_thread, store.close)
     workers: Any = given_workers or open_workers(settings.workers, settings.worker_processes)
@@ -105,7 +123,7 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
     scheduler = Scheduler(
         observed, QueueLimits(settings.waiting_tasks, settings.waiting_tasks_per_caller), accounts=quotas
     )
-    results = await stack.enter_async_context(Results(store, settings.memory_cache_bytes, _finish(settings)))
+    results = await stack.enter_async_context(Results(store, settings.memory_cache_bytes, finish))
     manager = await stack.enter_async_context(
         JobManager(
             store,
@@ -114,6 +132,7 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
             results,
             settings.task_limits,
             JobLimits(retention_s=settings.retention_seconds, results_bytes=settings.results_bytes),
+            tracing=tracing,
         )
     )
     outgoing = Outgoing(2 * settings.result_bytes, _UNREAD_RESULTS * settings.result_bytes)
@@ -128,18 +147,6 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         send=outgoing.send_one,
     )
 
-    calls = CallInterceptor(metrics, tracing)
-    services = {SERVICE_NAME: METHODS, JOB_SERVICE_NAME: JOB_METHODS}
-    guard = Guard(
-        {f"/{service}/{name}": _RULE for service, names in services.items() for name in names},
-        tokens,
-        has_client_certificates=settings.client_ca is not None,
-    )
-    server = grpc.aio.server(
-        interceptors=[calls, guard, MalformedRequests(JOB_SERVICE_NAME)],
-        options=[*_OPTIONS, ("grpc.max_receive_message_length", request_limits.request_bytes)],
-        maximum_concurrent_rpcs=_MAXIMUM_CALLS,
-    )
     server.add_generic_rpc_handlers((synthesis.handler(),))
     add_job_service(jobs, server)
     health = Health({SERVICE_NAME: ("workers",), JOB_SERVICE_NAME: ("store", "workers")})
@@ -152,7 +159,6 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         conditions=health.conditions,
         restarts=lambda: getattr(workers, "restarts", 0),  # Those of a cluster are its own.
     )
-    address = add_port(server, settings.address, settings.security)
     await stack.enter_async_context(
         health.following(
             {

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 # gRPC's own log would tell once more, in its words, what we tell; it is read at its import.
 os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 
-from robosc_server.application import StartError, running_server
 from robosc_server.operations.commands import run_command
 from robosc_server.operations.logs import set_up_logs
 from robosc_server.operations.settings import Settings, load_settings
@@ -23,23 +22,30 @@ def main(argv: Sequence[str] | None = None) -> int:
         return status
     settings = load_settings(words)
     set_up_logs(settings.log_format, settings.log_level)
+    return _serve(settings)
+
+
+def _serve(settings: Settings) -> int:
+    """Serve until a signal; returns the exit status."""
+    # Other commands, such as the health check of a container, need nothing of it, and it takes a while to import.
+    from robosc_server.application import StartError, running_server
+
+    async def serve_until_signal() -> None:
+        stop = asyncio.Event()
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGTERM, signal.SIGINT):
+            loop.add_signal_handler(number, stop.set)
+        async with running_server(settings) as address:
+            sys.stdout.write(f"robosc-server listening on {address}\n")
+            sys.stdout.flush()
+            await stop.wait()
+
     try:
-        asyncio.run(_serve_until_signal(settings))
+        asyncio.run(serve_until_signal())
     except StartError as error:
         sys.stderr.write(f"robosc-server: {error}\n")
         return 1
     return 0
-
-
-async def _serve_until_signal(settings: Settings) -> None:
-    stop = asyncio.Event()
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        loop.add_signal_handler(number, stop.set)
-    async with running_server(settings) as address:
-        sys.stdout.write(f"robosc-server listening on {address}\n")
-        sys.stdout.flush()
-        await stop.wait()
 
 
 if __name__ == "__main__":

@@ -72,7 +72,9 @@ class SynthesisService:
 
     def handler(self) -> grpc.GenericRpcHandler:
         """What a server is given; messages are bytes on both sides."""
-        methods: dict[str, Any] = {name: grpc.unary_unary_rpc_method_handler(self._unary(kind)) for name, kind in _UNARY.items()}
+        methods: dict[str, Any] = {}
+        for name, kind in _UNARY.items():
+            methods[name] = grpc.unary_unary_rpc_method_handler(self._unary(kind))
         for name, kind in _STREAMS.items():
             methods[name] = grpc.unary_stream_rpc_method_handler(self._stream(kind))
         for name, (message, answer) in self._fixed.items():

@@ -2,8 +2,8 @@
 
 Usage: run.py [NAME...]      (all of them without an argument)
 
-Names: cold-start, conditions, execution, language, synthesis; of the bridge: decoders, drive-bases, live-view,
-live-view-pixels, loop-period, maze, reaction, endurance, twin.
+Names: cold-start, conditions, execution, language, synthesis; of the service: service-load, isolation; of the bridge:
+decoders, drive-bases, live-view, live-view-pixels, loop-period, maze, reaction, endurance, twin.
 """
 
 import sys
@@ -28,6 +28,7 @@ import conditions
 import execution
 import language
 import synthesis
+from service import isolation, load
 
 TABLES: dict[str, Callable[[], str]] = {
     "cold-start": cold_start.table,
@@ -36,12 +37,14 @@ TABLES: dict[str, Callable[[], str]] = {
     "drive-bases": drive_bases.table,
     "endurance": endurance.table,
     "execution": execution.table,
+    "isolation": isolation.table,
     "language": language.table,
     "live-view": live_view.table,
     "live-view-pixels": live_view_pixels.table,
     "loop-period": loop_period.table,
     "maze": maze.table,
     "reaction": reaction.table,
+    "service-load": load.table,
     "synthesis": synthesis.table,
     "twin": twin.table,
 }

@@ -6,6 +6,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 import grpc
@@ -16,13 +17,16 @@ from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.model.structure import Deployment
 from robosc.source import Bundle, Location, SourceFile
 from robosc.targets import GenerateOptions, SupervisedController
+from robosc_api.security import Credentials
 from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client import (
+    NO_RETRIES,
     AsyncClient,
     Check,
     Client,
     ClientError,
+    CredentialsError,
     DeadlineError,
     Explore,
     Format,
@@ -53,6 +57,7 @@ from support.answers import (
     watched,
 )
 from support.both_clients import KINDS, client_of
+from support.certificates import Authority
 from support.models import bundle_of
 from support.scripted_service import PATIENCE_S, Refusal, scripted
 
@@ -324,6 +329,60 @@ class TestErrors:
         ):
             found = list(threads.map(lambda _: client.synthesize(BUNDLE).status, range(8)))
         assert found == [SynthesisStatus.EMPTY] * 8
+
+
+class TestCredentials:
+    @pytest.mark.parametrize("method", ["Check", "Synthesize"])
+    def test_a_token_is_shown_with_every_call(self, connect: Any, tmp_path: Path, method: str) -> None:
+        shown: list[Any] = []
+
+        def note(context: grpc.ServicerContext) -> None:
+            shown.extend(value for key, value in context.invocation_metadata() if key == "authorization")
+
+        token = tmp_path / "token"
+        token.touch(0o600)
+        token.write_text("secret\n")
+        call, answer = TASKS[method]
+        with (
+            scripted(**{method: [[note, *answer]]}) as (address, _),
+            connect(address, credentials=Credentials(token_file=token)) as client,
+        ):
+            call(client)
+            call(client)
+        assert shown == ["Bearer secret"] * 2
+
+    def test_never_in_the_clear_to_another_machine(self, connect: Any, tmp_path: Path) -> None:
+        token = tmp_path / "token"
+        token.touch(0o600)
+        token.write_text("secret")
+        chosen = Credentials(token_file=token)
+        with pytest.raises(CredentialsError, match="TLS only"), connect("192.0.2.1:1", credentials=chosen):
+            pass
+        with (
+            pytest.raises(CredentialsError, match="No such file"),
+            connect(NOWHERE, credentials=Credentials(ca=tmp_path / "none")),
+        ):
+            pass
+
+    @pytest.mark.parametrize("kind", KINDS)
+    def test_tls(self, kind: str, tmp_path: Path) -> None:
+        authority = Authority(tmp_path)
+        certificate, key = authority.sign("server")
+        credentials = grpc.ssl_server_credentials([(key.read_bytes(), certificate.read_bytes())])
+        with ThreadPoolExecutor(1) as threads:
+            server = grpc.server(threads)
+            port = server.add_secure_port("127.0.0.1:0", credentials)
+            server.start()
+            address = f"127.0.0.1:{port}"
+            believing = Credentials(ca=authority.file)
+            with (
+                client_of(kind, address, credentials=believing, retries=NO_RETRIES) as client,
+                pytest.raises(ServiceError, match="no RoboSC server"),
+            ):
+                client.get_version()
+            with client_of(kind, address, retries=NO_RETRIES) as client, pytest.raises(ServerUnavailableError):
+                client.get_version()
+            server.stop(None).wait()
 
 
 class TestWatch:

@@ -18,6 +18,7 @@ from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.main import main as robosc_client
 from support.answers import exploration, supervisor, synthesis, verification
 from support.fake_tasks import TASK_FUNCTION
+from support.long_work import long_work
 from support.models import EXAMPLE_DEPLOYMENTS
 from support.models import EXAMPLES as EXAMPLES_FOLDER
 from support.mutants import change
@@ -74,27 +75,6 @@ library Parts {
 
 def has_ended(pid: int) -> bool:
     return not is_running(pid)
-
-
-def long_work(count: Any) -> Any:
-    """A model whose synthesis takes many times the deadline: counters that are multiplied with each other."""
-    components = "".join(
-        f"""
-        component C{i} {{
-            incoming message up{i} with type: none
-            outgoing message down{i} with type: none
-            behaviour {{
-                variable x: integer(0..200)
-                initial marked state s {{ on request to up{i} transition if x > 150 goto t }}
-                state t {{ on response from down{i} do x := x + 1 goto s }}
-            }}
-        }}"""
-        for i in range(count)
-    )
-    requirements = "".join(
-        f"requirement up{i} needs C{i}.x * C{(i + 1) % count}.x + C{(i + 2) % count}.x < 5000\n" for i in range(count)
-    )
-    return f"robot Long {{ {components} {requirements} }}"
 
 
 @pytest.fixture(scope="module")
@@ -438,7 +418,15 @@ class TestExitCodes:
         answers = {
             "Check": [[pb.CheckResponse(diagnostics=[finding])]],
             "Synthesize": [[synthesis(reason=evil, diagnostics=[finding])]],
-            "Verify": [[pb.VerifyResponse(result=pb.VerificationResult(status=5, reason=evil, report="{}"))]],
+            "Verify": [
+                [
+                    pb.VerifyResponse(
+                        result=pb.VerificationResult(
+                            status=pb.VERIFICATION_STATUS_NO_SUPERVISOR, reason=evil, report="{}"
+                        )
+                    )
+                ]
+            ],
             "ListTargets": [[pb.ListTargetsResponse(targets=[pb.Target(name=evil, description=evil)])]],
             "GetVersion": [[pb.GetVersionResponse(version=evil, engines=[evil])]],
         }

@@ -6,20 +6,47 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, Self
 
 import grpc
 import pytest
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection_pb2, reflection_pb2_grpc
 
-from robosc_api.security import Credentials, Scope, ServerSecurity, make_token
-from robosc_client import Client, CredentialsError, RequestRefusedError, ServerUnavailableError
+from robosc_api.security import Credentials, Quota, Scope, ServerSecurity, make_token
+from robosc_api.v1 import jobs_pb2, jobs_pb2_grpc
+from robosc_client import (
+    Check,
+    Client,
+    CredentialsError,
+    RequestRefusedError,
+    RetryPolicy,
+    ServerBusyError,
+    ServerUnavailableError,
+)
 from robosc_client.main import main as robosc_client
 from robosc_server.application import StartError
 from robosc_server.main import main
+from robosc_server.tasks.task import Outcome, Result, Task, TaskLimits
+from robosc_server.workers import OnReport
 from support.certificates import Authority
-from support.fake_tasks import TASK_FUNCTION as FAKE
+from support.job_workers import task_message
 from support.service import PATIENCE_S, bundle_of, secured, served, server_process
+
+
+class Quick:
+    """Workers that find nothing wrong with anything, at once."""
+
+    capacity = 4
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        pass
+
+    async def run(self, task: Task, limits: TaskLimits, on_report: OnReport) -> Outcome:
+        return Result((b"",))
 
 
 @pytest.fixture(scope="module")
@@ -39,20 +66,23 @@ def secure(authority: Authority) -> ServerSecurity:
 
 
 @contextmanager
-def serving(security: ServerSecurity) -> Iterator[str]:
-    with served(FAKE, **secured(security)) as address:
+def serving(security: ServerSecurity, **settings: Any) -> Iterator[str]:
+    with served(given_workers=Quick(), **secured(security), **settings) as address:
         yield address
 
 
-def check(address: str, **credentials: Path | bool) -> None:
-    with Client(address, Credentials(**credentials)) as client:  # type: ignore[arg-type]
-        assert len(client.check(bundle_of(""))) == 1
+ONCE = RetryPolicy(attempts=1)
 
 
-def token_in(folder: Path, *scopes: Scope) -> tuple[Path, Path]:
+def check(address: str, **credentials: Any) -> None:
+    with Client(address, Credentials(**credentials), retries=ONCE) as client:
+        assert client.check(bundle_of(""), deadline_s=PATIENCE_S) == ()
+
+
+def token_in(folder: Path, *scopes: Scope, quota: Quota | None = None, name: str = "caller") -> tuple[Path, Path]:
     """A file with a token, and one that lets it in."""
-    token, line = make_token("caller", scopes)
-    files = folder / "token", folder / "tokens"
+    token, line = make_token(name, scopes, quota or Quota())
+    files = folder / f"token-of-{name}", folder / f"tokens-with-{name}"
     files[0].write_text(token + "\n")
     files[1].write_text(line + "\n")
     for file in files:
@@ -73,7 +103,7 @@ class TestTls:
         other = Authority(folder, "other")
         with serving(secure) as address:
             for credentials in (Credentials(), Credentials(ca=other.file), Credentials(is_secure=True)):
-                with Client(address, credentials) as client, pytest.raises(ServerUnavailableError):
+                with Client(address, credentials, retries=ONCE) as client, pytest.raises(ServerUnavailableError):
                     client.check(bundle_of(""), deadline_s=PATIENCE_S)
 
     def test_a_client_with_tls_does_not_talk_to_a_server_without(self, authority: Authority) -> None:
@@ -125,6 +155,31 @@ class TestTls:
             certificate.write_bytes(right)
             check(address, ca=first.file)
         assert caplog.text.count("the certificate stays as it was") == 3
+
+    def test_a_certificate_that_has_expired_is_refused_until_a_new_one_is_there(self, tmp_path: Path) -> None:
+        authority = Authority(tmp_path)
+        old, old_key = authority.sign("server", days=-1)
+        with serving(ServerSecurity(certificate=old, key=old_key)) as address:
+            with pytest.raises(ServerUnavailableError):
+                check(address, ca=authority.file)
+            new, new_key = authority.sign("new")
+            shutil.copy(new_key, old_key)
+            shutil.copy(new, old)
+            check(address, ca=authority.file)
+
+    def test_a_caller_whose_certificate_has_expired_is_refused(
+        self, tmp_path: Path, authority: Authority, secure: ServerSecurity
+    ) -> None:
+        callers = Authority(tmp_path, "callers")
+        security = ServerSecurity(certificate=secure.certificate, key=secure.key, client_ca=callers.file)
+        with serving(security) as address:
+            for days, is_admitted in ((1, True), (-1, False)):
+                certificate, key = callers.sign(f"caller{days}", days=days)
+                if is_admitted:
+                    check(address, ca=authority.file, certificate=certificate, key=key)
+                else:
+                    with pytest.raises(ServerUnavailableError):
+                        check(address, ca=authority.file, certificate=certificate, key=key)
 
     def test_a_key_that_others_may_read_is_told(self, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
         certificate, key = Authority(tmp_path).sign("server")
@@ -201,16 +256,71 @@ class TestTokens:
         assert secret not in caplog.text + "".join(capfd.readouterr())
 
 
+class TestQuotas:
+    def test_beyond_its_quota_a_caller_is_told_when_to_come_again_and_others_go_on(self, tmp_path: Path) -> None:
+        token, tokens = token_in(tmp_path, Scope.SYNTHESIZE, quota=Quota(per_minute=2))
+        other, other_tokens = token_in(tmp_path, Scope.SYNTHESIZE, name="other")
+        tokens.write_text(tokens.read_text() + other_tokens.read_text())
+        with serving(ServerSecurity(tokens=tokens)) as address:
+            with Client(address, Credentials(token_file=token), retries=ONCE) as client:
+                for text in ("a", "b"):
+                    client.check(bundle_of(text))
+                with pytest.raises(ServerBusyError) as caught:
+                    client.check(bundle_of("c"))
+                assert caught.value.reason == "QUOTA_EXCEEDED"
+                assert caught.value.retry_after_s is not None
+                assert 0 < caught.value.retry_after_s <= 30
+                # What is kept costs nothing.
+                client.check(bundle_of("a"))
+                with pytest.raises(ServerBusyError, match="2 tasks in a minute"):
+                    client.submit(Check(bundle_of("d")))
+            with Client(address, Credentials(token_file=other), retries=ONCE) as client:
+                client.check(bundle_of("c"))
+
+
+class TestJobsOfOthers:
+    def test_only_an_admin_sees_and_cancels_them(self, tmp_path: Path) -> None:
+        files = [
+            token_in(tmp_path, Scope.SYNTHESIZE, name="mine"),
+            token_in(tmp_path, Scope.SYNTHESIZE, name="theirs"),
+            token_in(tmp_path, Scope.SYNTHESIZE, Scope.ADMIN, name="admin"),
+        ]
+        tokens = tmp_path / "tokens"
+        tokens.write_text("".join(lines.read_text() for _, lines in files))
+        tokens.chmod(0o600)
+        mine, theirs, admin = ((("authorization", f"Bearer {token.read_text().strip()}"),) for token, _ in files)
+        stub: Any = jobs_pb2_grpc.JobServiceStub
+        with serving(ServerSecurity(tokens=tokens)) as address, grpc.insecure_channel(address) as channel:
+            jobs = stub(channel)
+
+            def code(call: Any, request: Any, metadata: Any) -> str:
+                try:
+                    call(request, metadata=metadata, timeout=PATIENCE_S)
+                except grpc.RpcError as error:
+                    return str(error.code().name)
+                return "OK"
+
+            request = jobs_pb2.SubmitJobRequest(task=task_message("a model"))
+            job = jobs.SubmitJob(request, metadata=mine, timeout=PATIENCE_S).job
+            assert job.owner == "mine"
+            get, cancel = jobs_pb2.GetJobRequest(id=job.id), jobs_pb2.CancelJobRequest(id=job.id)
+            assert [code(jobs.GetJob, get, who) for who in (mine, theirs, admin)] == ["OK", "NOT_FOUND", "OK"]
+            assert [code(jobs.CancelJob, cancel, who) for who in (theirs, admin)] == ["NOT_FOUND", "OK"]
+            every = jobs_pb2.ListJobsRequest(all_owners=True)
+            assert [code(jobs.ListJobs, every, who) for who in (theirs, admin)] == ["PERMISSION_DENIED", "OK"]
+
+
 class TestWhereItListens:
     @pytest.mark.parametrize("host", ["0.0.0.0", "::"])
     def test_beyond_this_machine_only_with_tls(self, host: str) -> None:
-        with pytest.raises(StartError, match="can be reached from other machines"), served(FAKE, host=host):
+        refused = pytest.raises(StartError, match="can be reached from other machines")
+        with refused, served(given_workers=Quick(), host=host):
             pass
 
     def test_unless_it_is_told_otherwise(self, secure: ServerSecurity, authority: Authority) -> None:
-        with served(FAKE, host="0.0.0.0", insecure_beyond_loopback=True) as address:
+        with serving(ServerSecurity(insecure_beyond_loopback=True), host="0.0.0.0") as address:
             check(address.replace("0.0.0.0", "127.0.0.1"))
-        with served(FAKE, host="0.0.0.0", **secured(secure)) as address:
+        with serving(secure, host="0.0.0.0") as address:
             check(address.replace("0.0.0.0", "127.0.0.1"), ca=authority.file)
 
     def test_files_that_do_not_fit_are_told_at_the_start(

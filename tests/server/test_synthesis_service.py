@@ -118,7 +118,7 @@ class TestRequests:
     def test_bundle_too_large(self, fake: Any, size: int) -> None:
         with pytest.raises(grpc.RpcError) as caught:
             check(fake, "x" * size)
-        assert caught.value.code() is grpc.StatusCode.RESOURCE_EXHAUSTED  # type: ignore[attr-defined]
+        assert caught.value.code() is grpc.StatusCode.RESOURCE_EXHAUSTED
 
 
 class TestWork:
@@ -172,7 +172,7 @@ class TestEnding:
         call, pid = stuck(fake, timeout=2.0)
         with pytest.raises(grpc.RpcError) as caught:
             next(call)
-        assert caught.value.code() is grpc.StatusCode.DEADLINE_EXCEEDED  # type: ignore[attr-defined]
+        assert caught.value.code() is grpc.StatusCode.DEADLINE_EXCEEDED
         assert eventually(partial(has_ended, pid))
 
     def test_the_servers_own_limit(self) -> None:

@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Coroutine
 from concurrent.futures import Future
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
@@ -54,3 +55,19 @@ def is_running(pid: int) -> bool:
     except ProcessLookupError:
         return False
     return True
+
+
+def parent_of(pid: int) -> int:
+    """The process that a process was started by."""
+    return int(_fields(pid)[1])
+
+
+def cpu_ticks(pid: int) -> int:
+    """Time of a processor that a process has taken, in hundredths of a second on most machines."""
+    fields = _fields(pid)
+    return int(fields[11]) + int(fields[12])
+
+
+def _fields(pid: int) -> list[str]:
+    """What the kernel tells of a process, after its name."""
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()

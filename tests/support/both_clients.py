@@ -55,12 +55,16 @@ def client_of(
     """
     options["channel_options"] = {"grpc.use_local_subchannel_pool": 1}
     if kind == "sync":
-        with Client(address, **options, **({"sleep": sleep} if sleep else {})) as client:
+        if sleep is not None:
+            options["sleep"] = sleep
+        with Client(address, **options) as client:
             yield client
         return
 
     async def opened() -> AsyncClient:
-        return AsyncClient(address, **options, **({"sleep": _awaited(sleep)} if sleep else {}))
+        if sleep is not None:
+            options["sleep"] = _awaited(sleep)
+        return AsyncClient(address, **options)
 
     with asyncio.Runner() as runner:
         asynchronous = runner.run(opened())

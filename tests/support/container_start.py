@@ -3,6 +3,7 @@
 Its argument is a JSON document: see `_Plan` there.
 """
 
+import ctypes
 import json
 import os
 import subprocess
@@ -11,6 +12,9 @@ from pathlib import Path
 from typing import Any
 
 _DEVICES = ("null", "zero", "full", "random", "urandom", "tty")
+
+# prctl(2)
+_SET_MDWE, _REFUSE_EXEC_GAIN = 65, 1
 
 
 def main(plan: dict[str, Any]) -> None:
@@ -48,6 +52,9 @@ def main(plan: dict[str, Any]) -> None:
         _mount("-t", "tmpfs", "-o", "mode=1777", "tmpfs", root / target.lstrip("/"))
     os.chroot(root)
     os.chdir(plan["folder"])
+    if plan["is_memory_sealed"]:
+        # Kernels before 6.3 know no such thing, and go on without it.
+        ctypes.CDLL(None).prctl(_SET_MDWE, _REFUSE_EXEC_GAIN, 0, 0, 0)
     os.execve(plan["command"][0], plan["command"], plan["environment"])
 
 

@@ -1,7 +1,7 @@
 """Containers without an engine: a Dockerfile is built and its program run in namespaces of the kernel, by util-linux.
 
-The base image is this machine's own /usr with its Python at /usr/local; everything else is what the Dockerfile says: its
-RUN instructions, its user, its paths. The root is read-only, the network is its own, no capability is left, and the
+The base image is this machine's own /usr with its Python at /usr/local; everything else is what the Dockerfile says:
+its RUN instructions, its user, its paths. The root is read-only, the network is its own, no capability is left, and the
 program is process 1, as in an engine. Packages come from a folder of wheels that `make images` has filled.
 """
 
@@ -105,7 +105,7 @@ def _carry_out(stage: Stage, root: Path, roots: Mapping[str, Path], wheels: Path
                 _inside(root, place).mkdir(parents=True, exist_ok=True)
             case "COPY":
                 *sources, target = shlex.split(item.text)
-                goal = _inside(root, os.path.join(place, target))
+                goal = _inside(root, str(Path(place, target)))
                 if "from" in item.flags:
                     (source,) = sources
                     shutil.copytree(
@@ -194,6 +194,7 @@ def _plan(root: Path, command: Sequence[str], environment: Mapping[str, str], fo
         "volumes": [],
         "temporary": [],
         "is_writable": False,
+        "is_memory_sealed": False,
         "folder": folder,
         "command": list(command),
         "environment": dict(environment),
@@ -241,6 +242,7 @@ class Start:
         temporary: Places within for files that are forgotten.
         folder: Where it starts.
         hosts: Names of the machine itself.
+        is_memory_sealed: Whether no memory may be written and executed (MemoryDenyWriteExecute of systemd).
     """
 
     command: Sequence[str]
@@ -251,6 +253,7 @@ class Start:
     temporary: Sequence[str] = ("/tmp",)
     folder: str = "/"
     hosts: Sequence[str] = ()
+    is_memory_sealed: bool = False
 
 
 class Container:
@@ -274,6 +277,7 @@ class Container:
         plan["binds"] = [(str(file), place) for place, file in start.files.items()]
         plan["volumes"] = [(str(folder), place) for place, folder in start.volumes.items()]
         plan["temporary"] = list(start.temporary)
+        plan["is_memory_sealed"] = start.is_memory_sealed
         command = ["unshare", "--mount", "--propagation", "private", "--pid", "--fork", "--kill-child", *_starter(plan)]
         self._output = output
         with output.open("wb") as stream:

@@ -12,6 +12,7 @@ Behaviour (`A` stands for the rest of the line):
     stop            stops its process, as Ctrl-Z would
     allocate        takes memory without end, in Python
     allocate in C   takes memory without end, and dies as libraries in C do
+    diagram         takes memory without end in decision diagrams, whose engine ends the process
     die A           ends its process by the signal of number A
     exit A          ends its process with status A
     raise           has a fault
@@ -139,6 +140,8 @@ def _misbehave(line: str) -> None:
             while memory := library.malloc(ctypes.c_size_t(2**20)):
                 ctypes.memset(memory, 1, 2**20)
             os.abort()
+        case ["diagram"]:
+            _make_large_diagram()
         case ["die", number]:
             os.kill(os.getpid(), int(number))
         case ["exit", status]:
@@ -147,6 +150,19 @@ def _misbehave(line: str) -> None:
             _send(b"HTTP/1.1 200 OK\r\n\r\n")
         case ["claim", size]:
             _send(HEADER.pack(Tag.MESSAGE.value, int(size)))
+
+
+def _make_large_diagram() -> None:
+    """Pairs of variables that are equal, in an order that keeps them apart: twice as many nodes with each pair."""
+    import dd.cudd
+
+    manager = dd.cudd.BDD()
+    manager.configure(reordering=False)
+    pairs = [(f"a{number}", f"b{number}") for number in range(30)]
+    manager.declare(*(first for first, _ in pairs), *(second for _, second in pairs))
+    diagram = manager.true
+    for first, second in pairs:
+        diagram &= manager.apply("<=>", manager.var(first), manager.var(second))
 
 
 def _send(content: bytes) -> None:

@@ -10,7 +10,7 @@ import socket
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -53,7 +53,7 @@ class Postgresql:
         with socket.socket() as listener:
             listener.bind(("127.0.0.1", 0))
             self._port = listener.getsockname()[1]
-        self._as: Mapping[str, int] = {}
+        self._as: dict[str, int] = {}
         if os.getuid() == 0:
             user = pwd.getpwnam(_USER)
             os.chown(folder, user.pw_uid, user.pw_gid)
@@ -95,7 +95,8 @@ class Postgresql:
                 stderr=log,
                 cwd=self._folder,
                 start_new_session=True,
-                **self._as,
+                user=self._as.get("user"),
+                group=self._as.get("group"),
             )
         end = time.monotonic() + PATIENCE_S
         while self._try("pg_isready", "-q", "-h", "127.0.0.1", "-p", str(self._port)):
@@ -142,7 +143,14 @@ class Postgresql:
     def _run(self, program: str, *arguments: str) -> None:
         programs = _programs()
         assert programs is not None
-        subprocess.run([programs / program, *arguments], check=True, capture_output=True, cwd=self._folder, **self._as)
+        subprocess.run(
+            [programs / program, *arguments],
+            check=True,
+            capture_output=True,
+            cwd=self._folder,
+            user=self._as.get("user"),
+            group=self._as.get("group"),
+        )
 
     def _try(self, program: str, *arguments: str) -> int:
         programs = _programs()

@@ -85,7 +85,7 @@ class Script:
     def _next(self, method: str, request: Any) -> Sequence[Step]:
         with self._lock:
             answers = self.answers[method]
-            answer = answers[min(sum(name == method for name, _ in self.requests), len(answers) - 1)]
+            answer: Sequence[Step] = answers[min(sum(name == method for name, _ in self.requests), len(answers) - 1)]
             self.requests.append((method, request))
             return answer
 

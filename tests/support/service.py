@@ -14,6 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import structlog
+
 from robosc.source import Bundle, SourceFile
 from robosc_api.security import ServerSecurity
 from robosc_server.application import running_server
@@ -25,16 +27,21 @@ PATIENCE_S = 60.0
 
 
 @contextmanager
-def served(task_function: str = TASK_FUNCTION, /, **settings: Any) -> Iterator[str]:
+def served(task_function: str = TASK_FUNCTION, /, *, given_workers: Any = None, **settings: Any) -> Iterator[str]:
     """A server in a thread of this process; yields its address.
 
     Args:
         task_function: What does the tasks, such as `fake_tasks.TASK_FUNCTION`.
+        given_workers: Who does the tasks instead, not started yet; None: processes of this machine.
         **settings: Those that are not as usual.
     """
+    # Its log goes where pytest hears it, and not to whatever was standard output when the first line was written.
+    structlog.configure(logger_factory=structlog.stdlib.LoggerFactory(), cache_logger_on_first_use=False)
     with tempfile.TemporaryDirectory() as folder:
         usual: dict[str, Any] = {"port": 0, "worker_processes": 1, "state_dir": Path(folder), "drain_seconds": 0.5}
-        with _served(Settings(**(usual | settings)), task_function) as address:
+        chosen = Settings(**(usual | settings))
+        workers = given_workers or LocalWorkers(chosen.worker_processes, task_function)
+        with _served(chosen, workers) as address:
             yield address
 
 
@@ -50,7 +57,7 @@ def secured(security: ServerSecurity) -> dict[str, Any]:
 
 
 @contextmanager
-def _served(chosen: Settings, task_function: str) -> Iterator[str]:
+def _served(chosen: Settings, workers: Any) -> Iterator[str]:
     address: list[str] = []
     failure: list[BaseException] = []
     ready = threading.Event()
@@ -58,7 +65,7 @@ def _served(chosen: Settings, task_function: str) -> Iterator[str]:
     stop = asyncio.Event()
 
     async def run() -> None:
-        async with running_server(chosen, LocalWorkers(chosen.worker_processes, task_function)) as name:
+        async with running_server(chosen, workers) as name:
             address.append(name)
             ready.set()
             await stop.wait()

@@ -23,6 +23,7 @@ from robosc_server.jobs.limits import JobLimits
 from robosc_server.jobs.results import Results
 from robosc_server.jobs.scheduler import Place, Scheduler
 from robosc_server.jobs.watching import Watchers
+from robosc_server.operations.tracing import NO_TRACING, Tracing
 from robosc_server.store import JobFilter, JobRecord, JobState, Store, StoreUnavailableError
 from robosc_server.store.records import STEP, messages_of
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, Task, TaskKind, TaskLimits
@@ -71,6 +72,7 @@ class JobManager:
         task_limits: What one task may take.
         limits: What jobs may take.
         clock: Seconds of a monotonic clock, for leases.
+        tracing: Where a span of each job goes.
     """
 
     def __init__(
@@ -82,8 +84,10 @@ class JobManager:
         task_limits: TaskLimits,
         limits: JobLimits,
         clock: Callable[[], float] = time.monotonic,
+        tracing: Tracing = NO_TRACING,
     ) -> None:
         self._store, self._scheduler, self._workers, self._results = store, scheduler, workers, results
+        self._tracing = tracing
         self._task_limits, self._limits, self._clock = task_limits, limits, clock
         self._replica = _new_id()
         self._carried: dict[str, _Carried] = {}
@@ -337,7 +341,8 @@ class JobManager:
     async def _carry(self, carried: _Carried) -> None:
         """Bring a job to its end, as often as the database or the workers are away."""
         try:
-            outcome = await self._outcome(carried)
+            with self._tracing.span("job", {"job.id": carried.record.id, "task.kind": carried.record.kind.value}):
+                outcome = await self._outcome(carried)
         except Exception:
             outcome = Failure(Reason.INTERNAL_FAULT, "a fault of the server", traceback.format_exc())
         self._give_place_back(carried)

@@ -1,4 +1,4 @@
-"""Commands beside serving: `robosc-server token`, `check-config` and `example-config`."""
+"""Commands beside serving: `robosc-server health`, `token`, `check-config` and `example-config`."""
 
 import argparse
 import json
@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from robosc_api.security import Scope, SecurityError, add_token_arguments, written_token
-from robosc_server.operations.check import Finding, Grade, check_settings
 from robosc_server.operations.example import example_file
 from robosc_server.operations.settings import (
     Settings,
@@ -39,12 +38,19 @@ def run_command(words: Sequence[str]) -> int | None:
         The exit status; None: it begins with no command, and so means to serve.
     """
     commands: dict[str, Callable[[Sequence[str]], int]] = {
+        "health": _health,
         "token": new_token,
         "check-config": check_config,
         "example-config": print_example,
     }
     command = commands.get(words[0]) if words else None
     return None if command is None else command(words[1:])
+
+
+def _health(argv: Sequence[str]) -> int:
+    from robosc_server.health_check import main
+
+    return main(argv)
 
 
 def new_token(argv: Sequence[str]) -> int:
@@ -77,6 +83,9 @@ def print_example(argv: Sequence[str]) -> int:
 
 def check_config(argv: Sequence[str]) -> int:
     """Print whether a server could start with such settings; the exit status."""
+    # The database's library takes longer to import than other commands take in all.
+    from robosc_server.operations.check import Grade, check_settings
+
     parser = argparse.ArgumentParser(
         prog="robosc-server check-config",
         description="Look whether a server could start with such settings: address, certificates, tokens, database, "
@@ -111,12 +120,9 @@ def check_config(argv: Sequence[str]) -> int:
             }
         )
     else:
-        sys.stdout.write("".join(map(_line, findings)))
+        lines = [f"{finding.grade:<8} {finding.part}: {finding.message}\n" for finding in findings]
+        sys.stdout.write("".join(lines))
     return 0 if is_ok else 1
-
-
-def _line(finding: Finding) -> str:
-    return f"{finding.grade:<8} {finding.part}: {finding.message}\n"
 
 
 def _settings_document(settings: Settings, arguments: argparse.Namespace) -> dict[str, Any]:

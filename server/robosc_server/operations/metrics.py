@@ -7,6 +7,7 @@ from types import TracebackType
 from typing import Any, Self
 
 import grpc
+import structlog
 from prometheus_client import (
     CollectorRegistry,
     Counter,
@@ -259,6 +260,7 @@ class MetricsEndpoint:
         except OSError as error:
             raise SecurityError(f"cannot listen on {self.address} for metrics: {error.strerror or error}") from error
         self.address = joined(host, self._server.sockets[0].getsockname()[1])
+        structlog.get_logger().info("metrics are shown", address=self.address)
         return self
 
     async def __aexit__(

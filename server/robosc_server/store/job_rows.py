@@ -128,12 +128,12 @@ def accept(
         now_us: The time.
 
     Returns:
-        The job, and whether it was there before: by its idempotency key, or by its id where this is done twice. None:
-        there are too many.
+        The job, and whether it was there before, by its idempotency key. None: there are too many.
     """
-    there = find(connection, record.id, now_us)
-    if there is None and record.idempotency_key is not None:
+    if record.idempotency_key is not None:
         there = find_by_key(connection, record.owner, record.idempotency_key, now_us)
+        if there is not None:
+            return there, True
         # One that has expired and is not swept yet.
         connection.execute(
             delete(JOBS).where(
@@ -142,8 +142,6 @@ def accept(
                 JOBS.c.expires_us <= now_us,
             )
         )
-    if there is not None:
-        return there, there.id != record.id
     if count_of(connection, record.owner, bound) >= bound:
         return None
     connection.execute(
@@ -184,20 +182,17 @@ def begin(connection: Connection, job_id: str, replica: str, now_us: int) -> tup
     ended = _end_from_store(connection, record_of(row), None, now_us)
     if ended is not None:
         return ended, b""
-    connection.execute(
-        update(JOBS)
-        .where(waits)
-        .values(
-            state=JobState.RUNNING,
-            attempts=JOBS.c.attempts + 1,
-            started_us=now_us,
-            revision=JOBS.c.revision + STEP,
-            stage=None,
-            progress=None,
-        )
+    record = _changed(
+        connection,
+        waits,
+        state=JobState.RUNNING,
+        attempts=JOBS.c.attempts + 1,
+        started_us=now_us,
+        stage=None,
+        progress=None,
     )
     request = connection.scalar(select(REQUESTS.c.content).where(REQUESTS.c.job == job_id))
-    return _read(connection, job_id), bytes(request or b"")
+    return None if record is None else (record, bytes(request or b""))
 
 
 def put_back(connection: Connection, ids: Collection[str], replica: str, next_replica: str | None) -> list[JobRecord]:
@@ -211,20 +206,17 @@ def put_back(connection: Connection, ids: Collection[str], replica: str, next_re
     """
     found = []
     for job_id in ids:
-        changed = connection.execute(
-            update(JOBS)
-            .where(JOBS.c.id == job_id, JOBS.c.replica == replica, JOBS.c.state == JobState.RUNNING)
-            .values(
-                state=JobState.QUEUED,
-                attempts=JOBS.c.attempts - 1,
-                replica=next_replica,
-                revision=JOBS.c.revision + STEP,
-                stage=None,
-                progress=None,
-            )
+        record = _changed(
+            connection,
+            and_(JOBS.c.id == job_id, JOBS.c.replica == replica, JOBS.c.state == JobState.RUNNING),
+            state=JobState.QUEUED,
+            attempts=JOBS.c.attempts - 1,
+            replica=next_replica,
+            stage=None,
+            progress=None,
         )
-        if changed.rowcount:
-            found.append(_read(connection, job_id))
+        if record is not None:
+            found.append(record)
     return found
 
 
@@ -310,12 +302,11 @@ def take_orphans(connection: Connection, ours: str, now_us: int) -> list[JobReco
         if record.state is JobState.RUNNING and record.attempts >= MAXIMUM_ATTEMPTS:
             taken.append(_fail(connection, record, Failure(Reason.SERVER_DIED, _SERVER_DIED), now_us))
             continue
-        connection.execute(
-            update(JOBS)
-            .where(JOBS.c.id == record.id)
-            .values(state=JobState.QUEUED, replica=ours, revision=JOBS.c.revision + STEP, stage=None, progress=None)
+        changed = _changed(
+            connection, JOBS.c.id == record.id, state=JobState.QUEUED, replica=ours, stage=None, progress=None
         )
-        taken.append(_read(connection, record.id))
+        if changed is not None:
+            taken.append(changed)
     return taken
 
 
@@ -341,8 +332,11 @@ def _is_active(job_id: str, replica: str) -> Any:
     return and_(JOBS.c.id == job_id, JOBS.c.replica == replica, JOBS.c.state.in_(sorted(ACTIVE)))
 
 
-def _read(connection: Connection, job_id: str) -> JobRecord:
-    return record_of(connection.execute(select(JOBS).where(JOBS.c.id == job_id)).one())
+def _changed(connection: Connection, which: Any, **values: Any) -> JobRecord | None:
+    """Change a job that is in some condition, and how it is then; None: it is not."""
+    changed = update(JOBS).where(which).values(revision=JOBS.c.revision + STEP, **values).returning(*JOBS.c)
+    row = connection.execute(changed).one_or_none()
+    return None if row is None else record_of(row)
 
 
 def _end_from_store(connection: Connection, record: JobRecord, result: Result | None, now_us: int) -> JobRecord | None:
@@ -362,20 +356,18 @@ def _fail(connection: Connection, record: JobRecord, failure: Failure, now_us: i
 
 
 def _end(connection: Connection, record: JobRecord, state: JobState, now_us: int, **values: Any) -> JobRecord:
-    connection.execute(
-        update(JOBS)
-        .where(JOBS.c.id == record.id)
-        .values(
-            state=state,
-            revision=JOBS.c.revision + STEP,
-            ended_us=now_us,
-            expires_us=now_us + record.retention_us,
-            replica=None,
-            **values,
-        )
-    )
     connection.execute(delete(REQUESTS).where(REQUESTS.c.job == record.id))
-    return _read(connection, record.id)
+    ended = _changed(
+        connection,
+        JOBS.c.id == record.id,
+        state=state,
+        ended_us=now_us,
+        expires_us=now_us + record.retention_us,
+        replica=None,
+        **values,
+    )
+    assert ended is not None  # noqa: S101  # its row is locked
+    return ended
 
 
 def clean(text: str) -> str:

@@ -26,6 +26,22 @@ from robosc_server.tasks.pace import PacedReports
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, TaskKind, TaskLimits
 from robosc_server.tasks.verify import NoPropertyError, verification
 
+_REHEARSAL = """
+robot Rehearsal {
+    component Button {
+        outgoing message pressed with identifier: "/pressed", type: boolean
+        behaviour {
+            variable is_down: boolean
+            on response from pressed do is_down := value
+            initial marked state up { transition if is_down goto down }
+            state down { transition if !is_down goto up }
+        }
+    }
+    component Door { incoming message open with identifier: "/open", type: none }
+    requirement open needs Button.down
+}
+"""
+
 
 class _ResultTooLargeError(Exception):
     """A result beyond its limit."""
@@ -52,6 +68,13 @@ def run_task(kind: TaskKind, request: bytes, limits: TaskLimits, on_report: OnRe
         return Failure(Reason.MALFORMED_REQUEST, str(error))
     except Exception as error:  # The worker's border: whatever it was, the server logs it and lives on.
         return Failure(Reason.INTERNAL_FAULT, "a fault of the server", _places(error))
+
+
+def rehearse() -> None:
+    """Do a small task: what is loaded and made on first use is there for every process that is forked from this one."""
+    file = pb.SourceFile(name="rehearsal.rscd", text=_REHEARSAL)
+    request = pb.SynthesizeRequest(bundle=pb.Bundle(main=file))
+    run_task(TaskKind.SYNTHESIZE, request.SerializeToString(), TaskLimits(), lambda report: None)
 
 
 def _places(error: BaseException) -> str:

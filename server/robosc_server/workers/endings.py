@@ -11,7 +11,8 @@ from robosc_server.workers.child import OUT_OF_MEMORY
 OUT_OF_PROCESSOR = "the work took more of a processor's time than a task may have"
 OUT_OF_TIME = "the work took longer than a task may take"
 
-_NEAR_THE_LIMIT = 0.75
+_NEAR_THE_LIMIT = 0.9
+_NEVER_RESIDENT_BYTES = 96 * 2**20  # Of the address space: mostly parts of libraries that nobody calls.
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +49,8 @@ def failure_of(ending: Ending, limits: TaskLimits, last_words: str, was_memory_s
         return Failure(Reason.CPU_LIMIT, OUT_OF_PROCESSOR, details)
     if ending.exit_code == -signal.SIGKILL and was_memory_short:
         return Failure(Reason.MEMORY_LIMIT, "the machine ran out of memory, and ended the work", details)
-    if ending.exit_code < 0 and ending.peak_bytes >= _NEAR_THE_LIMIT * limits.memory_bytes:
-        # Libraries in C end the process where memory is refused to them.
+    if ending.exit_code and ending.peak_bytes + _NEVER_RESIDENT_BYTES >= _NEAR_THE_LIMIT * limits.memory_bytes:
+        # Libraries in C end the process where memory is refused to them: CUDD by exit(1), others by abort().
         return Failure(Reason.MEMORY_LIMIT, OUT_OF_MEMORY, details)
     return Failure(Reason.WORKER_DIED, f"the worker process {_told(ending.exit_code)}", details)
 

@@ -120,15 +120,21 @@ class _Template:
 
 
 def _load(name: str) -> TaskFunction:
-    """The function that does tasks, after everything that it may need was imported."""
+    """The function that does tasks, after everything that it may need was imported, and made on first use.
+
+    The latter by the function `rehearse` beside it, if there is one.
+    """
     module_name, _, attribute = name.partition(":")
-    function: TaskFunction = getattr(importlib.import_module(module_name), attribute)
+    tasks = importlib.import_module(module_name)
+    function: TaskFunction = getattr(tasks, attribute)
     package = importlib.import_module(_PRELOADED_PACKAGE)
     for module in pkgutil.walk_packages(package.__path__, f"{_PRELOADED_PACKAGE}."):
         if not module.name.startswith(_NOT_PRELOADED) and not module.name.endswith("__main__"):
             # What is copied into generated packages needs the middleware that those run on.
             with contextlib.suppress(ImportError):
                 importlib.import_module(module.name)
+    if rehearse := getattr(tasks, "rehearse", None):
+        rehearse()
     return function
 
 

@@ -17,6 +17,7 @@ from robosc_api.security.tokens import parse_tokens
 from robosc_server.operations.commands import run_command
 from robosc_server.operations.example import example_file
 from robosc_server.operations.settings import Settings, settings_from, variable_of
+from robosc_server.store.opening import DATABASE_FILE
 from support.certificates import Authority
 
 
@@ -144,10 +145,10 @@ def test_the_state_folder(capsys: pytest.CaptureFixture[str], tmp_path: Path) ->
     assert Checked(capsys, "--state-dir", str(file / "below")).status == 1
     state = tmp_path / "state"
     state.mkdir()
-    (state / "jobs.sqlite3").write_bytes(b"no database at all, and long enough for somebody to look" * 100)
+    (state / DATABASE_FILE).write_bytes(b"no database at all, and long enough for somebody to look" * 100)
     assert "not a database" in Checked(capsys, "--state-dir", str(state)).of("database")[0][1]
-    (state / "jobs.sqlite3").unlink()
-    sqlite3.connect(state / "jobs.sqlite3").close()
+    (state / DATABASE_FILE).unlink()
+    sqlite3.connect(state / DATABASE_FILE).close()
     assert Checked(capsys, "--state-dir", str(state)).status == 0
     if os.getuid() != 0:
         state.chmod(0o500)
@@ -180,7 +181,7 @@ def test_a_token_with_quotas(capsys: pytest.CaptureFixture[str]) -> None:
     captured = capsys.readouterr()
     (entry,) = parse_tokens(captured.err.splitlines()[-1], "line")
     assert captured.out.startswith("robosc_")
-    assert (entry.scopes, entry.quota) == ({Scope.SYNTHESIZE, Scope.ADMIN}, Quota(per_minute=60))
+    assert (entry.scopes, entry.quota) == (frozenset({Scope.SYNTHESIZE, Scope.ADMIN}), Quota(per_minute=60))
     assert run_command(["token", "not a name"]) == 2
 
 

@@ -21,7 +21,7 @@ from robosc_server.workers.dask_task import answer, outcome_of
 from robosc_server.workers.frames import FrameError
 from robosc_server.workers.local import LocalWorkers
 from robosc_server.workers.opening import open_workers
-from support.background import BackgroundLoop, eventually, is_running
+from support.background import BackgroundLoop, eventually, is_running, parent_of
 from support.dask_clusters import Cluster, dask_cluster, kill
 from support.fake_tasks import TASK_FUNCTION, fake_task, said
 
@@ -91,7 +91,7 @@ def running(cluster: Cluster) -> Iterator[Running]:
 def dask_worker_of(cluster: Cluster, pid: int) -> "subprocess.Popen[bytes]":
     """The worker of the cluster that a task's process belongs to: the parent of its template."""
     for _ in range(2):
-        pid = int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
+        pid = parent_of(pid)
     return next(worker for worker in cluster.workers if worker.pid == pid)
 
 

@@ -7,16 +7,20 @@ import pytest
 from robosc_server.tasks.task import Reason, TaskLimits
 from robosc_server.workers.endings import Ending, failure_of, kills_for_memory
 
-LIMITS = TaskLimits(cpu_seconds=10, memory_bytes=1000)
+MIB = 2**20
+LIMITS = TaskLimits(cpu_seconds=10, memory_bytes=1000 * MIB)
 
 
 @pytest.mark.parametrize(
-    ("exit_code", "cpu_s", "peak_bytes", "was_memory_short", "reason", "message"),
+    ("exit_code", "cpu_s", "peak_mib", "was_memory_short", "reason", "message"),
     [
         (0, 1, 10, False, Reason.WORKER_DIED, "the worker process ended with status 0 and no answer"),
-        (3, 11, 1000, True, Reason.WORKER_DIED, "the worker process ended with status 3 and no answer"),
-        (-signal.SIGSEGV, 1, 749, False, Reason.WORKER_DIED, "the worker process was ended by SIGSEGV"),
-        (-signal.SIGSEGV, 1, 750, False, Reason.MEMORY_LIMIT, "the work took more memory than a task may have"),
+        (3, 11, 700, True, Reason.WORKER_DIED, "the worker process ended with status 3 and no answer"),
+        (1, 1, 803, False, Reason.WORKER_DIED, "the worker process ended with status 1 and no answer"),
+        (1, 1, 804, False, Reason.MEMORY_LIMIT, "the work took more memory than a task may have"),
+        (0, 1, 950, False, Reason.WORKER_DIED, "the worker process ended with status 0 and no answer"),
+        (-signal.SIGSEGV, 1, 803, False, Reason.WORKER_DIED, "the worker process was ended by SIGSEGV"),
+        (-signal.SIGSEGV, 1, 804, False, Reason.MEMORY_LIMIT, "the work took more memory than a task may have"),
         (-signal.SIGABRT, 1, 900, False, Reason.MEMORY_LIMIT, "the work took more memory than a task may have"),
         (-signal.SIGKILL, 9.9, 10, False, Reason.WORKER_DIED, "the worker process was ended by SIGKILL"),
         (-signal.SIGKILL, 9.9, 10, True, Reason.MEMORY_LIMIT, "the machine ran out of memory, and ended the work"),
@@ -40,11 +44,11 @@ LIMITS = TaskLimits(cpu_seconds=10, memory_bytes=1000)
     ],
 )
 def test_each_ending_is_told_by_its_cause(
-    exit_code: int, cpu_s: float, peak_bytes: int, was_memory_short: bool, reason: Reason, message: str
+    exit_code: int, cpu_s: float, peak_mib: int, was_memory_short: bool, reason: Reason, message: str
 ) -> None:
-    failure = failure_of(Ending(exit_code, cpu_s, peak_bytes), LIMITS, "Fatal error\n", was_memory_short)
+    failure = failure_of(Ending(exit_code, cpu_s, peak_mib * MIB), LIMITS, "Fatal error\n", was_memory_short)
     assert (failure.reason, failure.message) == (reason, message)
-    assert failure.details.endswith(f"at most {peak_bytes} bytes resident\nFatal error")
+    assert failure.details.endswith(f"at most {peak_mib * MIB} bytes resident\nFatal error")
 
 
 def test_kills_for_want_of_memory_are_counted_by_the_kernel() -> None:

@@ -18,7 +18,7 @@ import pytest
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, TaskKind, TaskLimits
 from robosc_server.workers import Workers, WorkersError
 from robosc_server.workers.local import LocalWorkers
-from support.background import BackgroundLoop, eventually, is_running
+from support.background import BackgroundLoop, cpu_ticks, eventually, is_running, parent_of
 from support.fake_tasks import TASK_FUNCTION, fake_task, said
 
 LIMITS = TaskLimits(seconds=60, cpu_seconds=20, memory_bytes=512 * 2**20, result_bytes=10**6)
@@ -71,15 +71,6 @@ def running() -> Iterator[Running]:
         loop.run(workers.__aexit__())
 
 
-def parent_of(pid: int) -> int:
-    return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
-
-
-def cpu_ticks(pid: int) -> int:
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return int(fields[11]) + int(fields[12])
-
-
 class TestAnswers:
     def test_a_task_is_answered_after_its_reports(self, running: Running) -> None:
         future, reports = running.start("reports 3\necho hello")
@@ -119,9 +110,9 @@ class TestLimits:
         assert said(running.run("echo small", limits)) == "small"
         assert running.failure("allocate", limits).reason is Reason.MEMORY_LIMIT
 
-    @pytest.mark.parametrize("text", ["allocate", "allocate in C"])
+    @pytest.mark.parametrize("text", ["allocate", "allocate in C", "diagram"])
     def test_memory(self, running: Running, text: str) -> None:
-        failure = running.failure(text)
+        failure = running.failure(text, replace(LIMITS, memory_bytes=2**27, cpu_seconds=60))
         assert failure.reason is Reason.MEMORY_LIMIT
         assert failure.message == "the work took more memory than a task may have"
 

@@ -1,0 +1,190 @@
+"""Dockerfiles, the file of compose and the locks of the images, looked at by linters and by rules of our own."""
+
+import importlib
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from robosc_server.operations.settings import Settings, settings_from
+from support.checkers import checked
+from support.containers import IMAGES, TOP
+from support.dockerfiles import Ignored, Stage, context_files, parse_dockerfile
+
+DOCKERFILES = sorted(IMAGES.glob("*.Dockerfile"))
+COMPOSE = TOP / "deploy" / "compose"
+
+
+@pytest.fixture(scope="module")
+def compose() -> dict[str, Any]:
+    return dict(yaml.safe_load((COMPOSE / "compose.yaml").read_text()))
+
+
+@pytest.mark.parametrize("file", DOCKERFILES, ids=lambda file: file.stem)
+def test_hadolint_finds_nothing(file: Path) -> None:
+    checked("hadolint", "--no-color", file)
+
+
+def test_hadolint_would_find_something(tmp_path: Path) -> None:
+    file = tmp_path / "Dockerfile"
+    file.write_text("FROM python:latest\nRUN cd /tmp && pip install robosc\n")
+    with pytest.raises(AssertionError, match=r"(?s)DL3007.*DL3003"):
+        checked("hadolint", "--no-color", file)
+
+
+@pytest.mark.parametrize("file", DOCKERFILES, ids=lambda file: file.stem)
+def test_an_image_is_as_it_should_be(file: Path) -> None:
+    stages = parse_dockerfile(file.read_text())
+    last = stages[-1]
+    assert len(stages) == 2 and len({stage.base for stage in stages}) == 1
+    # A version of the base in full, not whatever is the latest.
+    assert re.fullmatch(r"docker\.io/library/python:3\.12\.\d+-slim-\w+", last.base)
+    # Not root, and a number, which Kubernetes can judge.
+    assert last.instructions.index(last.last("USER")) < last.instructions.index(last.last("ENTRYPOINT"))  # type: ignore[arg-type]
+    assert re.fullmatch(r"[1-9]\d{4,}:[1-9]\d{4,}", last.last("USER").text)  # type: ignore[union-attr]
+    # No shell stands between the engine's signals and the program, or a health check and its answer.
+    assert last.words("ENTRYPOINT") and last.health_check[1] == "health"
+    assert [item.text for item in last.all("STOPSIGNAL")] == ["SIGTERM"]
+    # Nothing of what builds it is in it.
+    assert [(item.flags, item.text) for item in last.all("COPY")] == [({"from": "build"}, "/opt/robosc /opt/robosc")]
+    (volume,) = last.last("VOLUME").words  # type: ignore[union-attr]
+    assert last.last("WORKDIR").text == volume  # type: ignore[union-attr]
+    assert any(f"-m 0700 {volume}" in item.text for item in last.all("RUN"))
+
+
+def test_every_package_is_locked() -> None:
+    for file in DOCKERFILES:
+        for item in parse_dockerfile(file.read_text())[0].all("RUN"):
+            for command in item.text.split("&&"):
+                if "pip" in command and "-m venv" not in command:
+                    assert "--require-hashes" in command or "--no-deps" in command, command
+                    assert "--no-index" in command or "--no-build-isolation" in command or "install -r" not in command
+
+
+def test_only_what_an_image_needs_is_sent_to_its_build() -> None:
+    ignored = Ignored((TOP / ".dockerignore").read_text())
+    for secret in (".git/config", "deploy/compose/secrets/tls_key", ".venv/bin/python", "tests/conftest.py", "out/a"):
+        assert secret in ignored, secret
+    assert "robosc/__pycache__/errors.pyc" in ignored
+    for needed in ("pyproject.toml", "robosc/errors.py", "proto/robosc_api/v1/jobs_pb2.py", "robosc/py.typed"):
+        assert needed not in ignored, needed
+    for file in DOCKERFILES:
+        for item in parse_dockerfile(file.read_text())[0].all("COPY"):
+            for source in item.text.split()[:-1]:
+                assert any(context_files(TOP, [source], ignored)), source
+
+
+def test_the_wheel_has_all_that_the_images_copy_for_it() -> None:
+    packages = tomllib.loads((TOP / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]["wheel"][
+        "packages"
+    ]
+    for file in DOCKERFILES:
+        copied = [item.text.split()[0] for item in parse_dockerfile(file.read_text())[0].all("COPY")]
+        assert all(any(package == one or package.startswith(f"{one}/") for one in copied) for package in packages)
+
+
+def test_the_locks_of_the_images_are_lines_of_the_lock(tmp_path: Path) -> None:
+    sys.path.insert(0, str(TOP / "deploy"))
+    try:
+        lock_images = importlib.import_module("lock_images")
+    finally:
+        sys.path.pop(0)
+    entries = lock_images.locked((TOP / "requirements.lock").read_text())
+    for name, needed in lock_images.wanted().items():
+        lock = lock_images.locked((TOP / "deploy" / f"requirements-{name}.txt").read_text())
+        assert lock == {package: entries[package] for package in needed}, f"{name}: python deploy/lock_images.py"
+
+
+def test_what_a_dockerfile_says_is_read() -> None:
+    (stage,) = parse_dockerfile(
+        'ARG A=b:1\nFROM ${A} AS one\n# no\nENV X=1 \\\n    Y=$X/2\nHEALTHCHECK --interval=3s CMD ["a", "b"]\n'
+    )
+    assert (stage.base, stage.name) == ("b:1", "one")
+    assert stage.environment({}) == {"X": "1", "Y": "1/2"}
+    assert stage.health_check == ["a", "b"]
+    assert stage.last("HEALTHCHECK").flags == {"interval": "3s"}  # type: ignore[union-attr]
+    assert Stage("", "").words("CMD") == []
+
+
+def test_the_compose_file_fits_its_schema(tmp_path: Path) -> None:
+    checked("check-jsonschema", "--builtin-schema", "vendor.compose-spec", COMPOSE / "compose.yaml")
+    wrong = tmp_path / "compose.yaml"
+    wrong.write_text("services: {server: {imag: robosc-server}}\n")
+    with pytest.raises(AssertionError, match="imag"):
+        checked("check-jsonschema", "--builtin-schema", "vendor.compose-spec", wrong)
+
+
+def test_yamllint_finds_nothing() -> None:
+    rules = "{extends: default, rules: {line-length: {max: 120}, document-start: disable, braces: {forbid: false}}}"
+    checked("yamllint", "--strict", "-d", rules, "deploy")
+
+
+def test_every_service_of_compose_is_confined(compose: dict[str, Any]) -> None:
+    for name, service in compose["services"].items():
+        assert service["read_only"] is True, name
+        assert service["cap_drop"] == ["ALL"] and service["security_opt"] == ["no-new-privileges:true"], name
+        assert {"mem_limit", "pids_limit", "stop_grace_period", "restart"} <= set(service), name
+        assert "privileged" not in service and "latest" not in service["image"], name
+        # The image's own, or one that is written here.
+        assert name == "server" or service["healthcheck"]["test"][0] == "CMD", name
+        assert set(service.get("secrets", ())) <= set(compose["secrets"]), name
+        assert set(service["networks"]) <= set(compose["networks"]), name
+    # Only the server is reached from outside.
+    assert [name for name, service in compose["services"].items() if "ports" in service] == ["server"]
+    assert [name for name, service in compose["services"].items() if "outside" in service["networks"]] == ["server"]
+    assert compose["networks"]["inside"] == {"internal": True}
+
+
+def test_the_settings_of_compose_can_be_used(compose: dict[str, Any]) -> None:
+    settings = settings_from({}, COMPOSE / "server.toml")
+    server = compose["services"]["server"]
+    secrets = {f"/run/secrets/{name}" for name in server["secrets"]}
+    assert {str(settings.tls_certificate), str(settings.tls_key), str(settings.tokens)} <= secrets
+    assert settings.database_url is not None
+    host, _, passfile = settings.database_url.partition("@")[2].partition("/robosc?passfile=")
+    assert host in compose["services"] and passfile in secrets
+    assert settings.workers == f"dask://{compose['services']['worker']['command'][0].removeprefix('tcp://')}"
+    assert compose["services"]["server"]["ports"][0].endswith(f":{settings.port}")
+    assert _seconds(server["stop_grace_period"]) > settings.drain_seconds
+    threads = int(_after(compose["services"]["worker"]["command"], "--nthreads"))
+    memory = int(compose["services"]["worker"]["mem_limit"].removesuffix("g")) * 2**30
+    assert threads * settings.task_memory_bytes < memory
+
+
+def test_the_secrets_of_compose_are_made_and_kept(compose: dict[str, Any], tmp_path: Path) -> None:
+    from robosc_api.security.tokens import parse_tokens
+
+    folder = tmp_path / "secrets"
+    command = ["sh", str(COMPOSE / "make_secrets.sh"), "server.example.org", str(folder)]
+    subprocess.run(command, check=True, capture_output=True)
+    before = {file.name: file.read_bytes() for file in folder.iterdir()}
+    assert {Path(secret["file"]).name for secret in compose["secrets"].values()} < set(before)
+    assert all(file.stat().st_mode & 0o077 == 0 for file in folder.iterdir())
+    (entry,) = parse_tokens(before["tokens"].decode(), "tokens")
+    assert entry.name == "first"
+    assert before["database_login"].decode().strip().endswith(":" + before["database_password"].decode())
+    subprocess.run(command, check=True, capture_output=True)
+    assert {file.name: file.read_bytes() for file in folder.iterdir()} == before
+    wrong = subprocess.run(["sh", str(COMPOSE / "make_secrets.sh"), "a b"], capture_output=True, text=True)
+    assert (wrong.returncode, wrong.stderr) == (2, "make_secrets.sh: 'a b' is no name or address of a machine\n")
+
+
+def test_variables_of_the_images_are_settings() -> None:
+    for file in DOCKERFILES:
+        names = parse_dockerfile(file.read_text())[-1].environment({"PATH": ""})
+        for name in names:
+            if name.startswith("ROBOSC_SERVER_"):
+                assert name.removeprefix("ROBOSC_SERVER_").lower() in Settings.model_fields, name
+
+
+def _seconds(text: str) -> float:
+    return float(text.removesuffix("s"))
+
+
+def _after(words: list[str], flag: str) -> str:
+    return words[words.index(flag) + 1]

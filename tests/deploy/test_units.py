@@ -1,0 +1,108 @@
+"""Units of systemd and rules of udev."""
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from robosc_server.operations.settings import Settings
+from support.containers import TOP
+from support.units import read_unit
+
+UNITS = sorted((TOP / "deploy" / "systemd").glob("*.service"))
+RULES = TOP / "deploy" / "udev" / "60-robosc.rules"
+
+needs_systemd = pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="there is no systemd-analyze")
+
+# udev(7): what a rule may ask, and what it may set.
+_ASKED = "ACTION KERNEL SUBSYSTEM SUBSYSTEMS DRIVER ATTR{} ATTRS{} ENV{}".split()
+_SET = "SYMLINK GROUP MODE ENV{} ATTR{} GOTO LABEL".split()
+
+
+def _verified(file: Path, folder: Path) -> str:
+    """What systemd says about a unit whose program is there; an instance stands for a template."""
+    program = folder / "program"
+    program.write_text("#!/bin/sh\n")
+    program.chmod(0o755)
+    name = file.name.replace("@.", "@burger.")
+    text = re.sub(r"/opt/robosc/bin/\S+", str(program), file.read_text())
+    (folder / name).write_text(text)
+    done = subprocess.run(
+        ["systemd-analyze", "verify", "--recursive-errors=no", str(folder / name)], capture_output=True, text=True
+    )
+    return done.stdout + done.stderr + ("" if done.returncode == 0 else f"status {done.returncode}\n")
+
+
+@needs_systemd
+@pytest.mark.parametrize("file", UNITS, ids=lambda file: file.stem)
+def test_systemd_finds_nothing(file: Path, tmp_path: Path) -> None:
+    assert _verified(file, tmp_path) == ""
+
+
+@needs_systemd
+def test_systemd_would_find_something(tmp_path: Path) -> None:
+    file = tmp_path / "wrong.service"
+    file.write_text(UNITS[-1].read_text().replace("ProtectHome", "ProtectHouse"))
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    assert "Unknown key name 'ProtectHouse'" in _verified(file, folder)
+
+
+@needs_systemd
+@pytest.mark.parametrize(("name", "exposure"), [("robosc-server.service", 15), ("robosc-bridge@.service", 20)])
+def test_a_service_is_exposed_to_little(name: str, exposure: int) -> None:
+    """Of 100, as `systemd-analyze security` counts: 20 of them are its best word, OK, anyhow."""
+    file = TOP / "deploy" / "systemd" / name
+    command = ["systemd-analyze", "security", "--offline=true", f"--threshold={exposure}", "--no-pager", str(file)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout.splitlines()[-1]
+
+
+@pytest.mark.parametrize("file", UNITS, ids=lambda file: file.stem)
+def test_a_unit_promises_nothing_that_its_program_does_not_keep(file: Path) -> None:
+    unit = read_unit(file)
+    # Neither program says that it is ready, or that it is still there.
+    assert unit.one("Type") == "exec" and not unit.all("WatchdogSec") and not unit.all("NotifyAccess")
+    assert unit.one("Restart") == "on-failure" and unit.one("KillMode") == "mixed"
+    assert unit.one("DynamicUser") == "yes" and unit.one("WorkingDirectory").endswith(unit.one("StateDirectory"))
+
+
+def test_the_servers_unit_gives_it_time_to_drain_and_settings_that_there_are() -> None:
+    unit = read_unit(TOP / "deploy" / "systemd" / "robosc-server.service")
+    assert float(unit.one("TimeoutStopSec")) > Settings().drain_seconds
+    for text in unit.all("Environment"):
+        assert text.partition("=")[0].removeprefix("ROBOSC_SERVER_").lower() in {"config", *Settings.model_fields}
+    handed = {text.partition(":")[0] for text in unit.all("LoadCredential")}
+    assert handed == {match for text in unit.all("Environment") for match in re.findall(r"%d/(\w+)", text)}
+
+
+def test_the_rules_of_udev_can_be_read() -> None:
+    """Every line as udev(7) has it: comparisons, then assignments, to keys that there are."""
+    labels, jumps = [], []
+    for line in RULES.read_text().splitlines():
+        if not line or line.startswith("#"):
+            continue
+        is_setting = False
+        for part in line.split(", "):
+            match = re.fullmatch(r'([A-Z]+)(\{[A-Za-z_]+\})?(==|!=|=|\+=)"([^"]*)"', part)
+            assert match, part
+            key = match[1] + ("{}" if match[2] else "")
+            if match[3] in ("==", "!="):
+                assert key in _ASKED and not is_setting, part
+            else:
+                assert key in _SET, part
+                is_setting = True
+            labels += [match[4]] if key == "LABEL" else []
+            jumps += [match[4]] if key == "GOTO" else []
+    assert len(labels) == len(set(labels)) and set(jumps) == set(labels)
+
+
+def test_udev_knows_the_devices_that_the_bridge_drives() -> None:
+    text = RULES.read_text()
+    found = re.findall(r'idVendor}=="(\w{4})", ATTRS{idProduct}=="(\w{4})", SYMLINK\+="robosc-(\w+)"', text)
+    assert {name for _, _, name in found} == {"opencr", "u2d2", "lds"}
+    documented = (TOP / "docs" / "deployment.md").read_text()
+    for vendor, product, name in found:
+        assert f"`{vendor}:{product}`" in documented and f"`/dev/robosc-{name}`" in documented

@@ -1,0 +1,75 @@
+"""A whole server as a program that a test may kill: job_server.py FOLDER DATABASE_URL WORKERS.
+
+WORKERS is `scripted` (see job_workers), or `local`: real ones, two. The database's URL may be empty. It prints its
+address.
+"""
+
+import asyncio
+import contextlib
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from robosc_server.application import running_server
+from robosc_server.operations.logs import set_up_logs
+from robosc_server.operations.settings import Settings
+from robosc_server.workers.local import LocalWorkers
+from support.job_workers import ScriptedWorkers
+
+_PREFIX = "listening on "
+
+
+class StartedWorkers(ScriptedWorkers):
+    """Scripted workers that a server starts."""
+
+    restarts = 0
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        pass
+
+
+async def serve(folder: str, url: str, workers: str) -> None:
+    chosen: dict[str, Any] = {"port": 0, "state_dir": Path(folder), "database_url": url or None}
+    settings = Settings(**chosen, waiting_tasks_per_caller=1000)
+    set_up_logs(settings.log_format, settings.log_level)
+    made = StartedWorkers(2) if workers == "scripted" else LocalWorkers(2)
+    async with running_server(settings, made) as address:
+        sys.stdout.write(f"{_PREFIX}{address}\n")
+        sys.stdout.flush()
+        await asyncio.Event().wait()
+
+
+@contextmanager
+def job_server(folder: Path, url: str = "", workers: str = "scripted") -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """Such a program; yields the process and its address, and kills it at the end."""
+    process = subprocess.Popen(
+        [sys.executable, __file__, str(folder), url, workers],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+    )
+    try:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        assert line.startswith(_PREFIX), line
+        yield process, line.removeprefix(_PREFIX).strip()
+    finally:
+        process.kill()
+        process.wait()
+        if process.stdout is not None:
+            process.stdout.close()
+
+
+if __name__ == "__main__":
+    with contextlib.suppress(KeyboardInterrupt):
+        asyncio.run(serve(*sys.argv[1:]))

@@ -58,6 +58,9 @@ _OPTIONS = (
     ("grpc.http2.min_recv_ping_interval_without_data_ms", 10_000),
 )
 
+_SUBMISSION_BYTES = 4096
+"""What a job's submission has beside its request."""
+
 _UNREAD_RESULTS = 8
 """Results of the greatest size that may be on their way to their readers."""
 
@@ -109,7 +112,7 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
     )
     server = grpc.aio.server(
         interceptors=[calls, guard, MalformedRequests(JOB_SERVICE_NAME)],
-        options=[*_OPTIONS, ("grpc.max_receive_message_length", request_limits.request_bytes)],
+        options=[*_OPTIONS, ("grpc.max_receive_message_length", request_limits.request_bytes + _SUBMISSION_BYTES)],
         maximum_concurrent_rpcs=_MAXIMUM_CALLS,
     )
     address = add_port(server, settings.address, settings.security)

@@ -4,7 +4,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Future
 from contextlib import contextmanager
 from dataclasses import replace
@@ -26,7 +26,8 @@ from support.dask_clusters import Cluster, dask_cluster, kill
 from support.fake_tasks import TASK_FUNCTION, fake_task, said
 
 LIMITS = TaskLimits(seconds=60, cpu_seconds=20, memory_bytes=512 * 2**20, result_bytes=10**6)
-KILLED_WITHIN_S = 0.2
+KILLED_WITHIN_S = 1.0
+"""A fifth of that where they have a processor: the server, the scheduler and the worker have a part in it."""
 
 
 class Running:
@@ -128,12 +129,16 @@ class TestTasks:
 
     @pytest.mark.real_time
     @pytest.mark.parametrize("text", ["stuck", "stop", "sleep 600"])
-    def test_a_cancelled_task_is_gone_in_time(self, running: Running, text: str) -> None:
+    def test_a_cancelled_task_is_gone_in_time(
+        self, running: Running, text: str, record_property: Callable[[str, object], None]
+    ) -> None:
         future, pid = running.begun(text)
         begin = time.monotonic()
         future.cancel()
         assert eventually(lambda: not is_running(pid))
-        assert time.monotonic() - begin < KILLED_WITHIN_S
+        taken_s = time.monotonic() - begin
+        record_property(f"a cancelled task on Dask ({text}) was gone after", f"{taken_s * 1e3:.0f} ms")
+        assert taken_s < KILLED_WITHIN_S
         with pytest.raises(CancelledError):
             future.result(60)
 

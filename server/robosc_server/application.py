@@ -55,7 +55,7 @@ _OPTIONS = (
     # Who has gone without a word is found out, so that nobody works for it.
     ("grpc.keepalive_time_ms", 30_000),
     ("grpc.keepalive_timeout_ms", 10_000),
-    ("grpc.http2.min_recv_ping_interval_without_data_ms", 10_000),
+    ("grpc.http2.min_ping_interval_without_data_ms", 10_000),
 )
 
 _SUBMISSION_BYTES = 4096

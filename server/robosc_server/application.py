@@ -33,10 +33,10 @@ from robosc_server.operations.metrics import Metrics, MetricsEndpoint, check_met
 from robosc_server.operations.observed import ObservedWorkers
 from robosc_server.operations.quotas import Quotas
 from robosc_server.operations.settings import Settings
-from robosc_server.operations.tracing import open_tracing
+from robosc_server.operations.tracing import TracingError, open_tracing
 from robosc_server.outgoing import Outgoing
 from robosc_server.signing import SigningError, read_signing_key, signed
-from robosc_server.store import StoreError, open_store
+from robosc_server.store import StoreError, StoreUnavailableError, open_store
 from robosc_server.synthesis_service import METHODS, SERVICE_NAME, SynthesisService
 from robosc_server.tasks.describe import server_limits, targets_response, version_response
 from robosc_server.tasks.requests import RequestLimits, accepted
@@ -49,12 +49,17 @@ _RULE = Rule(frozenset({Scope.SYNTHESIZE}))
 _IDLE_METHODS = frozenset({f"/{JOB_SERVICE_NAME}/WatchJob", "/grpc.health.v1.Health/Watch"})
 """Calls that a server which ends need not wait for."""
 
+KEEPALIVE = (
+    ("grpc.keepalive_time_ms", 30_000),
+    ("grpc.keepalive_timeout_ms", 10_000),
+    # How long an answer to a ping is awaited goes by this one; a minute unless it is set.
+    ("grpc.http2.ping_timeout_ms", 10_000),
+)
+"""Who has gone without a word is found out, so that nobody works for it."""
+
 _OPTIONS = (
     # Without this two servers could share a port and each get some of the requests.
     ("grpc.so_reuseport", 0),
-    # Who has gone without a word is found out, so that nobody works for it.
-    ("grpc.keepalive_time_ms", 30_000),
-    ("grpc.keepalive_timeout_ms", 10_000),
     ("grpc.http2.min_ping_interval_without_data_ms", 10_000),
 )
 
@@ -86,7 +91,7 @@ async def running_server(settings: Settings, workers: Workers | None = None) -> 
     try:
         async with AsyncExitStack() as stack:
             yield await _start(settings, workers, stack)
-    except (SecurityError, SigningError, StoreError, WorkersError) as error:
+    except (SecurityError, SigningError, StoreError, StoreUnavailableError, TracingError, WorkersError) as error:
         raise StartError(str(error)) from error
 
 
@@ -112,7 +117,11 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
     )
     server = grpc.aio.server(
         interceptors=[calls, guard, MalformedRequests(JOB_SERVICE_NAME)],
-        options=[*_OPTIONS, ("grpc.max_receive_message_length", request_limits.request_bytes + _SUBMISSION_BYTES)],
+        options=[
+            *_OPTIONS,
+            *KEEPALIVE,
+            ("grpc.max_receive_message_length", request_limits.request_bytes + _SUBMISSION_BYTES),
+        ],
         maximum_concurrent_rpcs=_MAXIMUM_CALLS,
     )
     address = add_port(server, settings.address, settings.security)

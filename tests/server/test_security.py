@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -224,6 +225,22 @@ class TestTokens:
             request = reflection_pb2.ServerReflectionRequest(list_services="")
             with pytest.raises(grpc.RpcError) as caught:
                 list(stub.ServerReflectionInfo(iter([request]), timeout=PATIENCE_S))
+            assert caught.value.code() is grpc.StatusCode.UNAUTHENTICATED
+
+    def test_who_has_none_is_refused_before_a_request_has_come(self, tmp_path: Path) -> None:
+        _, tokens = token_in(tmp_path, Scope.SYNTHESIZE)
+        with serving(ServerSecurity(tokens=tokens)) as address, grpc.insecure_channel(address) as channel:
+            call: Any = channel.stream_stream("/robosc_api.v1.SynthesisService/Check")
+            silence = threading.Event()
+
+            def requests() -> Iterator[bytes]:
+                silence.wait(PATIENCE_S)
+                yield b""
+
+            responses = call(requests(), timeout=PATIENCE_S)
+            with pytest.raises(grpc.RpcError) as caught:
+                next(responses)
+            silence.set()
             assert caught.value.code() is grpc.StatusCode.UNAUTHENTICATED
 
     def test_two_tokens_are_none(self, tmp_path: Path) -> None:

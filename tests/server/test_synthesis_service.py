@@ -1,10 +1,10 @@
 """The synthesis service over real sockets, with tasks that behave as their text says."""
 
-import signal
 import socket
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from typing import Any
 
@@ -18,10 +18,11 @@ from grpc_status import rpc_status
 from robosc import __version__
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_api.v1 import synthesis_pb2_grpc
+from robosc_server import application
 from robosc_server.application import StartError
 from robosc_server.main import main
 from support.fake_tasks import TASK_FUNCTION as FAKE
-from support.service import PATIENCE_S, eventually, is_running, served, server_process
+from support.service import PATIENCE_S, eventually, is_running, served
 
 STUB: Any = synthesis_pb2_grpc.SynthesisServiceStub
 
@@ -240,19 +241,83 @@ class TestEnding:
                 assert check(fake, f"echo {len(content)}") == str(len(content))
 
 
-class TestStopping:
-    def test_a_call_under_way_is_finished_first(self) -> None:
-        with server_process("--drain-seconds", "30") as (process, address), grpc.insecure_channel(address) as channel:
-            call = STUB(channel).Check.future(pb.CheckRequest(bundle=bundle("robot R { component C { } }")))
-            call.result(timeout=PATIENCE_S)
-            process.send_signal(signal.SIGTERM)
-            assert process.wait(PATIENCE_S) == 0
+@contextmanager
+def line_that_dies(address: str) -> Iterator[tuple[str, threading.Event]]:
+    """A line to a server that carries nothing any more, and tells nobody, once the event is set; its address."""
+    host, _, port = address.rpartition(":")
+    is_dead = threading.Event()
+    with socket.create_server(("127.0.0.1", 0)) as listener:
 
-    def test_new_calls_are_refused_while_it_ends(self) -> None:
-        pids: list[int] = []
-        with served(FAKE, worker_processes=2) as address, grpc.insecure_channel(address) as channel:
-            pids.append(stuck(channel)[1])
-        assert eventually(lambda: not any(map(is_running, pids)))
+        def carry(source: socket.socket, target: socket.socket) -> None:
+            with suppress(OSError):
+                while data := source.recv(65536):
+                    if not is_dead.is_set():
+                        target.sendall(data)
+
+        def serve() -> None:
+            with suppress(OSError):
+                near, _ = listener.accept()
+                far = socket.create_connection((host, int(port)))
+                ends.extend((near, far))
+                for pair in ((near, far), (far, near)):
+                    threading.Thread(target=carry, args=pair, daemon=True).start()
+
+        ends: list[socket.socket] = []
+        threading.Thread(target=serve, daemon=True).start()
+        try:
+            yield f"127.0.0.1:{listener.getsockname()[1]}", is_dead
+        finally:
+            for end in ends:
+                end.close()
+
+
+class TestLostCallers:
+    def test_the_work_of_a_caller_whose_line_has_died_is_ended(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        quick = (("grpc.keepalive_time_ms", 300), ("grpc.http2.ping_timeout_ms", 300))
+        monkeypatch.setattr(application, "KEEPALIVE", quick)
+        with (
+            served(FAKE) as address,
+            line_that_dies(address) as (line, is_dead),
+            grpc.insecure_channel(line) as channel,
+        ):
+            _, pid = stuck(channel)
+            is_dead.set()
+            # No end of the connection was told to the server: it asks for a sign of life, and gets none.
+            assert eventually(partial(has_ended, pid))
+
+
+class TestStopping:
+    def test_a_call_under_way_is_finished_and_new_ones_are_refused(self) -> None:
+        with ExitStack() as server:
+            address = server.enter_context(served(FAKE, worker_processes=2, drain_seconds=PATIENCE_S))
+            channel: Any = server.enter_context(grpc.insecure_channel(address))
+            begun = STUB(channel).Synthesize(pb.SynthesizeRequest(bundle=bundle("pid\nsleep 2\necho done")))
+            next(begun)
+            ending = threading.Thread(target=server.pop_all().close)
+            # The channel is closed first: this one is another.
+            with grpc.insecure_channel(address) as other:
+                call = STUB(other).Synthesize(pb.SynthesizeRequest(bundle=bundle("pid\nsleep 3\necho done too")))
+                next(call)
+                ending.start()
+                refused: list[str] = []
+
+                def is_refused() -> bool:
+                    try:
+                        check(other, f"echo {len(refused)}")
+                    except grpc.RpcError as error:
+                        refused.append(str(error.code().name))
+                    return bool(refused)
+
+                assert eventually(is_refused)
+                assert refused == ["UNAVAILABLE"]
+                assert [response.result.reason for response in call] == ["done too"]
+            ending.join(PATIENCE_S)
+            assert not ending.is_alive()
+
+    def test_what_never_ends_is_ended(self) -> None:
+        with served(FAKE) as address, grpc.insecure_channel(address) as channel:
+            _, pid = stuck(channel)
+        assert eventually(partial(has_ended, pid))
 
 
 class TestStart:

@@ -17,6 +17,7 @@ from robosc_api.streams import write_responses
 _log = logging.getLogger(__name__)
 
 _HEALTH = "/grpc.health.v1.Health/"
+_NO_TOKEN = grpc.StatusCode.UNAUTHENTICATED, "a valid token is needed"
 _SCHEME = "bearer "
 
 
@@ -58,10 +59,23 @@ class Guard(grpc.aio.ServerInterceptor):
         method: str = handler_call_details.method
         if handler is None or method.startswith(_HEALTH):
             return handler
+        if self._tokens is not None and self._entry(self._tokens, handler_call_details.invocation_metadata) is None:
+            # Whoever shows none is told so at once: a handler of single requests would wait for one that never comes,
+            # and hold one of the calls that a server can have.
+            return grpc.stream_stream_rpc_method_handler(self._refuse(method))
         made = self._made.get(method)
         if made is None or made[0] is not handler:
             made = self._made[method] = handler, self._behind(handler, method)
         return made[1]
+
+    def _refuse(self, method: str) -> Any:
+        async def refuse(requests: Any, context: Any) -> None:
+            refusal = self._refusal(Rule(), method, context.invocation_metadata(), context.peer())
+            # One that has become valid in between is shown again.
+            code, message = refusal or _NO_TOKEN
+            await context.abort(code, message, failure_metadata(code, message, code.name, context=context))
+
+        return refuse
 
     def _behind(self, handler: Any, method: str) -> Any:
         """A handler that does nothing before the caller is admitted."""
@@ -97,7 +111,7 @@ class Guard(grpc.aio.ServerInterceptor):
         entry = self._entry(self._tokens, metadata)
         if entry is None:
             _log.warning("%s: no valid token for %s", peer, method)
-            return grpc.StatusCode.UNAUTHENTICATED, "a valid token is needed"
+            return _NO_TOKEN
         if rule.scopes and not rule.scopes & entry.scopes:
             _log.warning("%s: the token '%s' is not for %s", peer, entry.name, method)
             wanted = " or ".join(f"'{scope}'" for scope in sorted(rule.scopes))

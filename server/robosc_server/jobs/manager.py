@@ -157,11 +157,10 @@ class JobManager:
         try:
             place = self._scheduler.enter(caller.name)
         except RefusedError:
-            # Whoever asks again because the answer was lost needs no other place.
-            there = await self._store.find_by_key(caller.name, idempotency_key) if idempotency_key else None
+            there = await self.submitted(task, caller, idempotency_key) if idempotency_key else None
             if there is None:
                 raise
-            return self._current(_same_task(there, task)), True
+            return there, True
         kept_s = self._limits.retention_s if retention_s is None else min(retention_s, self._limits.retention_s)
         record = JobRecord(
             id=_new_id(),
@@ -183,6 +182,15 @@ class JobManager:
         accepting = self._spawn(self._accept(carried, task))
         accepted, existed = await asyncio.shield(accepting)
         return self._current(_same_task(accepted, task) if existed else accepted), existed
+
+    async def submitted(self, task: Task, caller: Caller, idempotency_key: str) -> JobRecord | None:
+        """The job that was submitted with a key, if there is one.
+
+        Raises:
+            RefusedError: The key was used for another task.
+        """
+        there = await self._store.find_by_key(caller.name, idempotency_key)
+        return None if there is None else self._current(_same_task(there, task))
 
     async def get(self, job_id: str, caller: Caller) -> JobRecord:
         """A job of the caller.

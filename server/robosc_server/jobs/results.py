@@ -15,6 +15,8 @@ _log = logging.getLogger(__name__)
 
 _OVERHEAD_BYTES = 500
 _UNWRITTEN_BYTES = 128 * 2**20
+_AT_ONCE = 100
+_AT_ONCE_BYTES = 4 * 2**20
 _TOUCHED = 10_000
 _TOUCH_S = 30.0
 
@@ -43,6 +45,7 @@ class Results:
         self._unwritten: OrderedDict[str, tuple[TaskKind, Result]] = OrderedDict()
         self._unwritten_bytes = 0
         self._has_unwritten = asyncio.Event()
+        self._writes_singly = False
         self._touched: set[str] = set()
         self._tasks: list[asyncio.Task[None]] = []
         self.hits = 0
@@ -62,7 +65,7 @@ class Results:
         # A last try: what was made shortly before the end is there after the next start.
         with contextlib.suppress(StoreUnavailableError):
             while self._unwritten:
-                await self._write_one()
+                await self._write_some()
 
     def at_hand(self, key: str) -> Result | None:
         """A result that is in memory."""
@@ -135,32 +138,51 @@ class Results:
             self._touched.add(key)
 
     async def _write(self) -> None:
-        """Write what is kept, one after the other."""
+        """Write what is kept, in its order."""
         while True:
             await self._has_unwritten.wait()
             try:
-                await self._write_one()
+                await self._write_some()
             except StoreUnavailableError as error:
                 await asyncio.sleep(error.retry_after_s or 1.0)
             except Exception:
                 _log.exception("a result cannot be kept")
                 await asyncio.sleep(1.0)
 
-    async def _write_one(self) -> None:
-        key, (kind, result) = next(iter(self._unwritten.items()))
+    async def _write_some(self) -> None:
+        """Write what waits, many in one transaction; after one that failed, a single one."""
+        some = self._next_ones()
         try:
-            await self._store.keep_result(key, kind, result)
+            await self._store.keep_results([(key, *self._unwritten[key]) for key in some])
         except StoreUnavailableError:
-            # Another one has its turn first: this one may be what does not fit.
-            self._unwritten.move_to_end(key)
+            # Others have their turn first: one of these may be what does not fit.
+            self._writes_singly = True
+            for key in some:
+                self._unwritten.move_to_end(key)
             raise
         except Exception:
-            self._forget(key, result)
-            raise
-        self._forget(key, result)
+            if len(some) == 1:
+                self._forget(some[0])
+                raise
+            self._writes_singly = True
+            return
+        self._writes_singly = False
+        for key in some:
+            self._forget(key)
 
-    def _forget(self, key: str, result: Result) -> None:
-        del self._unwritten[key]
+    def _next_ones(self) -> list[str]:
+        """Keys of what is written next."""
+        found: list[str] = []
+        size = 0
+        for key, (_, result) in self._unwritten.items():
+            size += _size_of(result)
+            if found and (self._writes_singly or len(found) >= _AT_ONCE or size > _AT_ONCE_BYTES):
+                break
+            found.append(key)
+        return found
+
+    def _forget(self, key: str) -> None:
+        _, result = self._unwritten.pop(key)
         self._unwritten_bytes -= _size_of(result)
         if not self._unwritten:
             self._has_unwritten.clear()

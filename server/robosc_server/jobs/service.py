@@ -56,6 +56,9 @@ class JobService(convert.JobServiceServicer):
         label, retention_s = convert.checked_label(request.label), convert.retention_s_of(request)
         task = self._accept(*convert.kind_and_request(request.task))
         caller = self._identify(context)
+        # Whoever asks again because the answer was lost asks for nothing new, and is refused nothing.
+        if idempotency_key and (there := await self._manager.submitted(task, caller, idempotency_key)):
+            return pb.SubmitJobResponse(job=self._job(there), existed=True)
         self._admit(caller.name)
         record, existed = await self._manager.submit(
             task, caller, idempotency_key=idempotency_key, label=label, retention_s=retention_s

@@ -445,7 +445,6 @@ def words_of(name: str) -> str:
 _EPILOG = f"""\
 commands:
   robosc-server token NAME       make a token for a caller
-  robosc-server health           ask the server that such settings have started how it is
   robosc-server check-config     look whether the server could start with such settings
   robosc-server example-config   print a file with every setting and its default
   robosc-server health           ask the server that such settings have started how it is

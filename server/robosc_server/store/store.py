@@ -4,7 +4,7 @@ Every call raises StoreUnavailableError where the database is away, full or too 
 """
 
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 
 from sqlalchemy import Connection
@@ -172,10 +172,17 @@ class Store:
         now_us = self.now_us()
         return await self._database.write(lambda connection: replica_rows.adopt(connection, replica, dead, now_us))
 
-    async def keep_result(self, key: str, kind: TaskKind, result: Result) -> None:
-        """Keep a result, unless there is one of that key."""
+    async def keep_results(self, results: Sequence[tuple[str, TaskKind, Result]]) -> None:
+        """Keep results by their keys, but for those whose keys are there; all or none."""
         now_us = self.now_us()
-        await self._database.write(lambda connection: result_rows.insert_result(connection, key, kind, result, now_us))
+        # The same order in each server: none waits for one that waits for it.
+        ordered = sorted(results, key=lambda item: item[0])
+
+        def insert(connection: Connection) -> None:
+            for key, kind, result in ordered:
+                result_rows.insert_result(connection, key, kind, result, now_us)
+
+        await self._database.write(insert)
 
     async def find_result(self, key: str) -> tuple[TaskKind, Result] | None:
         """A whole result, and what its task was."""

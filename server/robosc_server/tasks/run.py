@@ -18,6 +18,7 @@ from robosc.model import check
 from robosc.supervisor import Supervisor, encode
 from robosc.supervisor.conditions import state_predicates
 from robosc.synthesis import UnknownEngineError
+from robosc.synthesis.engines import keep_ready, resolve_engine
 from robosc.targets import GeneratedFiles, UnknownTargetError, generated, require_generatable
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.tasks.attempt import Attempt, OnReport
@@ -75,6 +76,7 @@ def rehearse() -> None:
     file = pb.SourceFile(name="rehearsal.rscd", text=_REHEARSAL)
     request = pb.SynthesizeRequest(bundle=pb.Bundle(main=file))
     run_task(TaskKind.SYNTHESIZE, request.SerializeToString(), TaskLimits(), lambda report: None)
+    keep_ready(resolve_engine("auto"))
 
 
 def _places(error: BaseException) -> str:

@@ -23,6 +23,9 @@ from robosc_server.workers.frames import (
 
 type TaskFunction = Callable[[TaskKind, bytes, TaskLimits, Callable[[Report], None]], Outcome]
 
+_COLLECT_EVERY = 20_000
+"""New objects of Python after which those that refer to each other in circles are looked for."""
+
 OUT_OF_MEMORY = "the work took more memory than a task may have"
 
 
@@ -50,6 +53,8 @@ def _answer(
 ) -> None:
     confinement.confine(limits)
     gc.enable()
+    # A process that does one task and ends has little to collect, and its parts of the diagrams are not Python's.
+    gc.set_threshold(_COLLECT_EVERY)
     try:
         outcome = function(kind, request, limits, lambda report: connection.sendall(report_frame(report)))
     except ConnectionError:

@@ -68,3 +68,14 @@ def test_an_engine_of_another_package_that_cannot_be_loaded(monkeypatch: pytest.
     offer(monkeypatch, value)
     with pytest.raises(UnknownEngineError, match=f"'foreign' cannot be loaded from {value}"):
         synthesize(EMPTY, engine="foreign")
+
+
+@pytest.mark.parametrize("name", ["cudd", "autoref"])
+def test_a_manager_that_is_kept_ready_is_used_once(name: str) -> None:
+    if name == "cudd":
+        pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+    module.keep_ready(name)
+    module.keep_ready(name)
+    ready = module.make_manager(name)
+    assert module.make_manager(name) is not ready
+    assert len(ready) <= 1

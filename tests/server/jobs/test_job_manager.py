@@ -292,7 +292,7 @@ def test_results_that_no_job_needs_go_first_those_that_were_not_asked_for_longes
             for task in tasks[1:]:
                 choices.times.wall_s += 1.0
                 outcome = await made.workers.run(task, None, None)  # type: ignore[arg-type]
-                await made.store.keep_result(task.key, task.kind, outcome)  # type: ignore[arg-type]
+                await made.store.keep_results([(task.key, task.kind, outcome)])  # type: ignore[list-item]
             choices.times.wall_s += 1.0
             await made.store.touch([tasks[1].key])
             await made.manager.sweep()

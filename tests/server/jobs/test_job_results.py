@@ -1,6 +1,7 @@
 """What was worked out before: in memory, in the database, and without the database."""
 
 import asyncio
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -65,7 +66,7 @@ def test_without_the_database_it_goes_on_and_writes_when_it_is_back(
     async def test() -> None:
         store = open_store(tmp_path)
         tried = asyncio.Event()
-        keep = store.keep_result
+        keep = store.keep_results
 
         async def away(*_: object) -> None:
             tried.set()
@@ -74,14 +75,14 @@ def test_without_the_database_it_goes_on_and_writes_when_it_is_back(
             raise error
 
         async with Results(store, 0) as results:
-            monkeypatch.setattr(store, "keep_result", away)
+            monkeypatch.setattr(store, "keep_results", away)
             monkeypatch.setattr(store, "find_result", away)
             results.keep("k", _KIND, Result((b"a",)))
             await tried.wait()
             assert await results.find("other") is None
             assert await results.find("k") == Result((b"a",))
             monkeypatch.undo()
-            assert store.keep_result == keep
+            assert store.keep_results == keep
             await until(lambda: is_written(store, "k"))
         store.close()
 
@@ -96,6 +97,31 @@ def test_what_was_kept_shortly_before_the_end_is_there_after_it(tmp_path: Path) 
                 results.keep(str(number), _KIND, Result((bytes(number),)))
         for number in range(20):
             assert await store.find_result(str(number)) == (_KIND, Result((bytes(number),)))
+        store.close()
+
+    in_loop(test)
+
+
+def test_one_that_cannot_be_written_takes_no_other_with_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def test() -> None:
+        store = open_store(tmp_path)
+        keep = store.keep_results
+        sizes: list[int] = []
+
+        async def choosy(results: Sequence[tuple[str, TaskKind, Result]]) -> None:
+            sizes.append(len(results))
+            if any(key == "bad" for key, _, _ in results):
+                raise ValueError("cannot be written")
+            await keep(results)
+
+        monkeypatch.setattr(store, "keep_results", choosy)
+        async with Results(store, 0) as results:
+            for key in ("a", "bad", "c", "d"):
+                results.keep(key, _KIND, Result((key.encode(),)))
+            await until(lambda: is_written(store, "d"))
+            assert [await is_written(store, key) for key in ("a", "bad", "c")] == [True, False, True]
+            assert max(sizes) > 1
+            assert results.unwritten("bad") is None
         store.close()
 
     in_loop(test)

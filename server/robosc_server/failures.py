@@ -8,6 +8,9 @@ from robosc_api.failures import failure_metadata
 from robosc_server.operations.logs import tell_fault
 from robosc_server.tasks.task import Failure, Reason
 
+MAXIMUM_MESSAGE_BYTES = 1000
+"""Of a sentence for a caller, in UTF-8; percent-encoded it is up to three times as long."""
+
 _CODES = {
     Reason.MALFORMED_REQUEST: grpc.StatusCode.INVALID_ARGUMENT,
     Reason.REQUEST_TOO_LARGE: grpc.StatusCode.RESOURCE_EXHAUSTED,
@@ -58,8 +61,10 @@ def code_of(reason: Reason) -> grpc.StatusCode:
 async def abort(context: Any, error: RefusedError) -> NoReturn:
     """End a call (of grpc.aio) with what is to be told."""
     code = code_of(error.reason)
-    metadata = failure_metadata(code, error.message, error.reason, error.retry_after_s, context)
-    await context.abort(code, error.message, metadata)
+    # It goes twice into the metadata, which callers take 8 KiB of; what is too long loses the reason, too.
+    message = error.message.encode("utf-8", "replace")[:MAXIMUM_MESSAGE_BYTES].decode("utf-8", "ignore")
+    metadata = failure_metadata(code, message, error.reason, error.retry_after_s, context)
+    await context.abort(code, message, metadata)
     raise AssertionError("unreachable: abort raises")
 
 

@@ -45,15 +45,25 @@ class Outgoing:
         Raises:
             RefusedError: Too much that was sent before is not read yet.
         """
-        self._count(context, sum(map(len, messages)))
-        for message in messages:
-            await context.write(message)
+        self.hold(context, messages)
+        await self.send_held(context, messages)
 
     async def send_one(self, context: Any, message: bytes) -> None:
         """Send one of the messages of a result; see `send`."""
         await self.send(context, (message,))
 
-    def _count(self, context: Any, size: int) -> None:
+    async def send_held(self, context: Any, messages: tuple[bytes, ...]) -> None:
+        """Send what is counted already."""
+        for message in messages:
+            await context.write(message)
+
+    def hold(self, context: Any, messages: tuple[bytes, ...]) -> None:
+        """Count a result that is there, and may have to wait before it can be sent.
+
+        Raises:
+            RefusedError: As `send`.
+        """
+        size = sum(map(len, messages))
         if size <= SMALL_BYTES:
             return
         caller = caller_of(context)

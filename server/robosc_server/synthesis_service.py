@@ -98,7 +98,11 @@ class SynthesisService:
             if result is None:
                 async with _Progress(context) as progress:
                     result = await self._desk.result(task, caller_of(context), progress.tell)
-            await self._outgoing.send(context, result.messages)
+                    # Now: a caller that does not read its reports has the result wait.
+                    self._outgoing.hold(context, result.messages)
+                await self._outgoing.send_held(context, result.messages)
+            else:
+                await self._outgoing.send(context, result.messages)
 
         return answer
 

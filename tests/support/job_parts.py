@@ -23,6 +23,8 @@ from robosc_server.jobs import (
     caller_of,
 )
 from robosc_server.jobs.service import Context
+from robosc_server.operations.interceptor import CallInterceptor
+from robosc_server.operations.metrics import Metrics
 from robosc_server.store import JobRecord, JobState, Store, open_store
 from robosc_server.tasks.task import TaskLimits
 from support.job_workers import ScriptedWorkers, accepted
@@ -91,7 +93,7 @@ async def parts(folder: Path, choices: Choices | None = None) -> AsyncIterator[P
 @asynccontextmanager
 async def offered(manager: JobManager, identify: Callable[[Context], Caller] = caller_of) -> AsyncIterator[Any]:
     """The jobs' service over gRPC; yields a stub."""
-    server = grpc.aio.server()
+    server = grpc.aio.server(interceptors=[CallInterceptor(Metrics("of a test"))])
     add_job_service(JobService(manager, accepted, identify), server)
     port = server.add_insecure_port("127.0.0.1:0")
     await server.start()

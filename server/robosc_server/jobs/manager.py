@@ -236,6 +236,8 @@ class JobManager:
                 if self._has_left:
                     raise RefusedError(Reason.SHUTTING_DOWN, _LEFT, retry_after_s=1.0)
                 record = await watch.news()
+                if record is None and watch.is_gone:
+                    raise _no_such_job()
 
     async def cancel(self, job_id: str, caller: Caller) -> JobRecord:
         """End a job, wherever it is; one that has ended stays as it is.
@@ -525,8 +527,12 @@ class JobManager:
             job_id: revision for job_id, revision in self._watchers.revisions().items() if job_id not in self._carried
         }
         if watched:
-            for record in await self._store.find_changed(watched):
+            changed, forgotten = await self._store.find_changed(watched)
+            for record in changed:
                 self._watchers.tell(record)
+            for job_id in forgotten:
+                # It has ended and was forgotten between two looks: who watches is told that there is none.
+                self._watchers.tell_gone(job_id)
 
     async def _start_again(self) -> None:
         """We were taken for dead: our jobs are another's now."""
@@ -542,7 +548,8 @@ class JobManager:
         gone = [carried for job_id in known - active if (carried := self._carried.get(job_id)) is not None]
         if gone:
             await self._stop_carrying(gone)
-            for record in await self._store.find_changed({carried.record.id: -1 for carried in gone}):
+            changed, _ = await self._store.find_changed({carried.record.id: -1 for carried in gone})
+            for record in changed:
                 self._watchers.tell(record)
         if active - before:
             records = await self._store.active_of(self._replica)

@@ -12,12 +12,14 @@ class Watch:
 
     Attributes:
         revision: The one that it knows; set by whoever uses it.
+        is_gone: Whether the job is there no more.
     """
 
-    __slots__ = ("_news", "_record", "revision")
+    __slots__ = ("_news", "_record", "is_gone", "revision")
 
     def __init__(self) -> None:
         self.revision = 0
+        self.is_gone = False
         self._record: JobRecord | None = None
         self._news = asyncio.Event()
 
@@ -62,6 +64,12 @@ class Watchers:
         """Tell all watchers of a job how it is now."""
         for watch in self._by_job.get(record.id, ()):
             watch.tell(record)
+
+    def tell_gone(self, job_id: str) -> None:
+        """Tell all watchers of a job that it is there no more."""
+        for watch in self._by_job.get(job_id, ()):
+            watch.is_gone = True
+            watch.wake()
 
     def wake(self) -> None:
         """Have everybody look up."""

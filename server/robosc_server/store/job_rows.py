@@ -96,17 +96,20 @@ def find_by_key(connection: Connection, owner: str, idempotency_key: str, now_us
     return None if row is None else record_of(row)
 
 
-def find_many(connection: Connection, revisions: dict[str, int]) -> list[JobRecord]:
-    """Those of some jobs that have changed since the revisions given."""
+def find_many(connection: Connection, revisions: dict[str, int]) -> tuple[list[JobRecord], set[str]]:
+    """Those of some jobs that have changed since the revisions given, and the ids of those that are there no more."""
     ids = list(revisions)
+    gone = set(ids)
     found: list[JobRecord] = []
     for place in range(0, len(ids), 500):
         part = ids[place : place + 500]
         known = select(JOBS.c.id, JOBS.c.revision).where(JOBS.c.id.in_(part))
-        changed = [row.id for row in connection.execute(known) if row.revision > revisions[row.id]]
+        rows = connection.execute(known).all()
+        gone -= {row.id for row in rows}
+        changed = [row.id for row in rows if row.revision > revisions[row.id]]
         if changed:
             found += map(record_of, connection.execute(select(JOBS).where(JOBS.c.id.in_(changed))))
-    return found
+    return found, gone
 
 
 def listed(

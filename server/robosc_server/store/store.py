@@ -82,8 +82,8 @@ class Store:
             lambda connection: job_rows.find_by_key(connection, owner, idempotency_key, now_us)
         )
 
-    async def find_changed(self, revisions: Mapping[str, int]) -> list[JobRecord]:
-        """Those of some jobs that have greater revisions than those given."""
+    async def find_changed(self, revisions: Mapping[str, int]) -> tuple[list[JobRecord], set[str]]:
+        """Those of some jobs that have greater revisions than those given, and the ids of those that are gone."""
         known = dict(revisions)
         return await self._database.read(lambda connection: job_rows.find_many(connection, known))
 

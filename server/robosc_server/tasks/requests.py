@@ -9,7 +9,8 @@ import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import entry_points
+from importlib.metadata import entry_points, version
+from importlib.util import find_spec
 from typing import Any
 
 from google.protobuf.message import DecodeError
@@ -83,10 +84,12 @@ def accepted(kind: TaskKind, request: bytes, limits: RequestLimits) -> Task:
 
 @cache
 def _makers() -> tuple[str, ...]:
-    """What makes results, by version: this distribution, and those whose targets and engines it uses."""
+    """What makes results, by version: this distribution, the diagrams, and those whose targets and engines it uses."""
+    # Without dd's extension the engine `auto` is another one.
+    diagrams = f"dd {version('dd')} {'with' if find_spec('dd.cudd') else 'without'} cudd"
     dists = [point.dist for group in _PLUGINS for point in entry_points(group=group)]
     others = {f"{dist.name} {dist.version}" for dist in dists if dist is not None and dist.name != "robosc"}
-    return (__version__, *sorted(others))
+    return (__version__, diagrams, *sorted(others))
 
 
 class _Look:

@@ -151,6 +151,8 @@ class AnswerReader:
                 self._messages.append(payload)
                 return None
             case Tag.RESULT:
+                if not self._messages:
+                    raise FrameError("a result without a message")
                 return Result(tuple(self._messages))
             case Tag.REPORT:
                 values = _values(payload)

@@ -24,6 +24,7 @@ START_S = 60.0
 
 _PAUSES_S = (0.0, 0.0, 0.2, 1.0, 5.0)
 _HOPELESS = 3
+_DESCRIPTORS = 3
 _DEAD_SPARE_PAUSE_S = 0.2
 _SECRETS = "ROBOSC_SERVER_"
 
@@ -209,7 +210,7 @@ class Supply:
     def _hear(self, line: socket.socket) -> bool:
         """Take one packet of the template's; whether there was one."""
         try:
-            packet, descriptors, _, _ = socket.recv_fds(line, PACKET_BYTES, 3, socket.MSG_CMSG_CLOEXEC)
+            packet, descriptors, _, _ = socket.recv_fds(line, PACKET_BYTES, _DESCRIPTORS, socket.MSG_CMSG_CLOEXEC)
         except BlockingIOError:
             return False
         except OSError:
@@ -219,6 +220,14 @@ class Supply:
             return False
         told = json.loads(packet)
         match told["is"]:
+            case "worker" if len(descriptors) < _DESCRIPTORS:
+                # The system had none to spare. A worker whose line nobody holds ends by itself; another one is asked
+                # for when there may be room.
+                for number in descriptors:
+                    os.close(number)
+                self.fault = "this process may have no more files open"
+                _LOG.error("%s; no worker can be had", self.fault)
+                asyncio.get_running_loop().call_later(_DEAD_SPARE_PAUSE_S, self._ask_for, 1)
             case "worker":
                 connection, descriptor, last_words = descriptors
                 worker = WorkerProcess(told["pid"], socket.socket(fileno=connection), descriptor, last_words)
@@ -235,7 +244,9 @@ class Supply:
         return True
 
     def _note_end(self, pid: int, ending: Ending) -> None:
-        worker = self._known.pop(pid)
+        worker = self._known.pop(pid, None)
+        if worker is None:  # It never got here: see `_hear`.
+            return
         worker.ending.set_result(ending)
         if worker in self._ready:
             self._ready.remove(worker)

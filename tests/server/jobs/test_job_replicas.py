@@ -95,6 +95,31 @@ def test_a_job_is_cancelled_at_another_server_and_its_worker_stopped(database_ur
     in_loop(test)
 
 
+def test_who_watches_a_job_that_is_forgotten_elsewhere_is_told(database_url: str) -> None:
+    async def test() -> None:
+        times = Times()
+        by_hand = JobLimits(look_s=3600.0, sweep_s=3600.0)
+        async with (
+            parts(Path("unused"), Choices(database_url, by_hand, times=times)) as ours,
+            parts(Path("unused"), Choices(database_url, by_hand, times=times)) as theirs,
+        ):
+            job, _ = await ours.manager.submit(task_of(_NEVER), ME, retention_s=0.0)
+            watch = theirs.manager.watch(job.id, ME, 0)
+            await anext(watch)
+            following = asyncio.create_task(anext(watch))
+            await asyncio.sleep(0)
+            await ours.manager.cancel(job.id, ME)
+            times.wall_s += 1.0
+            await ours.manager.sweep()
+            await theirs.manager.look()
+            with pytest.raises(RefusedError, match="no job of that id"):
+                while True:
+                    await following
+                    following = asyncio.create_task(anext(watch))
+
+    in_loop(test)
+
+
 def test_jobs_of_a_server_that_falls_silent_are_adopted_after_its_lease_and_run_once_more(
     database_url: str, tmp_path: Path
 ) -> None:

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -12,6 +13,7 @@ from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import CancelledError, Future
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -181,6 +183,25 @@ class TestDeaths:
                 os.kill(pid, signal.SIGKILL)
         assert eventually(lambda: not any(map(is_running, pids)))
         assert said(running.run("echo again")) == "again"
+
+    def test_where_no_more_files_may_be_open_there_are_workers_again_when_they_may(
+        self, running: Running, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        receive = socket.recv_fds
+        lost: list[int] = []
+
+        def without_files(*arguments: Any) -> Any:
+            packet, descriptors, flags, address = receive(*arguments)
+            if descriptors and len(lost) < 3:
+                lost.append(len(descriptors))
+                for number in descriptors:
+                    os.close(number)
+                return packet, [], flags, address
+            return packet, descriptors, flags, address
+
+        monkeypatch.setattr(socket, "recv_fds", without_files)
+        assert [said(running.run(f"echo {number}")) for number in range(8)] == [str(number) for number in range(8)]
+        assert lost == [3, 3, 3]
 
     def test_a_task_whose_template_dies_is_begun_again_once(self, running: Running) -> None:
         restarts = running.local.restarts

@@ -45,12 +45,19 @@ def read(content: bytes, limits: TaskLimits = LIMITS) -> tuple[list[Report], Out
     return reports, None
 
 
-@given(st.lists(st.binary(max_size=100), max_size=10), st.lists(st.tuples(st.text(), st.text()), max_size=5))
+@given(
+    st.lists(st.binary(max_size=100), min_size=1, max_size=10), st.lists(st.tuples(st.text(), st.text()), max_size=5)
+)
 def test_an_answer_is_read_as_it_was_said(messages: list[bytes], texts: list[tuple[str, str]]) -> None:
     reports = [Report(*both) for both in texts]
     said = b"".join(map(report_frame, reports)) + b"".join(frame(Tag.MESSAGE, message) for message in messages)
     assert read(said + frame(Tag.RESULT, b"")) == (reports, Result(tuple(messages)))
     assert read(said) == (reports, None)
+
+
+def test_a_result_of_nothing_is_none() -> None:
+    with pytest.raises(FrameError, match="without a message"):
+        read(frame(Tag.RESULT, b""))
 
 
 @given(st.binary(max_size=200))

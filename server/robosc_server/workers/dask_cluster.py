@@ -29,6 +29,8 @@ LOOK_S = 0.5
 _ATTEMPTS = 2
 _GRACE_S = 30.0
 _CANCEL_S = 1.0
+_END_S = 5.0
+_END_LOOK_S = 0.01
 _EXAMINE_S = 3.0
 _KEPT_REPORTS = 64
 _LOST = "two workers of the cluster were lost while they did this task"
@@ -94,6 +96,7 @@ class DaskWorkers:
         self._watched: dict[str, _Watched] = {}
         self._keeper: asyncio.Task[None] | None = None
         self._has_looked = asyncio.Event()
+        self._is_over = asyncio.Event()
         self.fault = f"the Dask scheduler at {address} was not reached yet"
 
     async def __aenter__(self) -> Self:
@@ -108,6 +111,12 @@ class DaskWorkers:
             self._keeper.cancel()
             await asyncio.gather(self._keeper, return_exceptions=True)
         self.fault = "the server's workers have ended"
+        # Whoever waits for a task is told, as long as there is a loop to tell it in.
+        self._is_over.set()
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(_END_S):
+                while self._watched:
+                    await asyncio.sleep(_END_LOOK_S)
 
     @property
     def capacity(self) -> int:
@@ -203,7 +212,9 @@ class DaskWorkers:
         """
         worked_at = time.monotonic()
         while True:
-            await asyncio.sleep(LOOK_S)
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(LOOK_S):
+                    await self._is_over.wait()
             now = time.monotonic()
             if self._client is not client:
                 raise WorkersError(f"the Dask scheduler at {self._address} was lost")

@@ -10,6 +10,8 @@ from typing import Any
 import grpc
 import grpc.aio
 
+from robosc_api.streams import write_responses
+
 OWN_END_S = 0.2
 """Time for a call to end by itself, with a last word."""
 
@@ -32,7 +34,11 @@ class EndingCalls(grpc.aio.ServerInterceptor):
         parse, serialize = handler.request_deserializer, handler.response_serializer
         if handler.stream_unary:
             return grpc.stream_unary_rpc_method_handler(self._ending(handler.stream_unary), parse, serialize)
-        return grpc.stream_stream_rpc_method_handler(self._ending(handler.stream_stream), parse, serialize)
+
+        async def answer(requests: Any, context: Any) -> None:
+            await write_responses(handler.stream_stream(requests, context), context)
+
+        return grpc.stream_stream_rpc_method_handler(self._ending(answer), parse, serialize)
 
     def _ending(self, answer: Callable[[Any, Any], Awaitable[Any]]) -> Callable[[Any, Any], Awaitable[Any]]:
         async def ending(requests: Any, context: Any) -> Any:

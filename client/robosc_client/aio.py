@@ -256,9 +256,17 @@ class AsyncClient:
             for job in listing.take(await self._run(listing.operation(), deadline_s)):
                 yield job
 
-    async def job_result(self, job_id: str, *, deadline_s: float | None = None) -> TaskResult:
-        """What a job that has succeeded has found: as the method for its task would have returned it."""
-        return await self._run(operations.job_result(job_id), deadline_s)
+    async def job_result(
+        self, job_id: str, *, kind: TaskKind | None = None, deadline_s: float | None = None
+    ) -> TaskResult:
+        """What a job that has succeeded has found: as the method for its task would have returned it.
+
+        Args:
+            job_id: Its id.
+            kind: What its task is, as `submit` or `get_job` have told: a result of another kind is refused; None: any.
+            deadline_s: See the class.
+        """
+        return await self._run(operations.job_result(job_id, kind), deadline_s)
 
     async def _run[Result](
         self, operation: Operation[Result], deadline_s: float | None, on_progress: OnProgress = ignored

@@ -121,10 +121,10 @@ def cancel_job(job_id: str) -> Operation[Job]:
     return _about_jobs("CancelJob", jobs_pb2.CancelJobRequest(id=job_id), _same(job_id))
 
 
-def job_result(job_id: str) -> Operation[TaskResult]:
-    """What a job has found."""
+def job_result(job_id: str, kind: TaskKind | None) -> Operation[TaskResult]:
+    """What a job has found; of this kind, if it is known."""
     request = jobs_pb2.GetJobResultRequest(id=job_id)
-    return Operation("GetJobResult", request, JobResultAssembly, is_stream=True, is_about_jobs=True)
+    return Operation("GetJobResult", request, lambda: JobResultAssembly(kind), is_stream=True, is_about_jobs=True)
 
 
 def _about_jobs[Message, Result](method: str, request: Any, convert: Callable[[Message], Result]) -> Operation[Result]:

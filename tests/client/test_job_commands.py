@@ -132,7 +132,7 @@ class TestWatch:
 
 class TestGet:
     def answers(self, kind: str, messages: Any) -> Any:
-        found = job(9, SUCCEEDED)
+        found = job(9, SUCCEEDED, kind=getattr(jobs_pb2, f"TASK_KIND_{kind.upper()}"))
         return {"GetJob": [[jobs_pb2.GetJobResponse(job=found)]], "GetJobResult": [enveloped(kind, messages)]}
 
     def test_where_it_is(self, capfd: pytest.CaptureFixture[str]) -> None:
@@ -180,6 +180,17 @@ class TestGet:
             assert (place / "a" / "one.py").stat().st_mode & 0o111
         if kind == "explore":
             assert len(json.loads(place.read_text())["states"]) == 2
+
+    def test_a_result_of_another_kind(self, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+        """Is none of this job: a text must not come where a supervisor is wanted."""
+        answers = self.answers("synthesize", [])
+        answers["GetJobResult"] = [enveloped("format", [pb.FormatResponse(text="robot R { }\n")])]
+        with scripted(**answers) as (address, _):
+            for more in (["-o", tmp_path / "out"], ["--result"], ["--result", "--json"]):
+                status, _, err = run(capfd, "get", "job-1", *more, "--server", address)
+                assert status == 3
+                assert "malformed" in err
+        assert not (tmp_path / "out").exists()
 
     def test_nothing_is_written_outside_of_the_folder(self, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
         """Not through links in the folder either; a link in a file's place is replaced, not followed."""
@@ -244,6 +255,42 @@ class TestSignatures:
             assert err
             assert not place.exists()
             assert not beside.exists()
+
+    @pytest.mark.parametrize(
+        ("kind", "messages"),
+        [
+            ("check", [pb.CheckResponse()]),
+            ("synthesize", [synthesis()]),
+            ("generate", generation()),
+            ("explore", exploration()),
+            ("verify", [verification()]),
+            ("format", [pb.FormatResponse(text="robot R { }\n")]),
+        ],
+    )
+    def test_what_nobody_can_have_signed(
+        self, capfd: pytest.CaptureFixture[str], tmp_path: Path, made: Any, kind: str, messages: Any
+    ) -> None:
+        trusted = ["--signed-by", tmp_path / "right.pub"]
+        with scripted(**TestGet().answers(kind, messages)) as (address, _):
+            for more in (["-o", tmp_path / "out"], ["--result"], ["--result", "--json"]):
+                status, _, err = run(capfd, "get", "job-1", *more, *trusted, "--server", address)
+                assert status == 3
+                assert "no supervisor" in err
+            assert run(capfd, "get", "job-1", *trusted, "--server", address)[0] == 2
+        assert not (tmp_path / "out").exists()
+
+    def test_results_that_are_printed(self, capfd: pytest.CaptureFixture[str], tmp_path: Path, made: Any) -> None:
+        content, signature = made
+        unknown = b"{}"
+        signed = sign(unknown, read_private_key(tmp_path / "right.key"))
+        for answer, status in (
+            (supervisor(content, signature=signature), 0),
+            (supervisor(content), 3),
+            (supervisor(unknown, signature=signed), 3),
+        ):
+            with scripted(**TestGet().answers("synthesize", [answer])) as (address, _):
+                options = ["--result", "--signed-by", tmp_path / "right.pub", "--server", address]
+                assert run(capfd, "get", "job-1", *options)[0] == status
 
 
 class TestListAndCancel:

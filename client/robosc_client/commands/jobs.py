@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from robosc.cli.arguments import add_engine_options, add_model_arguments, read_bundle
-from robosc.cli.output import ExitCode, UsageError, print_diagnostics, print_json, write_bytes
+from robosc.cli.output import CommandError, ExitCode, UsageError, print_diagnostics, print_json, write_bytes
 from robosc.cli.properties import add_arguments as add_property_arguments
 from robosc.cli.sign import read_supervisor
 from robosc.exploration import DEFAULT_LIMIT
@@ -34,7 +34,13 @@ from robosc_client import (
 )
 from robosc_client.commands.connection import add_connection_arguments, seconds
 from robosc_client.commands.shown import Shown
-from robosc_client.commands.tasks import add_synthesis_arguments, synthesis_options, verify_task, write_signature
+from robosc_client.commands.tasks import (
+    add_synthesis_arguments,
+    require_signature,
+    synthesis_options,
+    verify_task,
+    write_signature,
+)
 
 _SUBMIT = """\
 Have a server do something without waiting for it: the job's id is printed, and the job goes on whatever becomes of this
@@ -211,10 +217,15 @@ def _watch(arguments: argparse.Namespace, client: Client) -> int:
 
 
 def _get(arguments: argparse.Namespace, client: Client) -> int:
+    wants_result = arguments.result or arguments.output is not None
+    if arguments.signed_by and not wants_result:
+        raise UsageError("--signed-by is about what a job has found: it needs -o or --result")
     job = client.get_job(arguments.job, deadline_s=arguments.deadline)
-    if not (arguments.result or arguments.output):
+    if not wants_result:
         return _report(arguments, job)
-    found = client.job_result(arguments.job, deadline_s=arguments.deadline)
+    found = client.job_result(arguments.job, kind=job.kind, deadline_s=arguments.deadline)
+    if arguments.signed_by:
+        _require_signed(arguments, found)
     if arguments.output is not None:
         _write(arguments, found)
     if arguments.json:
@@ -222,6 +233,21 @@ def _get(arguments: argparse.Namespace, client: Client) -> int:
     elif arguments.result:
         _print(found)
     return ExitCode.OK if _is_good(found) else ExitCode.FAILED
+
+
+def _require_signed(arguments: argparse.Namespace, found: TaskResult) -> None:
+    """Do nothing if what was found is a supervisor that a key of the arguments has signed.
+
+    Raises:
+        CommandError: It is not.
+        ServiceError: The supervisor is no valid one.
+    """
+    from robosc_client.made import made_of
+
+    # Whatever else the server sends, a graph or a report, nobody has signed.
+    if not isinstance(found, Synthesis) or made_of(found, found.supervisor).supervisor is None:
+        raise CommandError("the job has found no supervisor that could be signed", ExitCode.SERVICE)
+    require_signature(arguments, found.supervisor, found.signature)
 
 
 def _cancel(arguments: argparse.Namespace, client: Client) -> int:
@@ -347,7 +373,7 @@ def _write(arguments: argparse.Namespace, found: TaskResult) -> None:
 
     match found:
         case Synthesis() if found.supervisor:
-            write_signature(arguments, found.supervisor, found.signature)
+            write_signature(arguments.output, found.signature)
             write_bytes(arguments.output, found.supervisor)
         case Generation() if found.files is not None:
             write_files(found.files, arguments.output, arguments.force)

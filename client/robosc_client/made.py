@@ -16,7 +16,7 @@ from robosc.model.structure import Deployment, Model
 from robosc.model_checking import Property, Verdict, properties_of
 from robosc.model_checking.outcome import Remainder, Run, RunKind
 from robosc.source import Bundle, SourceFile, visible
-from robosc.supervisor import Made, MadeStatus, decode
+from robosc.supervisor import Made, MadeStatus, Supervisor, decode
 from robosc_client.errors import ServiceError, malformed
 from robosc_client.results import Exploration, Generation, StateGraph, Synthesis, SynthesisStatus
 
@@ -34,17 +34,48 @@ def made_of(result: Synthesis | Generation | Exploration, content: bytes = b"") 
     """
     if result.status is SynthesisStatus.UNSUPPORTED_MODEL:
         raise UnsupportedModelError(result.reason)
-    try:
-        supervisor = decode(content) if content else None
-    except InvalidSupervisorError as error:
-        raise ServiceError(f"the server's supervisor is refused: {error}") from error
     return Made(
         MadeStatus(str(result.status)),
-        supervisor,
+        decoded(content) if content else None,
         result.diagnostics,
         reason=visible(result.reason),
         explanation=result.explanation,
     )
+
+
+def decoded(content: bytes) -> Supervisor:
+    """The supervisor in a file that a server has made.
+
+    Raises:
+        ServiceError: It is no valid one.
+    """
+    try:
+        return decode(content)
+    except InvalidSupervisorError as error:
+        raise ServiceError(f"the server's supervisor is refused: {error}") from error
+
+
+def require_made_for(supervisor: Supervisor, bundle: Bundle, deployment: Deployment) -> None:
+    """Do nothing if a supervisor was made of these texts, for this deployment.
+
+    A signature tells who made a supervisor, and not for whom: an old one, or one of another robot, is signed as well.
+
+    Raises:
+        ServiceError: It was made of others, or for another.
+    """
+    if supervisor.certificate.bundle_sha256 != bundle.digest:
+        raise ServiceError("the server's supervisor is refused: it was made of other texts than these")
+    require_deployment(supervisor, deployment)
+
+
+def require_deployment(supervisor: Supervisor, deployment: Deployment) -> None:
+    """Do nothing if a supervisor was made for this deployment.
+
+    Raises:
+        ServiceError: It was made for another.
+    """
+    if {supervisor.certificate.deployment, supervisor.deployment} != {deployment}:
+        raise ServiceError(f"the server's supervisor is refused: it was made for another deployment than {deployment}")
 
 
 def graph_of(found: StateGraph, bundle: Bundle, deployment: Deployment) -> Graph:

@@ -13,6 +13,7 @@ import pytest
 
 from robosc.cli.main import main as robosc
 from robosc.signatures import make_key_pair, read_private_key, sign
+from robosc.supervisor import encode, make_supervisor
 from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.commands.bench import varied
@@ -29,10 +30,20 @@ from support.answers import (
     verification,
     watched,
 )
-from support.models import EXAMPLES, bundle_of
+from support.models import EXAMPLES, bundle_of, example_bundle
 from support.scripted_service import PATIENCE_S, Refusal, scripted
 
 MODEL = str(EXAMPLES / "line_follower" / "line_follower.rscd")
+
+
+def encoded_supervisor(example: str) -> bytes:
+    """The file of an example's supervisor."""
+    made = make_supervisor(example_bundle(f"{example}/{example}")).supervisor
+    assert made is not None
+    return encode(made)
+
+
+MADE = supervisor(encoded_supervisor("line_follower"))
 SUCCEEDED = jobs_pb2.JOB_STATE_SUCCEEDED
 
 
@@ -153,7 +164,7 @@ class TestGet:
         [
             ("check", [pb.CheckResponse()], 0, '"errors": 0'),
             ("synthesize", [synthesis()], 1, '"status": "empty"'),
-            ("synthesize", [supervisor()], 0, '"status": "supervisor"'),
+            ("synthesize", [MADE], 0, '"status": "supervisor"'),
             ("generate", generation(), 0, "a/one.py"),
             ("explore", exploration(), 0, '"transitions"'),
             ("verify", [verification()], 0, '"holds"'),
@@ -165,7 +176,7 @@ class TestGet:
     ) -> None:
         with scripted(**self.answers(kind, messages)) as (address, _):
             found, out, _ = run(capfd, "get", "job-1", "--result", "--json", "--server", address)
-            assert found == status
+            assert found == status, out
             assert word in out
             json.loads(out)
             assert run(capfd, "get", "job-1", "--result", "--server", address)[0] == status
@@ -255,6 +266,41 @@ class TestSignatures:
             assert err
             assert not place.exists()
             assert not beside.exists()
+
+    @pytest.mark.parametrize(
+        ("made_of", "options"),
+        [
+            ("navigation", []),
+            ("line_follower", ["--deployment", "layer"]),
+        ],
+    )
+    def test_a_supervisor_that_was_not_asked_for(
+        self, capfd: pytest.CaptureFixture[str], tmp_path: Path, made: Any, made_of: str, options: Any
+    ) -> None:
+        """Is refused although its signature is right, and without one, too."""
+        content = encoded_supervisor(made_of)
+        answer = supervisor(content, signature=sign(content, read_private_key(tmp_path / "right.key")))
+        place = tmp_path / "there.rsup"
+        with scripted(Synthesize=[[answer]]) as (address, _):
+            for trusted in ([], ["--signed-by", tmp_path / "right.pub"]):
+                status, _, err = run(capfd, "synth", MODEL, *options, "-o", place, "--server", address, *trusted)
+                assert status == 3
+                assert "is refused: it was made" in err
+                assert list(tmp_path.glob("there*")) == []
+
+    def test_a_job_s_supervisor(self, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+        """Must be one, and of the deployment that is named."""
+        place = tmp_path / "there.rsup"
+        for answer, options, status in (
+            (MADE, ["--deployment", "controller"], 0),
+            (MADE, ["--deployment", "layer"], 3),
+            (supervisor(b"{}"), [], 3),
+        ):
+            place.unlink(missing_ok=True)
+            with scripted(**TestGet().answers("synthesize", [answer])) as (address, _):
+                assert run(capfd, "get", "job-1", "-o", place, *options, "--server", address)[0] == status
+            assert place.exists() == (status == 0)
+        assert run(capfd, "get", "job-1", "--deployment", "layer", "--server", "127.0.0.1:1")[0] == 2
 
     @pytest.mark.parametrize(
         ("kind", "messages"),

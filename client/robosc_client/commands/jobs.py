@@ -72,6 +72,11 @@ def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
         metavar="FILE.pub",
         help="the server must have signed the supervisor by a key of this file (may be repeated)",
     )
+    get.add_argument(
+        "--deployment",
+        choices=[str(deployment) for deployment in Deployment],
+        help="refuse a supervisor made for another deployment (default: any)",
+    )
     get.set_defaults(run=_get)
     cancel = commands.add_parser("cancel", help="end a job")
     cancel.set_defaults(run=_cancel)
@@ -218,14 +223,13 @@ def _watch(arguments: argparse.Namespace, client: Client) -> int:
 
 def _get(arguments: argparse.Namespace, client: Client) -> int:
     wants_result = arguments.result or arguments.output is not None
-    if arguments.signed_by and not wants_result:
-        raise UsageError("--signed-by is about what a job has found: it needs -o or --result")
+    if (arguments.signed_by or arguments.deployment) and not wants_result:
+        raise UsageError("--signed-by and --deployment are about what a job has found: they need -o or --result")
     job = client.get_job(arguments.job, deadline_s=arguments.deadline)
     if not wants_result:
         return _report(arguments, job)
     found = client.job_result(arguments.job, kind=job.kind, deadline_s=arguments.deadline)
-    if arguments.signed_by:
-        _require_signed(arguments, found)
+    _require_sound(arguments, found)
     if arguments.output is not None:
         _write(arguments, found)
     if arguments.json:
@@ -235,19 +239,25 @@ def _get(arguments: argparse.Namespace, client: Client) -> int:
     return ExitCode.OK if _is_good(found) else ExitCode.FAILED
 
 
-def _require_signed(arguments: argparse.Namespace, found: TaskResult) -> None:
-    """Do nothing if what was found is a supervisor that a key of the arguments has signed.
+def _require_sound(arguments: argparse.Namespace, found: TaskResult) -> None:
+    """Do nothing if a supervisor that was found is one, and is as the arguments want it.
 
     Raises:
-        CommandError: It is not.
-        ServiceError: The supervisor is no valid one.
+        CommandError: No key of the arguments has signed it, or it is no supervisor where one is wanted.
+        ServiceError: The supervisor is no valid one, or for another deployment.
     """
-    from robosc_client.made import made_of
+    from robosc_client.made import decoded, require_deployment
 
-    # Whatever else the server sends, a graph or a report, nobody has signed.
-    if not isinstance(found, Synthesis) or made_of(found, found.supervisor).supervisor is None:
-        raise CommandError("the job has found no supervisor that could be signed", ExitCode.SERVICE)
-    require_signature(arguments, found.supervisor, found.signature)
+    supervisor = decoded(found.supervisor) if isinstance(found, Synthesis) and found.supervisor else None
+    if supervisor is None or not isinstance(found, Synthesis):
+        # Whatever else the server sends, a graph or a report, nobody has signed.
+        if arguments.signed_by or arguments.deployment:
+            raise CommandError("the job has found no supervisor, and one is asked for", ExitCode.SERVICE)
+        return
+    if arguments.deployment:
+        require_deployment(supervisor, Deployment(arguments.deployment))
+    if arguments.signed_by:
+        require_signature(arguments, found.supervisor, found.signature)
 
 
 def _cancel(arguments: argparse.Namespace, client: Client) -> int:

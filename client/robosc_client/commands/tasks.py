@@ -139,19 +139,20 @@ def _check(arguments: argparse.Namespace, client: Client) -> int:
 
 
 def _synth(arguments: argparse.Namespace, client: Client) -> int:
-    from robosc_client.made import made_of
+    from robosc_client.made import made_of, require_made_for
 
     require_other_file(arguments.output, arguments.model)
     bundle = read_bundle(arguments)
+    options = synthesis_options(arguments)
     with Shown() as shown:
-        found = client.synthesize(
-            bundle, synthesis_options(arguments), deadline_s=arguments.deadline, on_progress=shown.tell
-        )
+        found = client.synthesize(bundle, options, deadline_s=arguments.deadline, on_progress=shown.tell)
     made = made_of(found, found.supervisor)
-    if arguments.signed_by and made.supervisor is not None:
-        require_signature(arguments, found.supervisor, found.signature)
-    if made.supervisor is not None and arguments.output is not None:
-        write_signature(arguments.output, found.signature)
+    if made.supervisor is not None:
+        require_made_for(made.supervisor, bundle, options.deployment)
+        if arguments.signed_by:
+            require_signature(arguments, found.supervisor, found.signature)
+        if arguments.output is not None:
+            write_signature(arguments.output, found.signature)
     return report_synthesis(arguments, made, bundle)
 
 

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import time
+import tty
 from pathlib import Path
 from typing import Any
 
@@ -202,6 +203,21 @@ class TestGet:
                 assert status == 3
                 assert "malformed" in err
         assert not (tmp_path / "out").exists()
+
+    def test_a_text_on_a_terminal_and_in_a_file(self, tmp_path: Path) -> None:
+        """What would move the cursor is shown, and not obeyed; a file has every byte."""
+        text = "robot R {\n\t// \x1b]0;owned\x07 \x9b2J\r\n}\n"
+        with scripted(**self.answers("format", [pb.FormatResponse(text=text)])) as (address, _):
+            command = [sys.executable, "-m", "robosc_client.main", "get", "job-1", "--result", "--server", address]
+            piped = subprocess.run(command, capture_output=True, timeout=PATIENCE_S, check=True).stdout
+            main_end, other_end = os.openpty()
+            tty.setraw(other_end)
+            subprocess.run(command, stdout=other_end, timeout=PATIENCE_S, check=True)
+            shown = os.read(main_end, 4096)
+            os.close(main_end)
+            os.close(other_end)
+        assert piped == text.encode()
+        assert shown == b"robot R {\n\t// \\x1b]0;owned\\x07 \\x9b2J\\r\n}\n"
 
     def test_nothing_is_written_outside_of_the_folder(self, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
         """Not through links in the folder either; a link in a file's place is replaced, not followed."""

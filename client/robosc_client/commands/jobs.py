@@ -13,6 +13,7 @@ from robosc.cli.sign import read_supervisor
 from robosc.exploration import DEFAULT_LIMIT
 from robosc.json_documents import diagnostics_json, json_text
 from robosc.model.structure import Deployment
+from robosc.source import visible
 from robosc.targets import ControllerConfigError, GenerateOptions, read_controller_config, write_files
 from robosc_client import (
     Check,
@@ -352,7 +353,8 @@ def result_json(found: TaskResult) -> dict[str, Any]:
 
 def _print(found: TaskResult) -> None:
     if isinstance(found, Formatted) and found.text is not None:
-        sys.stdout.write(found.text)
+        # To a file or program byte for byte; on a terminal, no text of a server moves the cursor.
+        sys.stdout.write(_harmless(found.text) if sys.stdout.isatty() else found.text)
         return
     if isinstance(found, tuple):
         print_diagnostics(found, None)
@@ -360,6 +362,11 @@ def _print(found: TaskResult) -> None:
     if isinstance(found, Synthesis | Generation | Exploration) and not _is_good(found):
         print_diagnostics(found.diagnostics, None)
     print_json(result_json(found))
+
+
+def _harmless(text: str) -> str:
+    """The lines of a text as a terminal may show them."""
+    return "\n".join("\t".join(map(visible, line.split("\t"))) for line in text.split("\n"))
 
 
 def _is_good(found: TaskResult) -> bool:

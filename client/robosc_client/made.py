@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import msgspec
+from msgspec import UNSET, UnsetType
 
 from robosc.automata import to_automata
 from robosc.automata.state import Subject, subject_domain, subjects
@@ -109,7 +110,7 @@ def _shown_value(value: Value) -> Value:
     return visible(value) if isinstance(value, str) else value
 
 
-class _State(msgspec.Struct):
+class _State(msgspec.Struct, forbid_unknown_fields=True):
     """A state in a report."""
 
     components: dict[str, str]
@@ -122,9 +123,10 @@ class _Fault(msgspec.Struct):
 
     check: str
     message: str
-    trace: list[str] | None = None
-    shortest: bool | None = None
-    state: _State | None = None
+    # Absent without a run, and never null.
+    trace: list[str] | UnsetType = UNSET
+    shortest: bool | UnsetType = UNSET
+    state: _State | UnsetType = UNSET
 
 
 class _Recheck(msgspec.Struct):
@@ -152,7 +154,9 @@ def require_recheck(report: Mapping[str, Any]) -> Mapping[str, Any]:
         document = msgspec.convert(report, type=_Recheck)
     except msgspec.ValidationError as error:
         raise malformed(f"the report is none: {error}") from error
-    if any(len({fault.trace is None, fault.shortest is None, fault.state is None}) > 1 for fault in document.faults):
+    if any(
+        len({part is UNSET for part in (fault.trace, fault.shortest, fault.state)}) > 1 for fault in document.faults
+    ):
         raise malformed("the report is none: a fault without its run")
     return report
 

@@ -400,6 +400,13 @@ class TestBench:
                     assert len(texts) == (20 if more else 1)
             assert "a second" in run(capfd, "bench", MODEL, "-d", "0.2", "--server", address)[1]
 
+    @pytest.mark.parametrize("more", [[], ["--uncached"]])
+    def test_what_cannot_be_sent(self, capfd: pytest.CaptureFixture[str], more: Any) -> None:
+        options = ["--task", "synth", "--max-nodes", str(2**70), "-n", "1", *more]
+        status, _, err = run(capfd, "bench", MODEL, *options, "--server", "127.0.0.1:1")
+        assert status == 3
+        assert "cannot be sent" in err
+
     def test_errors_by_reason(self, capfd: pytest.CaptureFixture[str]) -> None:
         refusal = Refusal(grpc.StatusCode.RESOURCE_EXHAUSTED, "busy", "SERVER_BUSY", 1.0)
         with scripted(Check=[[pb.CheckResponse()], [refusal]]) as (address, _):

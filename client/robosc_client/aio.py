@@ -18,7 +18,7 @@ from robosc_client.client import OnProgress, ignored
 from robosc_client.connection import CHANNEL_OPTIONS
 from robosc_client.convert.failures import Failure, failure_of
 from robosc_client.convert.requests import JobStub, SynthesisStub
-from robosc_client.errors import CredentialsError
+from robosc_client.errors import CredentialsError, malformed
 from robosc_client.jobs import Job, JobState, Submission, TaskKind
 from robosc_client.operations import Operation
 from robosc_client.results import (
@@ -215,7 +215,7 @@ class AsyncClient:
             try:
                 async for message in call:
                     attempts.succeeded()
-                    yield watching.take(message)
+                    yield watching.take(_parsed(message))
                     if watching.is_over:
                         return
             except grpc.RpcError as error:
@@ -256,9 +256,17 @@ class AsyncClient:
             for job in listing.take(await self._run(listing.operation(), deadline_s)):
                 yield job
 
-    async def job_result(self, job_id: str, *, deadline_s: float | None = None) -> TaskResult:
-        """What a job that has succeeded has found: as the method for its task would have returned it."""
-        return await self._run(operations.job_result(job_id), deadline_s)
+    async def job_result(
+        self, job_id: str, *, kind: TaskKind | None = None, deadline_s: float | None = None
+    ) -> TaskResult:
+        """What a job that has succeeded has found: as the method for its task would have returned it.
+
+        Args:
+            job_id: Its id.
+            kind: What its task is, as `submit` or `get_job` have told: a result of another kind is refused; None: any.
+            deadline_s: See the class.
+        """
+        return await self._run(operations.job_result(job_id, kind), deadline_s)
 
     async def _run[Result](
         self, operation: Operation[Result], deadline_s: float | None, on_progress: OnProgress = ignored
@@ -286,11 +294,22 @@ class AsyncClient:
         """The messages of one attempt; the call ends with their reader."""
         method = getattr(self._jobs if operation.is_about_jobs else self._tasks, operation.method)
         if not operation.is_stream:
-            yield await method(operation.request, timeout=timeout_s)
+            yield _parsed(await method(operation.request, timeout=timeout_s))
             return
         call = method(operation.request, timeout=timeout_s)
         try:
             async for message in call:
-                yield message
+                yield _parsed(message)
         finally:
             call.cancel()
+
+
+def _parsed[Message](message: Message | None) -> Message:
+    """A message of an answer.
+
+    Raises:
+        ServiceError: Its bytes are none: `grpc.aio` logs that, and gives None.
+    """
+    if message is None:
+        raise malformed("a message cannot be parsed")
+    return message

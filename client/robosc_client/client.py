@@ -257,9 +257,15 @@ class Client:
         while not listing.is_over:
             yield from listing.take(self._run(listing.operation(), deadline_s))
 
-    def job_result(self, job_id: str, *, deadline_s: float | None = None) -> TaskResult:
-        """What a job that has succeeded has found: as the method for its task would have returned it."""
-        return self._run(operations.job_result(job_id), deadline_s)
+    def job_result(self, job_id: str, *, kind: TaskKind | None = None, deadline_s: float | None = None) -> TaskResult:
+        """What a job that has succeeded has found: as the method for its task would have returned it.
+
+        Args:
+            job_id: Its id.
+            kind: What its task is, as `submit` or `get_job` have told: a result of another kind is refused; None: any.
+            deadline_s: See the class.
+        """
+        return self._run(operations.job_result(job_id, kind), deadline_s)
 
     def _run[Result](
         self, operation: Operation[Result], deadline_s: float | None, on_progress: OnProgress = ignored

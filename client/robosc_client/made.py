@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import msgspec
+from msgspec import UNSET, UnsetType
 
 from robosc.automata import to_automata
 from robosc.automata.state import Subject, subject_domain, subjects
@@ -16,7 +17,7 @@ from robosc.model.structure import Deployment, Model
 from robosc.model_checking import Property, Verdict, properties_of
 from robosc.model_checking.outcome import Remainder, Run, RunKind
 from robosc.source import Bundle, SourceFile, visible
-from robosc.supervisor import Made, MadeStatus, decode
+from robosc.supervisor import Made, MadeStatus, Supervisor, decode
 from robosc_client.errors import ServiceError, malformed
 from robosc_client.results import Exploration, Generation, StateGraph, Synthesis, SynthesisStatus
 
@@ -34,17 +35,48 @@ def made_of(result: Synthesis | Generation | Exploration, content: bytes = b"") 
     """
     if result.status is SynthesisStatus.UNSUPPORTED_MODEL:
         raise UnsupportedModelError(result.reason)
-    try:
-        supervisor = decode(content) if content else None
-    except InvalidSupervisorError as error:
-        raise ServiceError(f"the server's supervisor is refused: {error}") from error
     return Made(
         MadeStatus(str(result.status)),
-        supervisor,
+        decoded(content) if content else None,
         result.diagnostics,
         reason=visible(result.reason),
         explanation=result.explanation,
     )
+
+
+def decoded(content: bytes) -> Supervisor:
+    """The supervisor in a file that a server has made.
+
+    Raises:
+        ServiceError: It is no valid one.
+    """
+    try:
+        return decode(content)
+    except InvalidSupervisorError as error:
+        raise ServiceError(f"the server's supervisor is refused: {error}") from error
+
+
+def require_made_for(supervisor: Supervisor, bundle: Bundle, deployment: Deployment) -> None:
+    """Do nothing if a supervisor was made of these texts, for this deployment.
+
+    A signature tells who made a supervisor, and not for whom: an old one, or one of another robot, is signed as well.
+
+    Raises:
+        ServiceError: It was made of others, or for another.
+    """
+    if supervisor.certificate.bundle_sha256 != bundle.digest:
+        raise ServiceError("the server's supervisor is refused: it was made of other texts than these")
+    require_deployment(supervisor, deployment)
+
+
+def require_deployment(supervisor: Supervisor, deployment: Deployment) -> None:
+    """Do nothing if a supervisor was made for this deployment.
+
+    Raises:
+        ServiceError: It was made for another.
+    """
+    if {supervisor.certificate.deployment, supervisor.deployment} != {deployment}:
+        raise ServiceError(f"the server's supervisor is refused: it was made for another deployment than {deployment}")
 
 
 def graph_of(found: StateGraph, bundle: Bundle, deployment: Deployment) -> Graph:
@@ -78,7 +110,7 @@ def _shown_value(value: Value) -> Value:
     return visible(value) if isinstance(value, str) else value
 
 
-class _State(msgspec.Struct):
+class _State(msgspec.Struct, forbid_unknown_fields=True):
     """A state in a report."""
 
     components: dict[str, str]
@@ -91,9 +123,10 @@ class _Fault(msgspec.Struct):
 
     check: str
     message: str
-    trace: list[str] | None = None
-    shortest: bool | None = None
-    state: _State | None = None
+    # Absent without a run, and never null.
+    trace: list[str] | UnsetType = UNSET
+    shortest: bool | UnsetType = UNSET
+    state: _State | UnsetType = UNSET
 
 
 class _Recheck(msgspec.Struct):
@@ -121,7 +154,9 @@ def require_recheck(report: Mapping[str, Any]) -> Mapping[str, Any]:
         document = msgspec.convert(report, type=_Recheck)
     except msgspec.ValidationError as error:
         raise malformed(f"the report is none: {error}") from error
-    if any(len({fault.trace is None, fault.shortest is None, fault.state is None}) > 1 for fault in document.faults):
+    if any(
+        len({part is UNSET for part in (fault.trace, fault.shortest, fault.state)}) > 1 for fault in document.faults
+    ):
         raise malformed("the report is none: a fault without its run")
     return report
 

@@ -37,9 +37,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parse(make_parser(), argv)
 
     def run() -> int:
-        if "run_alone" in arguments:
-            return int(arguments.run_alone(arguments))
         try:
+            if "run_alone" in arguments:
+                return int(arguments.run_alone(arguments))
             with connect(arguments) as client:
                 return int(arguments.run(arguments, client))
         except ClientError as error:

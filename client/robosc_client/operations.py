@@ -121,10 +121,10 @@ def cancel_job(job_id: str) -> Operation[Job]:
     return _about_jobs("CancelJob", jobs_pb2.CancelJobRequest(id=job_id), _same(job_id))
 
 
-def job_result(job_id: str) -> Operation[TaskResult]:
-    """What a job has found."""
+def job_result(job_id: str, kind: TaskKind | None) -> Operation[TaskResult]:
+    """What a job has found; of this kind, if it is known."""
     request = jobs_pb2.GetJobResultRequest(id=job_id)
-    return Operation("GetJobResult", request, JobResultAssembly, is_stream=True, is_about_jobs=True)
+    return Operation("GetJobResult", request, lambda: JobResultAssembly(kind), is_stream=True, is_about_jobs=True)
 
 
 def _about_jobs[Message, Result](method: str, request: Any, convert: Callable[[Message], Result]) -> Operation[Result]:
@@ -167,18 +167,22 @@ class Listing:
         request = list_request(
             states, kind, all_owners=self._all_owners, page_size=self._page_size, page_token=self._token
         )
-        return _about_jobs("ListJobs", request, jobs.page_of)
+
+        def convert(message: jobs_pb2.ListJobsResponse) -> tuple[tuple[Job, ...], str]:
+            return jobs.page_of(message, self._page_size)
+
+        return _about_jobs("ListJobs", request, convert)
 
     def take(self, page: tuple[tuple[Job, ...], str]) -> tuple[Job, ...]:
         """The jobs of a page.
 
         Raises:
-            ServiceError: It has more than was asked for, or pages do not get on.
+            ServiceError: Pages do not get on.
         """
         found, token = page
         self._empty = 0 if found else self._empty + 1
-        if len(found) > self._page_size or (token and token == self._token) or self._empty > _EMPTY_PAGES:
-            raise malformed("a list of jobs has no end, or too long a page")
+        if (token and token == self._token) or self._empty > _EMPTY_PAGES:
+            raise malformed("a list of jobs has no end")
         self._token = token
         self.is_over = not token
         return found

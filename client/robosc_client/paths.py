@@ -36,6 +36,9 @@ def path_problem(path: str) -> str:
             return f"a name in it has more than {MAXIMUM_NAME_BYTES} bytes"
         if part != part.strip() or part.endswith("."):
             return "a name in it begins or ends with a blank, or ends with a full stop"
+        if part.startswith("."):
+            # What a shell, an editor or git obeys without being asked: no target makes such a file.
+            return "a name in it begins with a full stop"
         if part.partition(".")[0].rstrip().casefold() in _DEVICES:
             return "a name in it stands for a device on Windows"
     return ""

@@ -11,6 +11,7 @@ their owner may read.
     token_file = "/home/me/.config/robosc/tokens/lab"
 """
 
+import contextlib
 import os
 import re
 import tomllib
@@ -102,7 +103,8 @@ def read_profiles() -> Profiles:
     text = _text(file)
     try:
         document = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
+        # Also a number that is too long to be converted.
         raise UsageError(f"{file}: {error}") from error
     found = document.pop("profiles", {})
     default = document.pop("default", None)
@@ -133,6 +135,9 @@ def add_profile(name: str, profile: Profile, *, token: str | None = None, is_def
     if name in known.by_name and not replaces:
         raise UsageError(f"there is a profile {name!r}: --force replaces it")
     entry = profile.document()
+    for key in _PATHS:
+        if not _is_unicode(str(entry.get(key, ""))):
+            raise UsageError(f"the file for {key!r} cannot be kept in {profiles_file()}: its name is no UTF-8")
     if token is not None:
         entry["token_file"] = str(_token_file(name))
         _write(_token_file(name), f"{token}\n")
@@ -190,8 +195,19 @@ def _profile(file: Path, name: str, entry: Any) -> Profile:
         if key in _PATHS and (not isinstance(value, str) or not value or "\0" in value):
             raise refused(f"{key!r} must be the name of a file")
     # What is relative is so to the file, wherever the command is called.
-    paths = {key: file.parent / Path(entry[key]).expanduser() for key in _PATHS if key in entry}
+    try:
+        paths = {key: file.parent / Path(entry[key]).expanduser() for key in _PATHS if key in entry}
+    except RuntimeError as error:
+        raise refused("a file's name begins with '~', and nobody of that name has a home") from error
     return Profile(server=entry["server"], tls=entry.get("tls", False), **paths)
+
+
+def _is_unicode(text: str) -> bool:
+    try:
+        text.encode("utf-8")
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _token_file(name: str) -> Path:
@@ -229,6 +245,9 @@ def _write(file: Path, text: str) -> None:
         with os.fdopen(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as out:
             out.write(text)
         temporary.replace(file)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
+    except BaseException as error:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        if not isinstance(error, OSError):
+            raise
         raise UsageError(f"cannot write {file}: {error.strerror or error}") from error

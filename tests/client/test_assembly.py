@@ -13,15 +13,18 @@ from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client import ServiceError, SynthesisStatus, VerificationStatus
 from robosc_client.convert import assembly
+from robosc_client.convert.answers import server_info_of, targets_of
 from robosc_client.convert.assembly import (
     ExplorationAssembly,
     GenerationAssembly,
     JobResultAssembly,
     SynthesisAssembly,
     VerificationAssembly,
+    Whole,
     check_assembly,
     format_assembly,
 )
+from robosc_client.operations import Listing
 from support.answers import (
     FILES,
     GRAPH,
@@ -91,6 +94,31 @@ class TestSynthesis:
     def test_endless_progress(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(assembly, "MAXIMUM_PROGRESS", 1000)
         refused(SynthesisAssembly(), (progress(number) for number in iter(int, 1)), "for ever")
+
+
+@pytest.mark.parametrize(
+    ("assembly_", "message", "what"),
+    [
+        (check_assembly(), pb.CheckResponse(diagnostics=[pb.Diagnostic()] * 100_001), "findings"),
+        (
+            check_assembly(),
+            pb.CheckResponse(diagnostics=[pb.Diagnostic(related=[pb.RelatedPlace()] * 60_000)] * 2),
+            "places",
+        ),
+        (format_assembly(None), pb.FormatResponse(diagnostics=[pb.Diagnostic()] * 100_001), "findings"),
+        (SynthesisAssembly(), supervisor(summary=pb.Summary(added=[pb.AddedCondition()] * 100_001)), "events"),
+        (Whole(targets_of), pb.ListTargetsResponse(targets=[pb.Target()] * 1001), "targets"),
+        (Whole(server_info_of), pb.GetVersionResponse(engines=[""] * 1001), "engines"),
+        (
+            Listing((), None, all_owners=False, page_size=2).operation().assembly(),
+            jobs_pb2.ListJobsResponse(jobs=[jobs_pb2.Job()] * 3),
+            "more than 2 jobs",
+        ),
+    ],
+)
+def test_too_many_items(assembly_: Any, message: Any, what: str) -> None:
+    """Are counted before one of them is looked at: each would be refused for itself, too."""
+    refused(assembly_, [message], what)
 
 
 class TestGeneration:
@@ -186,6 +214,7 @@ class TestGeneration:
         "path",
         [
             "/etc/passwd", "../x", "a/../../x", "", ".", "a//b", "a/./b", "C:\\x", "C:x", "a\\b", "\\\\host\\x", "a\0b",
+            ".git/hooks/post-checkout", ".bashrc", "a/.b", "a/.git/c",
             "a\nb", "a\x1b[2J", "a\u202eb", "nul", "x/CON.txt", "com1.py", "LPT\u00b9", "aux ", "a.", "a ", " a",
             "x" * 256, "\u00e9" * 128, "/".join(["x" * 200] * 6), "a*b", "a?b", 'a"b', "a<b", ".robosc-manifest.json",
         ],

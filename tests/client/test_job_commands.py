@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import time
+import tty
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import pytest
 
 from robosc.cli.main import main as robosc
 from robosc.signatures import make_key_pair, read_private_key, sign
+from robosc.supervisor import encode, make_supervisor
 from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.commands.bench import varied
@@ -29,10 +31,20 @@ from support.answers import (
     verification,
     watched,
 )
-from support.models import EXAMPLES, bundle_of
+from support.models import EXAMPLES, bundle_of, example_bundle
 from support.scripted_service import PATIENCE_S, Refusal, scripted
 
 MODEL = str(EXAMPLES / "line_follower" / "line_follower.rscd")
+
+
+def encoded_supervisor(example: str) -> bytes:
+    """The file of an example's supervisor."""
+    made = make_supervisor(example_bundle(f"{example}/{example}")).supervisor
+    assert made is not None
+    return encode(made)
+
+
+MADE = supervisor(encoded_supervisor("line_follower"))
 SUCCEEDED = jobs_pb2.JOB_STATE_SUCCEEDED
 
 
@@ -132,7 +144,7 @@ class TestWatch:
 
 class TestGet:
     def answers(self, kind: str, messages: Any) -> Any:
-        found = job(9, SUCCEEDED)
+        found = job(9, SUCCEEDED, kind=getattr(jobs_pb2, f"TASK_KIND_{kind.upper()}"))
         return {"GetJob": [[jobs_pb2.GetJobResponse(job=found)]], "GetJobResult": [enveloped(kind, messages)]}
 
     def test_where_it_is(self, capfd: pytest.CaptureFixture[str]) -> None:
@@ -153,7 +165,7 @@ class TestGet:
         [
             ("check", [pb.CheckResponse()], 0, '"errors": 0'),
             ("synthesize", [synthesis()], 1, '"status": "empty"'),
-            ("synthesize", [supervisor()], 0, '"status": "supervisor"'),
+            ("synthesize", [MADE], 0, '"status": "supervisor"'),
             ("generate", generation(), 0, "a/one.py"),
             ("explore", exploration(), 0, '"transitions"'),
             ("verify", [verification()], 0, '"holds"'),
@@ -165,7 +177,7 @@ class TestGet:
     ) -> None:
         with scripted(**self.answers(kind, messages)) as (address, _):
             found, out, _ = run(capfd, "get", "job-1", "--result", "--json", "--server", address)
-            assert found == status
+            assert found == status, out
             assert word in out
             json.loads(out)
             assert run(capfd, "get", "job-1", "--result", "--server", address)[0] == status
@@ -180,6 +192,32 @@ class TestGet:
             assert (place / "a" / "one.py").stat().st_mode & 0o111
         if kind == "explore":
             assert len(json.loads(place.read_text())["states"]) == 2
+
+    def test_a_result_of_another_kind(self, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+        """Is none of this job: a text must not come where a supervisor is wanted."""
+        answers = self.answers("synthesize", [])
+        answers["GetJobResult"] = [enveloped("format", [pb.FormatResponse(text="robot R { }\n")])]
+        with scripted(**answers) as (address, _):
+            for more in (["-o", tmp_path / "out"], ["--result"], ["--result", "--json"]):
+                status, _, err = run(capfd, "get", "job-1", *more, "--server", address)
+                assert status == 3
+                assert "malformed" in err
+        assert not (tmp_path / "out").exists()
+
+    def test_a_text_on_a_terminal_and_in_a_file(self, tmp_path: Path) -> None:
+        """What would move the cursor is shown, and not obeyed; a file has every byte."""
+        text = "robot R {\n\t// \x1b]0;owned\x07 \x9b2J\r\n}\n"
+        with scripted(**self.answers("format", [pb.FormatResponse(text=text)])) as (address, _):
+            command = [sys.executable, "-m", "robosc_client.main", "get", "job-1", "--result", "--server", address]
+            piped = subprocess.run(command, capture_output=True, timeout=PATIENCE_S, check=True).stdout
+            main_end, other_end = os.openpty()
+            tty.setraw(other_end)
+            subprocess.run(command, stdout=other_end, timeout=PATIENCE_S, check=True)
+            shown = os.read(main_end, 4096)
+            os.close(main_end)
+            os.close(other_end)
+        assert piped == text.encode()
+        assert shown == b"robot R {\n\t// \\x1b]0;owned\\x07 \\x9b2J\\r\n}\n"
 
     def test_nothing_is_written_outside_of_the_folder(self, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
         """Not through links in the folder either; a link in a file's place is replaced, not followed."""
@@ -245,6 +283,77 @@ class TestSignatures:
             assert not place.exists()
             assert not beside.exists()
 
+    @pytest.mark.parametrize(
+        ("made_of", "options"),
+        [
+            ("navigation", []),
+            ("line_follower", ["--deployment", "layer"]),
+        ],
+    )
+    def test_a_supervisor_that_was_not_asked_for(
+        self, capfd: pytest.CaptureFixture[str], tmp_path: Path, made: Any, made_of: str, options: Any
+    ) -> None:
+        """Is refused although its signature is right, and without one, too."""
+        content = encoded_supervisor(made_of)
+        answer = supervisor(content, signature=sign(content, read_private_key(tmp_path / "right.key")))
+        place = tmp_path / "there.rsup"
+        with scripted(Synthesize=[[answer]]) as (address, _):
+            for trusted in ([], ["--signed-by", tmp_path / "right.pub"]):
+                status, _, err = run(capfd, "synth", MODEL, *options, "-o", place, "--server", address, *trusted)
+                assert status == 3
+                assert "is refused: it was made" in err
+                assert list(tmp_path.glob("there*")) == []
+
+    def test_a_job_s_supervisor(self, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+        """Must be one, and of the deployment that is named."""
+        place = tmp_path / "there.rsup"
+        for answer, options, status in (
+            (MADE, ["--deployment", "controller"], 0),
+            (MADE, ["--deployment", "layer"], 3),
+            (supervisor(b"{}"), [], 3),
+        ):
+            place.unlink(missing_ok=True)
+            with scripted(**TestGet().answers("synthesize", [answer])) as (address, _):
+                assert run(capfd, "get", "job-1", "-o", place, *options, "--server", address)[0] == status
+            assert place.exists() == (status == 0)
+        assert run(capfd, "get", "job-1", "--deployment", "layer", "--server", "127.0.0.1:1")[0] == 2
+
+    @pytest.mark.parametrize(
+        ("kind", "messages"),
+        [
+            ("check", [pb.CheckResponse()]),
+            ("synthesize", [synthesis()]),
+            ("generate", generation()),
+            ("explore", exploration()),
+            ("verify", [verification()]),
+            ("format", [pb.FormatResponse(text="robot R { }\n")]),
+        ],
+    )
+    def test_what_nobody_can_have_signed(
+        self, capfd: pytest.CaptureFixture[str], tmp_path: Path, made: Any, kind: str, messages: Any
+    ) -> None:
+        trusted = ["--signed-by", tmp_path / "right.pub"]
+        with scripted(**TestGet().answers(kind, messages)) as (address, _):
+            for more in (["-o", tmp_path / "out"], ["--result"], ["--result", "--json"]):
+                status, _, err = run(capfd, "get", "job-1", *more, *trusted, "--server", address)
+                assert status == 3
+                assert "no supervisor" in err
+            assert run(capfd, "get", "job-1", *trusted, "--server", address)[0] == 2
+        assert not (tmp_path / "out").exists()
+
+    def test_results_that_are_printed(self, capfd: pytest.CaptureFixture[str], tmp_path: Path, made: Any) -> None:
+        content, signature = made
+        unknown = b"{}"
+        signed = sign(unknown, read_private_key(tmp_path / "right.key"))
+        for answer, status in (
+            (supervisor(content, signature=signature), 0),
+            (supervisor(content), 3),
+            (supervisor(unknown, signature=signed), 3),
+        ):
+            with scripted(**TestGet().answers("synthesize", [answer])) as (address, _):
+                options = ["--result", "--signed-by", tmp_path / "right.pub", "--server", address]
+                assert run(capfd, "get", "job-1", *options)[0] == status
+
 
 class TestListAndCancel:
     def test_list(self, capfd: pytest.CaptureFixture[str]) -> None:
@@ -290,6 +399,13 @@ class TestBench:
                     assert len(script.of(method)) == 20
                     assert len(texts) == (20 if more else 1)
             assert "a second" in run(capfd, "bench", MODEL, "-d", "0.2", "--server", address)[1]
+
+    @pytest.mark.parametrize("more", [[], ["--uncached"]])
+    def test_what_cannot_be_sent(self, capfd: pytest.CaptureFixture[str], more: Any) -> None:
+        options = ["--task", "synth", "--max-nodes", str(2**70), "-n", "1", *more]
+        status, _, err = run(capfd, "bench", MODEL, *options, "--server", "127.0.0.1:1")
+        assert status == 3
+        assert "cannot be sent" in err
 
     def test_errors_by_reason(self, capfd: pytest.CaptureFixture[str]) -> None:
         refusal = Refusal(grpc.StatusCode.RESOURCE_EXHAUSTED, "busy", "SERVER_BUSY", 1.0)

@@ -1,6 +1,7 @@
 """`robosc-client` and `robosc` side by side: what one prints and writes, the other one does."""
 
 import io
+import json
 import signal
 import subprocess
 import sys
@@ -32,6 +33,20 @@ NAVIGATION = EXAMPLES_FOLDER / "navigation" / "navigation.rscd"
 VERDICT = """{"status": "holds", "properties": [{"name": null, "property": "EF true", "holds": true, "run":
 {"kind": "witness", "states": [{"components": {}, "variables": {}, "communications": {}}], "events": [], "left": [],
 "loop": null}}]}"""
+
+STATE: dict[str, Any] = {"components": {}, "variables": {}, "communications": {}}
+
+
+def report_with(**fault: Any) -> str:
+    """A report about a supervisor that has one fault."""
+    return json.dumps(
+        {
+            "status": "failed", "model": "R", "deployment": "controller", "checks": {"safe": "failed"},
+            "faults": [{"check": "safe", "message": "bad", **fault}], "remarks": [], "states": 1, "transitions": 1,
+            "method": "search", "diagnostics": [],
+        }
+    )  # fmt: skip
+
 
 ERRONEOUS = "robot R { component C { incoming message go with type: Missing } requirement jump needs C.x }"
 
@@ -402,11 +417,16 @@ class TestExitCodes:
         assert error.count("\n") == 1
 
     def test_a_given_supervisor_and_no_report(self, capfd: pytest.CaptureFixture[str], supervisors: Path) -> None:
-        for report in ("{}", '{"status": "passed"}', '{"checks": 7}'):
+        null_fault = report_with(trace=None, shortest=None, state=None)
+        odd_state = report_with(trace=[], shortest=True, state={**STATE, "moods": {}})
+        for report in ("{}", '{"status": "passed"}', '{"checks": 7}', null_fault, odd_state):
             with scripted(Verify=[[verification(report)]]) as (address, _):
                 outcome = self.run(capfd, "verify", supervisors / "right.rsup", NAVIGATION, "--server", address)
             assert outcome[0] == 3
             assert "malformed" in outcome[1]
+        sound = report_with(trace=["go"], shortest=True, state=STATE)
+        with scripted(Verify=[[verification(sound)]]) as (address, _):
+            assert self.run(capfd, "verify", supervisors / "right.rsup", NAVIGATION, "--server", address)[0] == 1
 
     def test_nothing_moves_the_cursor(self, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
         """Whatever text comes from a server: neither stream gets a character that a terminal obeys."""

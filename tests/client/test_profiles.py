@@ -2,6 +2,8 @@
 
 import io
 import json
+import os
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -12,8 +14,8 @@ from robosc_api.security import Credentials
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.commands.connection import target_of
 from robosc_client.main import main, make_parser
-from robosc_client.profiles import profiles_file, read_profiles
-from support.scripted_service import scripted
+from robosc_client.profiles import Profile, add_profile, profiles_file, read_profiles
+from support.scripted_service import PATIENCE_S, scripted
 
 
 @pytest.fixture(autouse=True)
@@ -95,6 +97,7 @@ def test_comments_stay(capfd: pytest.CaptureFixture[str]) -> None:
         "[profiles.'a b']\nserver = 'x:1'", "[profiles.lab]\nserver = 'x:1'\ncolour = 'red'",
         "x = '" + "x" * 70_000 + "'", "[profiles.lab]\nserver = 'x:1'\ntls = 1",
         "[profiles.lab]\nserver = 'x:1'\nca = 5", "a = " + "[" * 5000,
+        "default = " + "9" * 5000, "[profiles.lab]\nserver = 'x:1'\nca = '~nobody-of-that-name/x'",
     ],
 )  # fmt: skip
 def test_odd_files(capfd: pytest.CaptureFixture[str], text: str) -> None:
@@ -156,3 +159,40 @@ def test_a_folder_that_cannot_be_written(capfd: pytest.CaptureFixture[str], fold
     status, _, err = run(capfd, "profile", "add", "lab", "--server", "x:1")
     assert status == 2
     assert "Not a directory" in err
+
+
+def test_a_path_that_is_no_unicode(capfd: pytest.CaptureFixture[str], folder: Path, tmp_path: Path) -> None:
+    """Cannot stand in the file; nothing is written, and nothing is left."""
+    status, _, err = run(capfd, "profile", "add", "lab", "--server", "lab:1", "--ca", tmp_path / "\udcff.pem")
+    assert status == 2
+    assert "no UTF-8" in err
+    assert list(folder.rglob("*")) == []
+
+
+def test_what_is_half_written_does_not_stay(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(source: Path, target: Path) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "replace", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        add_profile("lab", Profile(server="lab:1"), is_default=False, replaces=False)
+    assert list(folder.rglob("*")) == []
+
+
+def test_ctrl_d_at_the_prompt(folder: Path) -> None:
+    main_end, other_end = os.openpty()
+    command = [sys.executable, "-m", "robosc_client.main", "profile", "add", "lab", "--server", "lab:1", "--token"]
+    with subprocess.Popen(
+        command, stdin=other_end, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
+        # What is typed before the prompt is there does not count.
+        assert process.stderr is not None
+        assert process.stderr.read(len("token: ")) == "token: "
+        os.write(main_end, b"\x04")
+        _, err = process.communicate(timeout=PATIENCE_S)
+    os.close(main_end)
+    os.close(other_end)
+    assert process.returncode == 2
+    assert err.splitlines()[-1] == "robosc-client: standard input holds no single token"
+    assert "Traceback" not in err
+    assert not folder.exists()

@@ -61,7 +61,7 @@ def _packed(message: Any) -> any_pb2.Any:
 
 
 type Step = Any
-"""A message of the answer, a Refusal, or a function that is called with the call's context."""
+"""A message of the answer (bytes: as they are), a Refusal, or a function that is called with the call's context."""
 
 
 @dataclass
@@ -139,7 +139,11 @@ def _handler(service: Any, script: Script) -> grpc.GenericRpcHandler:
 
 def _method(method: Any, stream: Callable[[Any, Any], Iterator[Any]]) -> Any:
     parse = GetMessageClass(method.input_type).FromString
-    serialize = GetMessageClass(method.output_type).SerializeToString
+    as_bytes = GetMessageClass(method.output_type).SerializeToString
+
+    def serialize(message: Any) -> bytes:
+        return message if isinstance(message, bytes) else as_bytes(message)
+
     if method.server_streaming:
         return grpc.unary_stream_rpc_method_handler(stream, parse, serialize)
     return grpc.unary_unary_rpc_method_handler(

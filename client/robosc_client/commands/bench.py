@@ -97,7 +97,11 @@ def _bench(arguments: argparse.Namespace) -> int:
 
 
 def _requests(arguments: argparse.Namespace, bundle: Bundle) -> Callable[[int], bytes]:
-    """Serialized requests: always the same, or each with another comment at the end of its model."""
+    """Serialized requests: always the same, or each with another comment at the end of its model.
+
+    Raises:
+        RequestRefusedError: They cannot be sent.
+    """
 
     def content(chosen: Bundle) -> bytes:
         task: Task = Check(chosen)
@@ -105,8 +109,9 @@ def _requests(arguments: argparse.Namespace, bundle: Bundle) -> Callable[[int], 
             task = Synthesize(chosen, synthesis_options(arguments))
         return request_of(task).SerializeToString()
 
+    # What cannot be sent is told before anything is measured; another comment changes nothing about that.
+    same = content(bundle)
     if not arguments.uncached:
-        same = content(bundle)
         return lambda number: same
     return lambda number: content(varied(bundle, number))
 

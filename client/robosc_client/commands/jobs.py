@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from robosc.cli.arguments import add_engine_options, add_model_arguments, read_bundle
-from robosc.cli.output import ExitCode, UsageError, print_diagnostics, print_json, write_bytes
+from robosc.cli.output import CommandError, ExitCode, UsageError, print_diagnostics, print_json, write_bytes
 from robosc.cli.properties import add_arguments as add_property_arguments
 from robosc.cli.sign import read_supervisor
 from robosc.exploration import DEFAULT_LIMIT
 from robosc.json_documents import diagnostics_json, json_text
 from robosc.model.structure import Deployment
+from robosc.source import visible
 from robosc.targets import ControllerConfigError, GenerateOptions, read_controller_config, write_files
 from robosc_client import (
     Check,
@@ -34,7 +35,13 @@ from robosc_client import (
 )
 from robosc_client.commands.connection import add_connection_arguments, seconds
 from robosc_client.commands.shown import Shown
-from robosc_client.commands.tasks import add_synthesis_arguments, synthesis_options, verify_task, write_signature
+from robosc_client.commands.tasks import (
+    add_synthesis_arguments,
+    require_signature,
+    synthesis_options,
+    verify_task,
+    write_signature,
+)
 
 _SUBMIT = """\
 Have a server do something without waiting for it: the job's id is printed, and the job goes on whatever becomes of this
@@ -65,6 +72,11 @@ def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
         type=Path,
         metavar="FILE.pub",
         help="the server must have signed the supervisor by a key of this file (may be repeated)",
+    )
+    get.add_argument(
+        "--deployment",
+        choices=[str(deployment) for deployment in Deployment],
+        help="refuse a supervisor made for another deployment (default: any)",
     )
     get.set_defaults(run=_get)
     cancel = commands.add_parser("cancel", help="end a job")
@@ -211,10 +223,14 @@ def _watch(arguments: argparse.Namespace, client: Client) -> int:
 
 
 def _get(arguments: argparse.Namespace, client: Client) -> int:
+    wants_result = arguments.result or arguments.output is not None
+    if (arguments.signed_by or arguments.deployment) and not wants_result:
+        raise UsageError("--signed-by and --deployment are about what a job has found: they need -o or --result")
     job = client.get_job(arguments.job, deadline_s=arguments.deadline)
-    if not (arguments.result or arguments.output):
+    if not wants_result:
         return _report(arguments, job)
-    found = client.job_result(arguments.job, deadline_s=arguments.deadline)
+    found = client.job_result(arguments.job, kind=job.kind, deadline_s=arguments.deadline)
+    _require_sound(arguments, found)
     if arguments.output is not None:
         _write(arguments, found)
     if arguments.json:
@@ -222,6 +238,27 @@ def _get(arguments: argparse.Namespace, client: Client) -> int:
     elif arguments.result:
         _print(found)
     return ExitCode.OK if _is_good(found) else ExitCode.FAILED
+
+
+def _require_sound(arguments: argparse.Namespace, found: TaskResult) -> None:
+    """Do nothing if a supervisor that was found is one, and is as the arguments want it.
+
+    Raises:
+        CommandError: No key of the arguments has signed it, or it is no supervisor where one is wanted.
+        ServiceError: The supervisor is no valid one, or for another deployment.
+    """
+    from robosc_client.made import decoded, require_deployment
+
+    supervisor = decoded(found.supervisor) if isinstance(found, Synthesis) and found.supervisor else None
+    if supervisor is None or not isinstance(found, Synthesis):
+        # Whatever else the server sends, a graph or a report, nobody has signed.
+        if arguments.signed_by or arguments.deployment:
+            raise CommandError("the job has found no supervisor, and one is asked for", ExitCode.SERVICE)
+        return
+    if arguments.deployment:
+        require_deployment(supervisor, Deployment(arguments.deployment))
+    if arguments.signed_by:
+        require_signature(arguments, found.supervisor, found.signature)
 
 
 def _cancel(arguments: argparse.Namespace, client: Client) -> int:
@@ -316,7 +353,8 @@ def result_json(found: TaskResult) -> dict[str, Any]:
 
 def _print(found: TaskResult) -> None:
     if isinstance(found, Formatted) and found.text is not None:
-        sys.stdout.write(found.text)
+        # To a file or program byte for byte; on a terminal, no text of a server moves the cursor.
+        sys.stdout.write(_harmless(found.text) if sys.stdout.isatty() else found.text)
         return
     if isinstance(found, tuple):
         print_diagnostics(found, None)
@@ -324,6 +362,11 @@ def _print(found: TaskResult) -> None:
     if isinstance(found, Synthesis | Generation | Exploration) and not _is_good(found):
         print_diagnostics(found.diagnostics, None)
     print_json(result_json(found))
+
+
+def _harmless(text: str) -> str:
+    """The lines of a text as a terminal may show them."""
+    return "\n".join("\t".join(map(visible, line.split("\t"))) for line in text.split("\n"))
 
 
 def _is_good(found: TaskResult) -> bool:
@@ -347,7 +390,7 @@ def _write(arguments: argparse.Namespace, found: TaskResult) -> None:
 
     match found:
         case Synthesis() if found.supervisor:
-            write_signature(arguments, found.supervisor, found.signature)
+            write_signature(arguments.output, found.signature)
             write_bytes(arguments.output, found.supervisor)
         case Generation() if found.files is not None:
             write_files(found.files, arguments.output, arguments.force)

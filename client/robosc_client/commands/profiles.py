@@ -75,7 +75,11 @@ def _token() -> str:
     """A token that nobody sees on a terminal or in a list of processes."""
     if sys.stdin is None:
         raise UsageError("standard input is closed")
-    given = getpass.getpass("token: ") if sys.stdin.isatty() else sys.stdin.read(MAXIMUM_TOKEN_BYTES + 1)
+    try:
+        given = getpass.getpass("token: ") if sys.stdin.isatty() else sys.stdin.read(MAXIMUM_TOKEN_BYTES + 1)
+    except EOFError:
+        # Ctrl-D at the prompt.
+        given = ""
     token = given.strip()
     if not token or len(token) > MAXIMUM_TOKEN_BYTES or not token.isascii() or any(map(str.isspace, token)):
         raise UsageError("standard input holds no single token")

@@ -139,47 +139,62 @@ def _check(arguments: argparse.Namespace, client: Client) -> int:
 
 
 def _synth(arguments: argparse.Namespace, client: Client) -> int:
-    from robosc_client.made import made_of
+    from robosc_client.made import made_of, require_made_for
 
     require_other_file(arguments.output, arguments.model)
     bundle = read_bundle(arguments)
+    options = synthesis_options(arguments)
     with Shown() as shown:
-        found = client.synthesize(
-            bundle, synthesis_options(arguments), deadline_s=arguments.deadline, on_progress=shown.tell
-        )
+        found = client.synthesize(bundle, options, deadline_s=arguments.deadline, on_progress=shown.tell)
     made = made_of(found, found.supervisor)
     if made.supervisor is not None:
-        write_signature(arguments, found.supervisor, found.signature)
+        require_made_for(made.supervisor, bundle, options.deployment)
+        if arguments.signed_by:
+            require_signature(arguments, found.supervisor, found.signature)
+        if arguments.output is not None:
+            write_signature(arguments.output, found.signature)
     return report_synthesis(arguments, made, bundle)
 
 
-def write_signature(arguments: argparse.Namespace, supervisor: bytes, signature: bytes) -> None:
-    """Check a signature as the arguments want it, and write it beside the supervisor's file.
+def require_signature(arguments: argparse.Namespace, supervisor: bytes, signature: bytes) -> None:
+    """Do nothing if a key that `--signed-by` names has signed a supervisor's file.
 
     Raises:
-        CommandError: No key that they name has signed the supervisor.
-        UsageError: A file cannot be read or written.
+        CommandError: None has.
+        UsageError: A file cannot be read.
+        SignatureError: A file holds no key.
     """
-    from robosc.signatures import MAXIMUM_KEY_BYTES, PublicKey, SignatureError, read_public_keys, signature_file, signer
+    from robosc.signatures import MAXIMUM_KEY_BYTES, PublicKey, SignatureError, read_public_keys, signer
 
-    if arguments.signed_by:
-        keys: list[PublicKey] = []
-        for path in arguments.signed_by:
-            try:
-                with path.open("rb") as stream:
-                    text = stream.read(MAXIMUM_KEY_BYTES + 1).decode("utf-8", "replace")
-            except OSError as error:
-                raise UsageError(f"cannot read {path}: {error.strerror or error}") from error
-            keys += read_public_keys(text, str(path))
-        if not signature:
-            raise CommandError("the server has not signed the supervisor", ExitCode.SERVICE)
+    keys: list[PublicKey] = []
+    for path in arguments.signed_by:
         try:
-            signer(supervisor, signature, keys)
-        except SignatureError as error:
-            raise CommandError(f"the server's supervisor: {error}", ExitCode.SERVICE) from error
-    if arguments.output is None:
-        return
-    place = signature_file(arguments.output)
+            with path.open("rb") as stream:
+                text = stream.read(MAXIMUM_KEY_BYTES + 1).decode("utf-8", "replace")
+        except OSError as error:
+            raise UsageError(f"cannot read {path}: {error.strerror or error}") from error
+        keys += read_public_keys(text, str(path))
+    if not signature:
+        raise CommandError("the server has not signed the supervisor", ExitCode.SERVICE)
+    try:
+        signer(supervisor, signature, keys)
+    except SignatureError as error:
+        raise CommandError(f"the server's supervisor: {error}", ExitCode.SERVICE) from error
+
+
+def write_signature(output: Path, signature: bytes) -> None:
+    """Write the signature beside a supervisor's file.
+
+    Args:
+        output: The supervisor's file.
+        signature: The signature; empty: there is none, and none stays there.
+
+    Raises:
+        UsageError: A file cannot be written.
+    """
+    from robosc.signatures import signature_file
+
+    place = signature_file(output)
     if signature:
         write_bytes(place, signature)
     else:

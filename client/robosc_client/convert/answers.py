@@ -1,6 +1,6 @@
 """Parts of response messages to values, each checked."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 
 from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.explanation import EmptyExplanation, from_text
@@ -20,6 +20,11 @@ from robosc_client.results import (
 
 MAXIMUM_SHOWN = 1000
 """Characters of a line that is shown while work goes on."""
+
+MAXIMUM_ITEMS = 100_000
+"""Findings, their places, and events of one answer: more than any model has, and few bytes can hold millions."""
+
+_MAXIMUM_TARGETS = 1000
 
 _MAXIMUM_DIGITS = 4000
 
@@ -44,12 +49,24 @@ _VERDICTS = {
 }
 
 
-def diagnostics_of(messages: Iterable[pb.Diagnostic]) -> tuple[Diagnostic, ...]:
+def require_at_most(most: int, count: int, what: str) -> None:
+    """Do nothing if there are not too many of something; looked at before any of them becomes a value.
+
+    Raises:
+        ServiceError: There are.
+    """
+    if count > most:
+        raise malformed(f"it has more than {most} {what}")
+
+
+def diagnostics_of(messages: Sequence[pb.Diagnostic]) -> tuple[Diagnostic, ...]:
     """Findings as the core's values.
 
     Raises:
-        ServiceError: A severity is unknown.
+        ServiceError: A severity is unknown, or there are too many.
     """
+    require_at_most(MAXIMUM_ITEMS, len(messages), "findings")
+    require_at_most(MAXIMUM_ITEMS, sum(len(message.related) for message in messages), "places")
     return tuple(map(_diagnostic, messages))
 
 
@@ -92,8 +109,9 @@ def summary_of(message: pb.Summary) -> Summary:
     """A supervisor in figures and words.
 
     Raises:
-        ServiceError: A count is no number.
+        ServiceError: A count is no number, or there are too many events.
     """
+    require_at_most(MAXIMUM_ITEMS, len(message.added), "events")
     return Summary(
         controllable_events=message.controllable_events,
         uncontrollable_events=message.uncontrollable_events,
@@ -110,12 +128,14 @@ def statistics_of(message: pb.Statistics) -> Statistics:
 
 
 def targets_of(message: pb.ListTargetsResponse) -> tuple[TargetInfo, ...]:
-    """What can be generated."""
+    """What can be generated; raises ServiceError for too many."""
+    require_at_most(_MAXIMUM_TARGETS, len(message.targets), "targets")
     return tuple(TargetInfo(item.name, item.description) for item in message.targets)
 
 
 def server_info_of(message: pb.GetVersionResponse) -> ServerInfo:
-    """What a server is."""
+    """What a server is; raises ServiceError for too many engines."""
+    require_at_most(_MAXIMUM_TARGETS, len(message.engines), "engines")
     limits = message.limits
     return ServerInfo(
         version=message.version,

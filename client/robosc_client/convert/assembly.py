@@ -353,7 +353,13 @@ def _differ_in_layout_alone(before: str, after: str) -> bool:
 class JobResultAssembly:
     """Of GetJobResult: the messages of one of the others, each in an envelope."""
 
-    def __init__(self) -> None:
+    def __init__(self, expected: TaskKind | None = None) -> None:
+        """Begin.
+
+        Args:
+            expected: What the job's task is; None: it is not known.
+        """
+        self._expected = expected
         self._kind: TaskKind | None = None
         self._inner: Assembly[TaskResult]
 
@@ -364,6 +370,8 @@ class JobResultAssembly:
             raise malformed("a message says nothing that a client of this version knows")
         if self._kind is None:
             self._kind = TaskKind(name)
+            if self._expected not in (None, self._kind):
+                raise malformed(f"the result of a job that is to {self._expected} is that of {self._kind}")
             self._inner = assembly_of(self._kind)
         if self._kind is not TaskKind(name):
             raise malformed("results of two kinds")

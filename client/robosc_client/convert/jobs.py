@@ -7,7 +7,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 
 from robosc.source import visible
 from robosc_api.v1 import jobs_pb2 as pb
-from robosc_client.convert.answers import MAXIMUM_SHOWN, progress_of
+from robosc_client.convert.answers import MAXIMUM_SHOWN, progress_of, require_at_most
 from robosc_client.errors import malformed
 from robosc_client.jobs import Job, JobFailure, JobState, Submission, TaskKind
 
@@ -75,8 +75,9 @@ def job_in(message: pb.GetJobResponse | pb.CancelJobResponse | pb.WatchJobRespon
     return job_of(message.job)
 
 
-def page_of(message: pb.ListJobsResponse) -> tuple[tuple[Job, ...], str]:
-    """Jobs, and what asks for those that follow; raises as `job_of`."""
+def page_of(message: pb.ListJobsResponse, most: int) -> tuple[tuple[Job, ...], str]:
+    """Jobs, at most so many, and what asks for those that follow; raises as `job_of`."""
+    require_at_most(most, len(message.jobs), "jobs")
     return tuple(map(job_of, message.jobs)), message.next_page_token
 
 

@@ -127,7 +127,11 @@ def test_the_settings_can_be_used_and_fit_the_pod(variant: str, tmp_path: Path) 
     folders = {mount["mountPath"] for mount in container["volumeMounts"]}
     for file in (settings.tls_certificate, settings.tls_key, settings.tokens):
         assert file is None or str(file.parent) in folders, file
-    assert (settings.tls_certificate is None) == settings.insecure_beyond_loopback
+    # Clients send no token without TLS: where there is none, a token could be asked of nobody.
+    is_clear = settings.insecure_beyond_loopback
+    assert (settings.tls_certificate is None) == (settings.tokens is None) == is_clear
+    files = {"robosc-tls", "robosc-tokens"}
+    assert files & _secrets_of(pod) == (set() if is_clear else files)
     worker = container_of(variant, "robosc-worker") if settings.workers != "local" else container
     threads = settings.worker_processes if settings.workers == "local" else 2
     limit = int(worker["resources"]["limits"]["memory"].removesuffix("Gi")) * 2**30
@@ -163,6 +167,10 @@ def settings_of(variant: str, folder: Path) -> Settings:
     file = folder / "server.toml"
     file.write_text(config["data"]["server.toml"])
     return settings_from({}, file)
+
+
+def _secrets_of(pod: Manifest) -> set[str]:
+    return {volume["secret"]["secretName"] for volume in pod["volumes"] if "secret" in volume}
 
 
 def _pods(variant: str) -> list[Manifest]:

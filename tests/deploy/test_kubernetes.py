@@ -1,11 +1,14 @@
 """Manifests as Kustomize makes them, held against the schemas of Kubernetes and against rules of our own."""
 
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
 
+from robosc.signatures import make_key_pair
 from robosc_server.operations.settings import Settings, settings_from
+from robosc_server.signing import SigningError, read_signing_key
 from support.checkers import checked
 from support.containers import IMAGES
 from support.dockerfiles import parse_dockerfile
@@ -43,7 +46,8 @@ def test_pods_keep_to_the_strictest_standard(variant: str) -> None:
         assert not {"hostNetwork", "hostPID", "hostIPC"} & set(spec)
         kinds = {key for volume in spec["volumes"] for key in volume if key != "name"}
         assert kinds <= {"configMap", "secret", "emptyDir", "persistentVolumeClaim"}
-        for container in spec["containers"]:
+        containers = [*spec["containers"], *spec.get("initContainers", ())]
+        for container in containers:
             own = container["securityContext"]
             assert own == {
                 "allowPrivilegeEscalation": False,
@@ -52,11 +56,11 @@ def test_pods_keep_to_the_strictest_standard(variant: str) -> None:
             }
             assert re.fullmatch(r"robosc-server:\d+\.\d+\.\d+", container["image"])
             assert {"cpu", "memory"} == set(container["resources"]["limits"]) == set(container["resources"]["requests"])
-            assert {"startupProbe", "readinessProbe", "livenessProbe"} <= set(container)
-            mounted = {mount["name"] for mount in container["volumeMounts"]}
-            assert mounted == {volume["name"] for volume in spec["volumes"]}
-            # Without a limit, a disk of the node would fill.
-            assert all("sizeLimit" in volume.get("emptyDir", {"sizeLimit": ""}) for volume in spec["volumes"])
+        assert all({"startupProbe", "readinessProbe", "livenessProbe"} <= set(one) for one in spec["containers"])
+        mounted = {mount["name"] for container in containers for mount in container["volumeMounts"]}
+        assert mounted == {volume["name"] for volume in spec["volumes"]}
+        # Without a limit, a disk of the node would fill.
+        assert all("sizeLimit" in volume.get("emptyDir", {"sizeLimit": ""}) for volume in spec["volumes"])
     (namespace,) = of_kind(variant, "Namespace")
     assert namespace["metadata"]["labels"]["pod-security.kubernetes.io/enforce"] == "restricted"
 
@@ -149,6 +153,32 @@ def test_several_servers_share_a_database_and_one_alone_does_not() -> None:
         assert ("ROBOSC_SERVER_DATABASE_URL" not in variables) == is_alone
         assert (deployment["strategy"].get("type") == "Recreate") == is_alone
         assert (not of_kind(variant, "HorizontalPodAutoscaler")) == is_alone
+
+
+def test_a_key_that_signs_is_handed_over_for_its_reader_alone(tmp_path: Path) -> None:
+    """What Kubernetes makes of a secret is for a group, too, and refused."""
+    pod = named("overlays/signed", "Deployment", "robosc-server")["spec"]["template"]["spec"]
+    (first,) = pod["initContainers"]
+    folders = {mount["mountPath"]: tmp_path / mount["name"] for mount in first["volumeMounts"]}
+    words = list(first["command"])
+    for place, folder in folders.items():
+        folder.mkdir()
+        words = [word.replace(place, str(folder)) for word in words]
+    given, copied = (Path(word) for word in words[-2:])
+    make_key_pair(given, tmp_path / "public")
+    given.chmod(0o440)
+    with pytest.raises(SigningError, match="others may read"):
+        read_signing_key(given)
+    # Also where a copy is there already.
+    for _ in range(2):
+        subprocess.run(words, check=True)
+    read_signing_key(copied)
+    (container,) = pod["containers"]
+    variables = {item["name"]: item.get("value") for item in container["env"]}
+    place = Path(variables["ROBOSC_SERVER_SIGNING_KEY"])
+    assert folders[str(place.parent)] / place.name == copied
+    # The server itself sees the copy alone.
+    assert not [mount for mount in container["volumeMounts"] if mount["name"] == "signing-secret"]
 
 
 def test_the_image_of_kubernetes_is_that_of_the_dockerfile() -> None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from robosc_api.health import Condition, ask_health, local_address
+from robosc_api.health import Condition, ask_alive, ask_health, local_address
 from robosc_api.security import SecurityError
 from robosc_bridge.configuration import ConfigurationError, load
 from robosc_bridge.configuration.structure import Remote
@@ -17,7 +17,8 @@ NAME = "health"
 WELL, NOT_WELL, WRONG_USE = 0, 1, 2
 
 _EPILOG = (
-    "Its certificate is the only one that is believed, and is shown to a bridge that wants callers' certificates. "
+    "Its certificate is the only one that is believed, and is shown to a bridge that wants callers' certificates: "
+    "one of the authorities in remote.client_ca must have signed it, for clients, too; else use --alive. "
     "exit status: 0 it is well, or answers (--alive); 1 it is not; 2 wrong use or files"
 )
 
@@ -44,7 +45,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(arguments: argparse.Namespace) -> int:
     try:
-        condition = _ask(load(arguments.config).configuration.remote, arguments.timeout)
+        remote = load(arguments.config).configuration.remote
+        condition = _ask(remote, arguments.timeout, is_alive_enough=arguments.alive)
     except (ConfigurationError, SecurityError) as error:
         for line in str(error).splitlines():
             sys.stderr.write(f"robosc-bridge: {line}\n")
@@ -54,13 +56,14 @@ def _run(arguments: argparse.Namespace) -> int:
     return WELL if is_well else NOT_WELL
 
 
-def _ask(remote: Remote, timeout_s: float) -> Condition:
+def _ask(remote: Remote, timeout_s: float, *, is_alive_enough: bool) -> Condition:
     if remote.grpc_address is None:
         raise SecurityError("remote.grpc_address is not set: nobody can ask this bridge")
     certificate = _path(remote.tls_certificate)
     key = _path(remote.tls_key)
     shown = (certificate, key) if remote.client_ca is not None and certificate is not None and key is not None else None
-    return ask_health(local_address(remote.grpc_address), timeout_s=timeout_s, certificate=certificate, shown=shown)
+    ask = ask_alive if is_alive_enough else ask_health
+    return ask(local_address(remote.grpc_address), timeout_s=timeout_s, certificate=certificate, shown=shown)
 
 
 def _path(text: str | None) -> Path | None:

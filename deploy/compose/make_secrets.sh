@@ -2,8 +2,9 @@
 # Writes the secrets of compose.yaml: sh deploy/compose/make_secrets.sh NAME [FOLDER]
 #
 # NAME is what callers call this machine by, a name or an address; the certificate for it signs itself, and callers are
-# given it as --ca. FOLDER is `secrets` beside this script; what is there already is kept. The first caller's token goes
-# to FOLDER/first_token. Needs openssl; as root it also hands the files to the user of the containers.
+# given it as --ca. FOLDER is `secrets` beside this script; what is there already is kept. What the server reads goes to
+# FOLDER/server, the first caller's token to FOLDER/first_token. Needs openssl; as root it also hands the files to the
+# user of the containers.
 set -eu
 umask 077
 name=${1:?"usage: make_secrets.sh NAME [FOLDER]"}
@@ -15,10 +16,10 @@ case $name in
         exit 2
         ;;
 esac
-mkdir -p "$folder"
+mkdir -p "$folder/server"
 cd "$folder"
 
-if [ ! -e tls_key ]; then
+if [ ! -e server/tls_key ]; then
     case $name in
         *[!0-9.]*) kind=DNS ;;
         *) kind=IP ;;
@@ -27,23 +28,23 @@ if [ ! -e tls_key ]; then
         *:*) kind=IP ;;
     esac
     openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 365 -subj "/CN=robosc" \
-        -addext "subjectAltName=$kind:$name" -keyout tls_key -out tls_certificate 2>/dev/null
+        -addext "subjectAltName=$kind:$name" -keyout server/tls_key -out server/tls_certificate 2>/dev/null
 fi
-if [ ! -e tokens ]; then
+if [ ! -e server/tokens ]; then
     # As `robosc-server token` makes it.
     token=robosc_$(openssl rand -base64 32 | tr '+/' '-_' | tr -d '=')
     digest=$(printf '%s' "$token" | openssl dgst -sha256 -r | cut -d ' ' -f 1)
     printf '%s\n' "$token" > first_token
-    printf 'first synthesize,admin sha256:%s\n' "$digest" > tokens
+    printf 'first synthesize,admin sha256:%s\n' "$digest" > server/tokens
 fi
 if [ ! -e database_password ]; then
     openssl rand -hex 32 | tr -d '\n' > database_password
     # Host, port, database, user, password.
-    printf 'database:5432:robosc:robosc:%s\n' "$(cat database_password)" > database_login
+    printf 'database:5432:robosc:robosc:%s\n' "$(cat database_password)" > server/database_login
 fi
 if [ "$(id -u)" = 0 ]; then
-    chown "$user:$user" tls_key tls_certificate tokens database_login database_password
+    chown "$user:$user" server server/tls_key server/tls_certificate server/tokens server/database_login database_password
 else
-    echo "make_secrets.sh: not root: hand them over with: sudo chown $user:$user $PWD/[dt]*" >&2
+    echo "make_secrets.sh: not root: hand them over with: sudo chown -R $user:$user $PWD/server $PWD/database_password" >&2
 fi
-echo "written to $PWD; callers need tls_certificate (--ca) and first_token (--token-file)"
+echo "written to $PWD; callers need server/tls_certificate (--ca) and first_token (--token-file)"

@@ -1,5 +1,6 @@
 """Asking a service of this machine how it is, by gRPC's health checks: for containers, units and probes."""
 
+import socket
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,13 +15,17 @@ from robosc_api.security.listening import read
 
 _ANYWHERE = {"0.0.0.0": "127.0.0.1", "": "127.0.0.1", "::": "::1"}  # noqa: S104  # Not listening: asked there.
 
+# What gRPC says by itself where a program has said nothing; whatever else it says came from the program.
+_UNANSWERED = (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED, grpc.StatusCode.CANCELLED)
+
 
 @dataclass(frozen=True, slots=True)
 class Condition:
     """How a service is.
 
     Attributes:
-        is_there: Whether anything answered.
+        is_there: Whether the program is at work: it answered, if with no, or ended a connection that it had taken, as
+            where a certificate does not suit. One that takes connections and says nothing hangs, and is not there.
         is_serving: Whether it said that it is well.
         words: Its answer, or why there is none.
     """
@@ -71,11 +76,41 @@ def ask_health(
         try:
             answer = stub.Check(health_pb2.HealthCheckRequest(service=service), timeout=timeout_s)
         except grpc.RpcError as error:
-            # What the service itself has answered, if with no: it is there.
-            is_there = error.code() in (grpc.StatusCode.NOT_FOUND, grpc.StatusCode.UNIMPLEMENTED)
+            is_there = error.code() not in _UNANSWERED or (
+                # Nobody listens, or a handshake has failed.
+                error.code() is grpc.StatusCode.UNAVAILABLE and _takes_connections(address, timeout_s)
+            )
             return Condition(is_there, False, f"{error.code().name}: {error.details()}")
     status = health_pb2.HealthCheckResponse.ServingStatus
     return Condition(True, answer.status == status.SERVING, status.Name(answer.status))
+
+
+def ask_alive(
+    address: str,
+    service: str = "",
+    *,
+    timeout_s: float,
+    certificate: Path | None = None,
+    shown: tuple[Path, Path] | None = None,
+) -> Condition:
+    """The same for whoever ends a program that is not there: files that cannot be used do not speak against it.
+
+    It may listen with what stood in them before.
+    """
+    try:
+        return ask_health(address, service, timeout_s=timeout_s, certificate=certificate, shown=shown)
+    except SecurityError as error:
+        return Condition(_takes_connections(address, timeout_s), False, str(error))
+
+
+def _takes_connections(address: str, timeout_s: float) -> bool:
+    """Whether somebody listens there."""
+    host, port = split(address)
+    try:
+        with socket.create_connection((host, port), timeout_s):
+            return True
+    except OSError:
+        return False
 
 
 def _name_in(certificate: Path) -> str:

@@ -4,17 +4,17 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from robosc_api.health import Condition, ask_health, local_address
+from robosc_api.health import Condition, ask_alive, ask_health, local_address
 from robosc_api.security import SecurityError
 from robosc_server.operations.settings import Settings, SettingsError, add_settings_arguments, settings_of
 
 _EPILOG = """\
 Settings come from flags, environment and file as for the server itself, so that in its container and its unit nothing
 more needs to be said. Its certificate is the only one that is believed, and is shown to a server that wants callers'
-certificates.
+certificates: one of the authorities in client_ca must have signed it, for clients, too. Else use --alive.
 
 exit status:
-  0  it is well; with --alive: it answers
+  0  it is well; with --alive: it answers, if by refusing the connection for a certificate
   1  it is not
   2  wrong use, or wrong settings
 """
@@ -35,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     add_settings_arguments(parser)
     given = parser.parse_args(argv)
     try:
-        condition = _ask(settings_of(given), given.service, given.timeout)
+        condition = _ask(settings_of(given), given.service, given.timeout, is_alive_enough=given.alive)
     except SettingsError as error:
         for problem in error.problems:
             sys.stderr.write(f"robosc-server: {problem}\n")
@@ -48,14 +48,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0 if is_well else 1
 
 
-def _ask(settings: Settings, service: str, timeout_s: float) -> Condition:
+def _ask(settings: Settings, service: str, timeout_s: float, *, is_alive_enough: bool) -> Condition:
     certificate, key = settings.tls_certificate, settings.tls_key
     shown = None
     if settings.client_ca is not None and certificate is not None and key is not None:
         shown = certificate, key
-    return ask_health(
-        local_address(settings.address), service, timeout_s=timeout_s, certificate=certificate, shown=shown
-    )
+    ask = ask_alive if is_alive_enough else ask_health
+    return ask(local_address(settings.address), service, timeout_s=timeout_s, certificate=certificate, shown=shown)
 
 
 def _seconds(text: str) -> float:

@@ -1,5 +1,6 @@
 """Asking a service for its health by its own configuration: with and without TLS, well and not well."""
 
+import socket
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -9,8 +10,9 @@ import grpc
 import pytest
 from grpc_health.v1 import health, health_pb2, health_pb2_grpc
 
-from robosc_api.health import ask_health, local_address
+from robosc_api.health import ask_alive, ask_health, local_address
 from robosc_api.security import SecurityError, ServerSecurity, add_port
+from robosc_api.security.addresses import joined
 from robosc_bridge.health_check import main as bridge_health
 from robosc_server.health_check import main as server_health
 from support.certificates import Authority
@@ -20,12 +22,12 @@ IN_THE_CLEAR = ServerSecurity()
 
 
 @contextmanager
-def answering(status: int, security: ServerSecurity = IN_THE_CLEAR) -> Iterator[str]:
-    """A service that is as it is said to be; yields its address."""
+def answering(status: int, security: ServerSecurity = IN_THE_CLEAR, most_calls: int | None = None) -> Iterator[str]:
+    """A service that is as it is said to be, and answers so many calls at once; yields its address."""
     servicer = health.HealthServicer()
     servicer.set("", status)
     with ThreadPoolExecutor(2) as threads:
-        server = grpc.server(threads)
+        server = grpc.server(threads, maximum_concurrent_rpcs=most_calls)
         health_pb2_grpc.add_HealthServicer_to_server(servicer, server)
         address = add_port(server, "127.0.0.1:0", security)
         server.start()
@@ -66,8 +68,17 @@ def test_the_programs_own_certificate_is_believed_and_no_other(secure: ServerSec
     other, _ = Authority(tmp_path, "other").sign("other")
     with answering(Status.SERVING, secure) as address:
         assert ask_health(address, timeout_s=10, certificate=secure.certificate).is_serving
-        assert not ask_health(address, timeout_s=10, certificate=other).is_there
-        assert not ask_health(address, timeout_s=10).is_there
+        for certificate in (other, None):
+            condition = ask_health(address, timeout_s=10, certificate=certificate)
+            assert (condition.is_there, condition.is_serving) == (True, False), condition
+
+
+def test_an_expired_certificate_is_not_well_but_ends_no_program(tmp_path: Path) -> None:
+    certificate, key = Authority(tmp_path).sign("server", days=-1.0)
+    with answering(Status.SERVING, ServerSecurity(certificate=certificate, key=key)) as address:
+        condition = ask_health(address, timeout_s=10, certificate=certificate)
+    assert (condition.is_there, condition.is_serving) == (True, False) and "expired" in condition.words.lower()
+    assert not ask_health(address, timeout_s=10, certificate=certificate).is_there
 
 
 def test_whoever_wants_a_certificate_is_shown_its_own(tmp_path: Path) -> None:
@@ -76,14 +87,35 @@ def test_whoever_wants_a_certificate_is_shown_its_own(tmp_path: Path) -> None:
     security = ServerSecurity(certificate=certificate, key=key, client_ca=authority.file)
     with answering(Status.SERVING, security) as address:
         assert ask_health(address, timeout_s=10, certificate=certificate, shown=(certificate, key)).is_serving
-        assert not ask_health(address, timeout_s=10, certificate=certificate).is_there
+        without = ask_health(address, timeout_s=10, certificate=certificate)
+        assert (without.is_there, without.is_serving) == (True, False)
 
 
-def test_a_file_that_is_no_certificate_is_one_clear_error(tmp_path: Path) -> None:
+def test_whoever_has_too_many_calls_is_there() -> None:
+    with answering(Status.SERVING, most_calls=0) as address:
+        condition = ask_health(address, timeout_s=10)
+    assert (condition.is_there, condition.is_serving) == (True, False)
+    assert condition.words.startswith("RESOURCE_EXHAUSTED")
+
+
+def test_whoever_listens_and_says_nothing_hangs() -> None:
+    """The kernel takes connections for a program that stands still."""
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        condition = ask_health(joined(*listening.getsockname()), timeout_s=0.5)
+    assert (condition.is_there, condition.is_serving) == (False, False)
+    assert condition.words.startswith("DEADLINE_EXCEEDED")
+
+
+def test_a_file_that_is_no_certificate_is_one_clear_error(secure: ServerSecurity, tmp_path: Path) -> None:
     file = tmp_path / "server.pem"
     file.write_text("no certificate\n")
     with pytest.raises(SecurityError, match=r"server\.pem"):
         ask_health("127.0.0.1:1", timeout_s=1, certificate=file)
+    # Whoever listens has read another one, and goes on with it.
+    with answering(Status.SERVING, secure) as address:
+        condition = ask_alive(address, timeout_s=10, certificate=file)
+    assert (condition.is_there, condition.is_serving) == (True, False) and "server.pem" in condition.words
+    assert not ask_alive(address, timeout_s=10, certificate=file).is_there
 
 
 @pytest.mark.parametrize(("status", "code", "alive"), [(Status.SERVING, 0, 0), (Status.NOT_SERVING, 1, 0)])
@@ -104,6 +136,12 @@ def test_the_commands_say_it_by_their_status(
         )
         assert bridge_health(["health", "--config", str(bridge)]) == code
         assert bridge_health(["health", "--config", str(bridge), "--alive"]) == alive
+        spoiled = tmp_path / "spoiled.pem"
+        spoiled.write_text("no certificate\n")
+        for file, health in ((server, server_health), (bridge, lambda given: bridge_health(["health", *given]))):
+            file.write_text(file.read_text().replace(str(secure.certificate), str(spoiled)))
+            assert health(["--config", str(file)]) == 2
+            assert health(["--config", str(file), "--alive"]) == 0
     assert server_health(["--config", str(server), "--alive"]) == 1
     capsys.readouterr()
 

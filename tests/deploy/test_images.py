@@ -1,5 +1,6 @@
 """Dockerfiles, the file of compose and the locks of the images, looked at by linters and by rules of our own."""
 
+import os
 import re
 import runpy
 import subprocess
@@ -17,6 +18,8 @@ from support.dockerfiles import Ignored, Stage, context_files, parse_dockerfile
 
 DOCKERFILES = sorted(IMAGES.glob("*.Dockerfile"))
 COMPOSE = TOP / "deploy" / "compose"
+SERVER_SECRETS = {"tls_certificate", "tls_key", "tokens", "database_login"}
+"""What the server of compose reads."""
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +70,13 @@ def test_every_package_is_locked() -> None:
 
 def test_only_what_an_image_needs_is_sent_to_its_build() -> None:
     ignored = Ignored((TOP / ".dockerignore").read_text())
-    for secret in (".git/config", "deploy/compose/secrets/tls_key", ".venv/bin/python", "tests/conftest.py", "out/a"):
+    for secret in (
+        ".git/config",
+        "deploy/compose/secrets/server/tls_key",
+        ".venv/bin/python",
+        "tests/conftest.py",
+        "out/a",
+    ):
         assert secret in ignored, secret
     assert "robosc/__pycache__/errors.pyc" in ignored
     for needed in ("pyproject.toml", "robosc/errors.py", "proto/robosc_api/v1/jobs_pb2.py", "robosc/py.typed"):
@@ -138,7 +147,15 @@ def test_every_service_of_compose_is_confined(compose: dict[str, Any]) -> None:
 def test_the_settings_of_compose_can_be_used(compose: dict[str, Any]) -> None:
     settings = settings_from({}, COMPOSE / "server.toml")
     server = compose["services"]["server"]
-    secrets = {f"/run/secrets/{name}" for name in server["secrets"]}
+    # A folder as a whole: a file of it that is replaced by another one is seen.
+    (mounted,) = [item for item in server["volumes"] if isinstance(item, dict)]
+    assert (mounted["source"], mounted["read_only"], mounted["bind"]) == (
+        "./secrets/server",
+        True,
+        {"create_host_path": False},
+    )
+    secrets = {f"{mounted['target']}/{name}" for name in SERVER_SECRETS}
+    assert "secrets" not in server
     assert {str(settings.tls_certificate), str(settings.tls_key), str(settings.tokens)} <= secrets
     assert settings.database_url is not None
     host, _, passfile = settings.database_url.partition("@")[2].partition("/robosc?passfile=")
@@ -157,14 +174,20 @@ def test_the_secrets_of_compose_are_made_and_kept(compose: dict[str, Any], tmp_p
     folder = tmp_path / "secrets"
     command = ["sh", str(COMPOSE / "make_secrets.sh"), "server.example.org", str(folder)]
     subprocess.run(command, check=True, capture_output=True)
-    before = {file.name: file.read_bytes() for file in folder.iterdir()}
-    assert {Path(secret["file"]).name for secret in compose["secrets"].values()} < set(before)
-    assert all(file.stat().st_mode & 0o077 == 0 for file in folder.iterdir())
-    (entry,) = parse_tokens(before["tokens"].decode(), "tokens")
+    before = _contents(folder)
+    handed = {f"server/{name}" for name in SERVER_SECRETS}
+    handed |= {secret["file"].removeprefix("secrets/") for secret in compose["secrets"].values()}
+    # Neither container sees the token itself.
+    assert set(before) == handed | {"first_token"}
+    assert all(file.stat().st_mode & 0o077 == 0 for file in folder.rglob("*"))
+    (entry,) = parse_tokens(before["server/tokens"].decode(), "tokens")
     assert entry.name == "first"
-    assert before["database_login"].decode().strip().endswith(":" + before["database_password"].decode())
+    assert before["server/database_login"].decode().strip().endswith(":" + before["database_password"].decode())
+    if os.geteuid() == 0:
+        assert {folder.joinpath(name).stat().st_uid for name in (*handed, "server")} == {10001}
+        assert (folder / "first_token").stat().st_uid == 0
     subprocess.run(command, check=True, capture_output=True)
-    assert {file.name: file.read_bytes() for file in folder.iterdir()} == before
+    assert _contents(folder) == before
     wrong = subprocess.run(["sh", str(COMPOSE / "make_secrets.sh"), "a b"], capture_output=True, text=True)
     assert (wrong.returncode, wrong.stderr) == (2, "make_secrets.sh: 'a b' is no name or address of a machine\n")
 
@@ -175,6 +198,10 @@ def test_variables_of_the_images_are_settings() -> None:
         for name in names:
             if name.startswith("ROBOSC_SERVER_"):
                 assert name.removeprefix("ROBOSC_SERVER_").lower() in Settings.model_fields, name
+
+
+def _contents(folder: Path) -> dict[str, bytes]:
+    return {file.relative_to(folder).as_posix(): file.read_bytes() for file in folder.rglob("*") if file.is_file()}
 
 
 def _seconds(text: str) -> float:

@@ -1,11 +1,14 @@
 """Manifests as Kustomize makes them, held against the schemas of Kubernetes and against rules of our own."""
 
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
 
+from robosc.signatures import make_key_pair
 from robosc_server.operations.settings import Settings, settings_from
+from robosc_server.signing import SigningError, read_signing_key
 from support.checkers import checked
 from support.containers import IMAGES
 from support.dockerfiles import parse_dockerfile
@@ -43,7 +46,8 @@ def test_pods_keep_to_the_strictest_standard(variant: str) -> None:
         assert not {"hostNetwork", "hostPID", "hostIPC"} & set(spec)
         kinds = {key for volume in spec["volumes"] for key in volume if key != "name"}
         assert kinds <= {"configMap", "secret", "emptyDir", "persistentVolumeClaim"}
-        for container in spec["containers"]:
+        containers = [*spec["containers"], *spec.get("initContainers", ())]
+        for container in containers:
             own = container["securityContext"]
             assert own == {
                 "allowPrivilegeEscalation": False,
@@ -52,11 +56,11 @@ def test_pods_keep_to_the_strictest_standard(variant: str) -> None:
             }
             assert re.fullmatch(r"robosc-server:\d+\.\d+\.\d+", container["image"])
             assert {"cpu", "memory"} == set(container["resources"]["limits"]) == set(container["resources"]["requests"])
-            assert {"startupProbe", "readinessProbe", "livenessProbe"} <= set(container)
-            mounted = {mount["name"] for mount in container["volumeMounts"]}
-            assert mounted == {volume["name"] for volume in spec["volumes"]}
-            # Without a limit, a disk of the node would fill.
-            assert all("sizeLimit" in volume.get("emptyDir", {"sizeLimit": ""}) for volume in spec["volumes"])
+        assert all({"startupProbe", "readinessProbe", "livenessProbe"} <= set(one) for one in spec["containers"])
+        mounted = {mount["name"] for container in containers for mount in container["volumeMounts"]}
+        assert mounted == {volume["name"] for volume in spec["volumes"]}
+        # Without a limit, a disk of the node would fill.
+        assert all("sizeLimit" in volume.get("emptyDir", {"sizeLimit": ""}) for volume in spec["volumes"])
     (namespace,) = of_kind(variant, "Namespace")
     assert namespace["metadata"]["labels"]["pod-security.kubernetes.io/enforce"] == "restricted"
 
@@ -127,7 +131,11 @@ def test_the_settings_can_be_used_and_fit_the_pod(variant: str, tmp_path: Path) 
     folders = {mount["mountPath"] for mount in container["volumeMounts"]}
     for file in (settings.tls_certificate, settings.tls_key, settings.tokens):
         assert file is None or str(file.parent) in folders, file
-    assert (settings.tls_certificate is None) == settings.insecure_beyond_loopback
+    # Clients send no token without TLS: where there is none, a token could be asked of nobody.
+    is_clear = settings.insecure_beyond_loopback
+    assert (settings.tls_certificate is None) == (settings.tokens is None) == is_clear
+    files = {"robosc-tls", "robosc-tokens"}
+    assert files & _secrets_of(pod) == (set() if is_clear else files)
     worker = container_of(variant, "robosc-worker") if settings.workers != "local" else container
     threads = settings.worker_processes if settings.workers == "local" else 2
     limit = int(worker["resources"]["limits"]["memory"].removesuffix("Gi")) * 2**30
@@ -147,6 +155,32 @@ def test_several_servers_share_a_database_and_one_alone_does_not() -> None:
         assert (not of_kind(variant, "HorizontalPodAutoscaler")) == is_alone
 
 
+def test_a_key_that_signs_is_handed_over_for_its_reader_alone(tmp_path: Path) -> None:
+    """What Kubernetes makes of a secret is for a group, too, and refused."""
+    pod = named("overlays/signed", "Deployment", "robosc-server")["spec"]["template"]["spec"]
+    (first,) = pod["initContainers"]
+    folders = {mount["mountPath"]: tmp_path / mount["name"] for mount in first["volumeMounts"]}
+    words = list(first["command"])
+    for place, folder in folders.items():
+        folder.mkdir()
+        words = [word.replace(place, str(folder)) for word in words]
+    given, copied = (Path(word) for word in words[-2:])
+    make_key_pair(given, tmp_path / "public")
+    given.chmod(0o440)
+    with pytest.raises(SigningError, match="others may read"):
+        read_signing_key(given)
+    # Also where a copy is there already.
+    for _ in range(2):
+        subprocess.run(words, check=True)
+    read_signing_key(copied)
+    (container,) = pod["containers"]
+    variables = {item["name"]: item.get("value") for item in container["env"]}
+    place = Path(variables["ROBOSC_SERVER_SIGNING_KEY"])
+    assert folders[str(place.parent)] / place.name == copied
+    # The server itself sees the copy alone.
+    assert not [mount for mount in container["volumeMounts"] if mount["name"] == "signing-secret"]
+
+
 def test_the_image_of_kubernetes_is_that_of_the_dockerfile() -> None:
     stage = parse_dockerfile((IMAGES / "server.Dockerfile").read_text())[-1]
     pod = named("base", "Deployment", "robosc-server")["spec"]["template"]["spec"]
@@ -163,6 +197,10 @@ def settings_of(variant: str, folder: Path) -> Settings:
     file = folder / "server.toml"
     file.write_text(config["data"]["server.toml"])
     return settings_from({}, file)
+
+
+def _secrets_of(pod: Manifest) -> set[str]:
+    return {volume["secret"]["secretName"] for volume in pod["volumes"] if "secret" in volume}
 
 
 def _pods(variant: str) -> list[Manifest]:

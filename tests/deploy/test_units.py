@@ -72,10 +72,23 @@ def test_a_unit_promises_nothing_that_its_program_does_not_keep(file: Path) -> N
 def test_the_servers_unit_gives_it_time_to_drain_and_settings_that_there_are() -> None:
     unit = read_unit(TOP / "deploy" / "systemd" / "robosc-server.service")
     assert float(unit.one("TimeoutStopSec")) > Settings().drain_seconds
+    # Dask and what counts the memory of processes read /proc/meminfo and its like.
+    assert not unit.all("ProcSubset")
     for text in unit.all("Environment"):
         assert text.partition("=")[0].removeprefix("ROBOSC_SERVER_").lower() in {"config", *Settings.model_fields}
     handed = {text.partition(":")[0] for text in unit.all("LoadCredential")}
     assert handed == {match for text in unit.all("Environment") for match in re.findall(r"%d/(\w+)", text)}
+
+
+def test_the_bridges_unit_loads_the_drivers_that_its_devices_are_named_by() -> None:
+    unit = read_unit(TOP / "deploy" / "systemd" / "robosc-bridge@.service")
+    (wanted,) = unit.all("Wants", "Unit")
+    assert wanted in unit.all("After", "Unit")
+    # By what registers them; those that stand on no USB are part of the kernel.
+    drivers = {"ttyACM": {"cdc_acm"}, "ttyUSB": {"ftdi_sio", "cp210x"}, "video4linux": {"uvcvideo"}}
+    named = {text.removeprefix("char-").removesuffix(" rw") for text in unit.all("DeviceAllow")}
+    assert named == {*drivers, "ttyAMA", "ttyS"}
+    assert set(wanted.split()) == {f"modprobe@{name}.service" for names in drivers.values() for name in names}
 
 
 def test_the_rules_of_udev_can_be_read() -> None:

@@ -79,13 +79,17 @@ class DaskWorkers:
             task_function: What does tasks there, `package.module:name`.
 
         Raises:
-            WorkersError: The package `distributed` is missing.
+            WorkersError: The package `distributed` is missing, or cannot be loaded here.
         """
         try:
             import distributed
         except ImportError as error:
             raise WorkersError(
                 "workers on a Dask cluster need the package distributed: pip install 'robosc[dask]'"
+            ) from error
+        except OSError as error:  # It reads about the machine in /proc, which a sandbox may hide.
+            raise WorkersError(
+                f"workers on a Dask cluster need the package distributed, which cannot be loaded here: {error}"
             ) from error
         self._distributed = distributed
         self._address = address

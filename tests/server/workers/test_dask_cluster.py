@@ -227,6 +227,17 @@ def test_a_missing_package_is_told_in_one_sentence(monkeypatch: pytest.MonkeyPat
         open_workers("dask://localhost:8786", 1)
 
 
+def test_a_package_that_cannot_be_loaded_is_told_in_one_sentence(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """As where /proc has processes alone."""
+    (tmp_path / "distributed.py").write_text("open('/proc/none/meminfo')\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "distributed")
+    with pytest.raises(WorkersError, match=r"^workers on a Dask .* cannot be loaded here: .*/proc/none/meminfo'$"):
+        open_workers("dask://localhost:8786", 1)
+
+
 def test_nobody_loads_dask_who_does_not_ask_for_it() -> None:
     program = "import sys, robosc_server.workers.opening; print({'distributed', 'dask', 'grpc'} & sys.modules.keys())"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}

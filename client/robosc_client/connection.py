@@ -5,7 +5,9 @@ from robosc_client.convert.assembly import MAXIMUM_BYTES
 KEEPALIVE_MS = 60_000
 """A connection on which nothing comes is tried after so long: not more often than servers put up with."""
 
-CHANNEL_OPTIONS: tuple[tuple[str, int], ...] = (
+CHANNEL_OPTIONS: tuple[tuple[str, int | str], ...] = (
+    # Behind one name there may be several servers: calls go to all of them by turns, and past one that is gone.
+    ("grpc.service_config", '{"loadBalancingConfig": [{"round_robin": {}}]}'),
     # One message holds a whole supervisor; what surrounds it is little.
     ("grpc.max_receive_message_length", MAXIMUM_BYTES + 2**20),
     # The server knows its limit, and tells it.

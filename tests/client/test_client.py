@@ -86,6 +86,24 @@ def test_public_names() -> None:
     assert all(hasattr(robosc_client, name) for name in robosc_client.__all__)
 
 
+def test_servers_behind_one_name_take_turns(connect: Any) -> None:
+    answers = {"Check": [[pb.CheckResponse()]]}
+    # The first calls may come before there are both connections.
+    until_s = time.monotonic() + PATIENCE_S
+    with (
+        scripted(**answers) as (one, first),
+        scripted(**answers) as (two, second),
+        connect(f"ipv4:{one},{two}") as client,
+    ):
+        while not (first.of("Check") and second.of("Check")):
+            assert time.monotonic() < until_s
+            client.check(BUNDLE)
+        before = len(first.of("Check")), len(second.of("Check"))
+        for _ in range(10):
+            client.check(BUNDLE)
+        assert (len(first.of("Check")), len(second.of("Check"))) == (before[0] + 5, before[1] + 5)
+
+
 def test_both_clients_have_the_same_methods() -> None:
     names = [{name for name in vars(kind) if not name.startswith("_")} for kind in (Client, AsyncClient)]
     assert names[0] == names[1]

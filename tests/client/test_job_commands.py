@@ -2,8 +2,10 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import threading
 import time
 import tty
 from pathlib import Path
@@ -100,8 +102,44 @@ class TestSubmit:
         with scripted(**answers) as (address, _):
             status, out, _ = run(capfd, "submit", "check", MODEL, "--watch", "--server", address)
         assert status == 0
-        assert [line.split()[1] for line in out.splitlines()] == ["queued", "running", "succeeded"]
+        first, *lines = out.splitlines()
+        assert first == "job-1"
+        assert [line.split()[1] for line in lines] == ["queued", "running", "succeeded"]
         assert "2 before it" in out
+
+    @pytest.mark.parametrize("more", [[], ["--json"]])
+    def test_the_id_is_told_before_anything_is_waited_for(self, more: Any) -> None:
+        """So that Ctrl-C, or whatever else ends the waiting, does not lose the job."""
+        left = threading.Event()
+
+        def stuck(context: grpc.ServicerContext) -> None:
+            context.add_callback(left.set)
+            left.wait(PATIENCE_S)
+
+        submitted = jobs_pb2.SubmitJobResponse(job=job(1, jobs_pb2.JOB_STATE_QUEUED))
+        with scripted(SubmitJob=[[submitted]], WatchJob=[[stuck]]) as (address, _):
+            words = ["submit", "check", MODEL, "--watch", "--server", address, *more]
+            with subprocess.Popen(
+                [sys.executable, "-m", "robosc_client.command", *words],
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+            ) as process:
+                stream = process.stderr if more else process.stdout
+                assert stream is not None
+                assert stream.readline().split()[-1] == "job-1"
+                process.send_signal(signal.SIGINT)
+                out, _ = process.communicate(timeout=PATIENCE_S)
+        assert process.returncode == 130
+        assert not more or json.loads(out)["error"]["status"] == 130
+
+    def test_a_watch_that_fails(self, capfd: pytest.CaptureFixture[str]) -> None:
+        submitted = jobs_pb2.SubmitJobResponse(job=job(1, jobs_pb2.JOB_STATE_QUEUED))
+        gone = Refusal(grpc.StatusCode.NOT_FOUND, "there is no such job", "NO_SUCH_JOB")
+        with scripted(SubmitJob=[[submitted]], WatchJob=[[gone]]) as (address, _):
+            status, out, _ = run(capfd, "submit", "check", MODEL, "--watch", "--json", "--server", address)
+        assert status == 3
+        assert "job-1" in json.loads(out)["error"]["message"]
 
 
 class TestWatch:

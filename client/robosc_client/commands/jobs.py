@@ -18,6 +18,7 @@ from robosc.targets import ControllerConfigError, GenerateOptions, read_controll
 from robosc_client import (
     Check,
     Client,
+    ClientError,
     Exploration,
     Explore,
     Format,
@@ -142,7 +143,9 @@ def _add_tasks(submit: argparse.ArgumentParser) -> None:
         parser.add_argument(
             "--keep", type=seconds, metavar="SECONDS", help="keep the job so long after its end (default: the server's)"
         )
-        parser.add_argument("--watch", action="store_true", help="wait until it has ended, as 'watch' does")
+        parser.add_argument(
+            "--watch", action="store_true", help="print the id, and wait until it has ended, as 'watch' does"
+        )
         parser.set_defaults(run=_submit)
         add_connection_arguments(parser)
 
@@ -200,8 +203,15 @@ def _submit(arguments: argparse.Namespace, client: Client) -> int:
         deadline_s=arguments.deadline,
     )
     if arguments.watch:
+        # Whoever gives up waiting, or is cut off, knows how to ask for the job; the one JSON document comes at the end.
+        stream, told = (sys.stderr, f"submitted as {found.job.id}") if arguments.json else (sys.stdout, found.job.id)
+        stream.write(f"{told}\n")
+        stream.flush()
         arguments.job = found.job.id
-        return _watch(arguments, client)
+        try:
+            return _watch(arguments, client)
+        except ClientError as error:
+            raise CommandError(f"job {found.job.id} was submitted, but: {error}", ExitCode.SERVICE) from error
     if arguments.json:
         print_json({"job": job_json(found.job), "existed": found.existed})
     else:

@@ -57,6 +57,7 @@ _BY_FILE = (
     "tests/server/jobs/test_job_faults.py",
     "tests/server/jobs/test_job_replicas.py",
     "tests/server/test_reflection_client.py",
+    "tests/server/test_replicas_on_a_cluster.py",
     "tests/server/test_typescript_client.py",
     "tests/server/workers/",
 )

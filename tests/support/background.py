@@ -1,6 +1,7 @@
 """An event loop in a thread of its own, for tests that are written one step after the other; and what they wait for."""
 
 import asyncio
+import contextlib
 import os
 import threading
 import time
@@ -60,6 +61,15 @@ def is_running(pid: int) -> bool:
 def parent_of(pid: int) -> int:
     """The process that a process was started by."""
     return int(_fields(pid)[1])
+
+
+def children_of(pid: int) -> list[int]:
+    """The processes that a process has started, whichever of its threads did; none where it is gone."""
+    found: list[int] = []
+    for children in Path(f"/proc/{pid}/task").glob("*/children"):
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+            found += map(int, children.read_text().split())
+    return found
 
 
 def cpu_ticks(pid: int) -> int:

@@ -144,7 +144,7 @@ class DaskWorkers:
         return Failure(Reason.WORKER_DIED, _LOST)
 
     async def _run_once(self, task: Task, limits: TaskLimits, on_report: OnReport, watched: _Watched) -> Outcome | None:
-        """The outcome of a task; None: the scheduler gave it up, since workers were lost."""
+        """The outcome of a task; None: workers were lost, and it has to be begun anew."""
         from robosc_server.workers.dask_task import run_on_cluster
 
         client = self._client
@@ -152,6 +152,7 @@ class DaskWorkers:
             raise WorkersError(self.fault or f"the Dask cluster at {self._address} has no worker")
         name = f"robosc-{task.kind}-{uuid.uuid4().hex}"
         self._watched[name] = watched
+        named = sorted(self._threads) if self._refused else None
         future = client.submit(
             run_on_cluster,
             __version__,
@@ -163,12 +164,12 @@ class DaskWorkers:
             (limits.seconds, limits.cpu_seconds, limits.memory_bytes, limits.nodes, limits.result_bytes),
             key=name,
             pure=False,
-            workers=sorted(self._threads) if self._refused else None,
+            workers=named,
         )
         works = (
             asyncio.create_task(self._answer(future, limits)),
             asyncio.create_task(watched.pass_on(on_report)),
-            asyncio.create_task(self._guard(client, watched, limits)),
+            asyncio.create_task(self._guard(client, watched, limits, named)),
         )
         try:
             done, _ = await asyncio.wait(works, return_when=asyncio.FIRST_COMPLETED)
@@ -208,8 +209,20 @@ class DaskWorkers:
             raise WorkersError(content[1:1000].decode("utf-8", "replace"))
         raise WorkersError(f"the Dask cluster at {self._address} answered what is no answer of RoboSC")
 
-    async def _guard(self, client: Any, watched: _Watched, limits: TaskLimits) -> Failure:
+    async def _guard(
+        self, client: Any, watched: _Watched, limits: TaskLimits, named: list[str] | None
+    ) -> Failure | None:
         """End a wait for what will not come.
+
+        Args:
+            client: Of the cluster that has the task.
+            watched: What is told of the task.
+            limits: What it may take.
+            named: The workers that alone may do it; None: any.
+
+        Returns:
+            What has become of the task; None: those workers are gone and others are there, but the scheduler would go
+            on waiting for them.
 
         Raises:
             WorkersError: The cluster is lost, or has had no worker for a while.
@@ -224,6 +237,8 @@ class DaskWorkers:
                 raise WorkersError(f"the Dask scheduler at {self._address} was lost")
             if self._threads:
                 worked_at = now
+                if named is not None and self._threads.keys().isdisjoint(named):
+                    return None
             if now - worked_at > _GRACE_S:
                 raise WorkersError(self.fault or f"the Dask cluster at {self._address} has no worker")
             if watched.begun and now - watched.begun_at > limits.seconds + _GRACE_S:

@@ -173,6 +173,20 @@ def test_a_worker_of_another_version_is_told_of_and_left_out(
     cluster.workers.remove(worker)
 
 
+def test_a_task_is_not_tied_to_workers_that_are_gone(tmp_path: Path) -> None:
+    """While some workers cannot be used the others are named to the scheduler, and it would wait for them alone."""
+    (tmp_path / "sitecustomize.py").write_text("import robosc\nrobosc.__version__ = '0.0.1'\n")
+    path = os.pathsep.join((str(tmp_path), *(path for path in sys.path if path)))
+    with dask_cluster(tmp_path, workers=1) as cluster, running_on(cluster.address, 1) as running:
+        cluster.start_worker(environment={"PYTHONPATH": path})
+        assert eventually(lambda: bool(running.workers._refused))
+        future, pid = running.begun("sleep 1\necho again")
+        kill(dask_worker_of(cluster, pid))
+        cluster.start_worker()
+        assert said(future.result(60)) == "again"
+        assert len({report.message for report in running.reports}) == 2
+
+
 def test_losses(tmp_path: Path) -> None:
     """Workers are killed in the middle of tasks, then the scheduler; each comes back."""
     with dask_cluster(tmp_path, workers=2) as cluster, running_on(cluster.address, 2) as running:

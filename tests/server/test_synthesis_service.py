@@ -212,7 +212,7 @@ class TestEnding:
 
     def test_who_reads_no_results_gets_no_more_of_them(self) -> None:
         # Frames that nobody takes stop the server's end of the connection at this much.
-        options = [("grpc.http2.lookahead_bytes", 65535)]
+        options = [("grpc.http2.lookahead_bytes", 65535), ("grpc.http2.bdp_probe", 0)]
         with served(FAKE, result_bytes=3_000_000) as address, grpc.insecure_channel(address, options) as channel:
             request = pb.SynthesizeRequest(bundle=bundle("size 2900000")).SerializeToString()
             synthesize: Any = channel.unary_stream("/robosc_api.v1.SynthesisService/Synthesize")

@@ -269,7 +269,7 @@ def test_workers_are_opened_by_what_the_operator_writes() -> None:
             open_workers(spec, 1)
 
 
-@given(st.lists(st.binary(max_size=50), max_size=5) | st.text())
+@given(st.lists(st.binary(max_size=50), min_size=1, max_size=5) | st.text())
 def test_answers_travel_as_bytes(said: list[bytes] | str) -> None:
     outcome: Outcome = Failure(Reason.NODE_LIMIT, said, "") if isinstance(said, str) else Result(tuple(said))
     content = answer(outcome)

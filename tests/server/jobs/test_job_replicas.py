@@ -106,16 +106,19 @@ def test_who_watches_a_job_that_is_forgotten_elsewhere_is_told(database_url: str
             job, _ = await ours.manager.submit(task_of(_NEVER), ME, retention_s=0.0)
             watch = theirs.manager.watch(job.id, ME, 0)
             await anext(watch)
-            following = asyncio.create_task(anext(watch))
+
+            async def follow() -> None:
+                async for _ in watch:
+                    pass
+
+            following = asyncio.create_task(follow())
             await asyncio.sleep(0)
             await ours.manager.cancel(job.id, ME)
             times.wall_s += 1.0
             await ours.manager.sweep()
             await theirs.manager.look()
             with pytest.raises(RefusedError, match="no job of that id"):
-                while True:
-                    await following
-                    following = asyncio.create_task(anext(watch))
+                await following
 
     in_loop(test)
 

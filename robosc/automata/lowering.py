@@ -5,6 +5,7 @@ services and actions, then its own behaviour. Events follow the same order: thos
 communications, then its taus. Data plants only observe and are left out.
 """
 
+from collections import deque
 from collections.abc import Iterator
 
 from robosc.automata.plants import communication_plant, component_plant
@@ -35,6 +36,9 @@ from robosc.model.structure import (
     is_tau,
 )
 
+_recent: deque[tuple[Model, Deployment, System]] = deque(maxlen=2)
+"""What was made last: of a robot that is worked on, several stages ask for the same system, or its executed form."""
+
 
 def to_automata(model: Model, deployment: Deployment) -> System:
     """The plants and event conditions of a model.
@@ -46,7 +50,11 @@ def to_automata(model: Model, deployment: Deployment) -> System:
     Raises:
         UnsupportedModelError: A synthesis variable takes received data with infinitely many values.
     """
-    return System(
+    # Compared by identity, which takes no time; none of the three ever changes.
+    for known, where, system in tuple(_recent):
+        if known is model and where is deployment:
+            return system
+    system = System(
         name=model.name,
         events=tuple(_events(model, deployment)),
         automata=tuple(_automata(model)),
@@ -54,6 +62,8 @@ def to_automata(model: Model, deployment: Deployment) -> System:
         conditions=(*_request_conditions(model), *_cancel_conditions(model, deployment)),
         invariants=tuple(item.condition for item in model.invariants),
     )
+    _recent.append((model, deployment, system))
+    return system
 
 
 def _communications(model: Model) -> Iterator[tuple[Component, tuple[Communication, ...]]]:

@@ -10,7 +10,8 @@ systems modeled as extended finite automata", IEEE T-ASE 8(3), 2011, pp. 560-569
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from copy import copy
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 from math import prod
@@ -174,8 +175,12 @@ class _Rule:
 def _joint_step(arcs: tuple[_Arc, ...], state: State) -> tuple[bool, list[_Writes]]:
     """Whether the arcs, taken together, may leave a range, and what they write for each choice of data."""
     leaves_range = False
-    parts: list[list[_Writes]] = [[tuple((arc.place, arc.target) for arc in arcs)]]
-    for updates in _independent_updates([update for arc in arcs for update in arc.updates]):
+    moves = tuple((arc.place, arc.target) for arc in arcs)
+    all_updates = [update for arc in arcs for update in arc.updates]
+    if not all_updates:
+        return False, [moves]
+    parts: list[list[_Writes]] = [[moves]]
+    for updates in _independent_updates(all_updates):
         leaves, results = _updates_together(updates, state)
         leaves_range = leaves_range or leaves
         parts.append(results)
@@ -245,6 +250,20 @@ class Semantics:
         self._initial = compile_expression(system.initial, self._places)
         self._marker = compile_expression(system.marker, self._places)
         self._uncontrollable = tuple(rule for rule in self._rules.values() if not rule.event.is_controllable)
+
+    def only(self, event: Event) -> "Semantics":
+        """The meaning of one event alone, without invariants, and with nothing remembered.
+
+        Args:
+            event: One of the system's.
+        """
+        alone = copy(self)
+        alone.system = replace(self.system, events=(event,), invariants=())
+        rule = replace(self._rules[event.name], outcomes={}, carried={})
+        alone._rules = {event.name: rule}
+        alone._invariants = ()
+        alone._uncontrollable = () if event.is_controllable else (rule,)
+        return alone
 
     @cached_property
     def initial_states(self) -> tuple[State, ...]:

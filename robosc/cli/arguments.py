@@ -2,9 +2,10 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
-from robosc.cli.output import ExitCode, UsageError
+from robosc.cli.output import UsageError
+from robosc.cli.running import Parser as Parser  # for those who add commands
 from robosc.model.structure import Deployment
 from robosc.source import Bundle
 
@@ -17,42 +18,26 @@ SYNTHESIS_STATES = 200_000
 """States up to which the result of a synthesis is verified one by one: some seconds."""
 
 
-class WrongArguments(SystemExit):
-    """Arguments that are wrong, which has been told on standard error.
+def given_path(text: str) -> Path:
+    """A file or folder that an argument names.
 
-    Attributes:
-        message: What is wrong.
+    Raises:
+        argparse.ArgumentTypeError: It is empty, such as a variable that nobody has set; that is no name of this folder.
     """
-
-    def __init__(self, message: str) -> None:
-        super().__init__(int(ExitCode.USAGE))
-        self.message = message
-
-
-class Parser(argparse.ArgumentParser):
-    """A parser that says what is wrong in its exception, too; so do those of its commands."""
-
-    def error(self, message: str) -> NoReturn:
-        """Tell what is wrong.
-
-        Raises:
-            WrongArguments: Always.
-        """
-        try:
-            super().error(message)
-        except SystemExit as exit_:
-            raise WrongArguments(message) from exit_
+    if not text:
+        raise argparse.ArgumentTypeError("the name of a file or folder is empty")
+    return Path(text)
 
 
 def add_model_arguments(parser: argparse.ArgumentParser) -> None:
     """The model, its library folders and `--json`."""
-    parser.add_argument("model", type=Path, metavar="MODEL", help="the model's file, e.g. robot.rscd")
+    parser.add_argument("model", type=given_path, metavar="MODEL", help="the model's file, e.g. robot.rscd")
     parser.add_argument(
         "-L",
         "--library-path",
         action="append",
         default=[],
-        type=Path,
+        type=given_path,
         metavar="DIR",
         help="another folder with libraries (may be repeated; always searched: the model's folder and its ../shared)",
     )
@@ -61,7 +46,7 @@ def add_model_arguments(parser: argparse.ArgumentParser) -> None:
         "--interface-path",
         action="append",
         default=[],
-        type=Path,
+        type=given_path,
         metavar="DIR",
         help="another folder with ROS packages whose .msg, .srv and .action files the model is checked against (may be "
         "repeated; always searched: those of an installed ROS)",
@@ -97,7 +82,7 @@ def add_given_supervisor_options(parser: argparse.ArgumentParser, stands: str) -
             f"--{name}-path",
             action="append",
             default=[],
-            type=Path,
+            type=given_path,
             metavar="DIR",
             help=f"another folder with {what} of the model, as for 'robosc synth' (may be repeated)",
         )

@@ -2,7 +2,7 @@
 
 import argparse
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -17,6 +17,7 @@ from robosc.source import Bundle
 
 if TYPE_CHECKING:
     from robosc.explanation import EmptyExplanation
+    from robosc.supervisor import Made
 
 
 def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -42,6 +43,24 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 def run(arguments: argparse.Namespace) -> int:
     """Check the model; 0 without errors (and, where it was asked for, with a supervisor), else 1."""
+    return run_with(arguments, _checked, lambda bundle: synth.make(arguments, bundle, allow_livelock=False))
+
+
+def run_with(
+    arguments: argparse.Namespace,
+    check: Callable[[Bundle], tuple[Diagnostic, ...]],
+    make: "Callable[[Bundle], Made]",
+) -> int:
+    """Check the model wherever that is done.
+
+    Args:
+        arguments: Of the command.
+        check: Gives every finding about a model.
+        make: Synthesizes as the arguments say; raises UnsupportedModelError.
+
+    Raises:
+        UsageError: The arguments say how to synthesize, and not to; or a file is not there.
+    """
     engine = arguments.engine or arguments.reorder or arguments.max_nodes
     if not arguments.synthesize and (arguments.deployment or engine):
         raise UsageError(
@@ -51,9 +70,14 @@ def run(arguments: argparse.Namespace) -> int:
         bundle = read_bundle(arguments)
     except LanguageError as error:
         return report_check(arguments, error.diagnostics, None)
-    if arguments.synthesize:
-        return _report_synthesized(arguments, _synthesized(arguments, bundle), bundle)
-    return report_check(arguments, _checked(bundle), bundle)
+    if not arguments.synthesize:
+        return report_check(arguments, check(bundle), bundle)
+    arguments.deployment = arguments.deployment or str(Deployment.CONTROLLER)
+    try:
+        found = _synthesized(make(bundle))
+    except UnsupportedModelError as error:
+        found = _Synthesized(check(bundle), "unsupported model", str(error), has_failed=True)
+    return _report_synthesized(arguments, found, bundle)
 
 
 def _checked(bundle: Bundle) -> tuple[Diagnostic, ...]:
@@ -81,14 +105,9 @@ class _Synthesized:
     explanation: "EmptyExplanation | None" = None
 
 
-def _synthesized(arguments: argparse.Namespace, bundle: Bundle) -> _Synthesized:
+def _synthesized(made: "Made") -> _Synthesized:
     from robosc.supervisor import MadeStatus
 
-    arguments.deployment = arguments.deployment or str(Deployment.CONTROLLER)
-    try:
-        made = synth.make(arguments, bundle, allow_livelock=False)
-    except UnsupportedModelError as error:
-        return _Synthesized(_checked(bundle), "unsupported model", str(error), has_failed=True)
     has_failed = made.status is MadeStatus.EMPTY
     return _Synthesized(made.diagnostics, str(made.status), made.reason, has_failed, made.explanation)
 

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robosc.cli.arguments import add_given_supervisor_options
+from robosc.cli.arguments import add_given_supervisor_options, given_path
 from robosc.cli.given import given_supervisor
 from robosc.cli.output import ExitCode, UsageError, print_json
 from robosc.model.structure import Deployment
@@ -41,11 +41,11 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("log", type=Path, metavar="LOG", help="the event log, a file of JSON Lines")
+    parser.add_argument("log", type=given_path, metavar="LOG", help="the event log, a file of JSON Lines")
     parser.add_argument(
         "--model",
         required=True,
-        type=Path,
+        type=given_path,
         metavar="FILE",
         help="the model (.rscd), which is synthesized, or its supervisor (.rsup), which is believed: 'robosc verify' "
         "checks it",

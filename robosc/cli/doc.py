@@ -2,9 +2,8 @@
 
 import argparse
 import sys
-from pathlib import Path
 
-from robosc.cli.arguments import add_model_arguments, read_bundle
+from robosc.cli.arguments import add_model_arguments, given_path, read_bundle
 from robosc.cli.output import ExitCode, print_diagnostics, print_json, write_bytes
 from robosc.json_documents import diagnostics_json
 
@@ -19,7 +18,11 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     )
     add_model_arguments(parser)
     parser.add_argument(
-        "-o", "--output", type=Path, metavar="FILE.md", help="write the page to this file (default: standard output)"
+        "-o",
+        "--output",
+        type=given_path,
+        metavar="FILE.md",
+        help="write the page to this file (default: standard output)",
     )
     parser.set_defaults(run=run)
 

@@ -2,8 +2,7 @@
 
 import argparse
 import sys
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from robosc.cli import synth
 from robosc.cli.arguments import (
@@ -11,9 +10,11 @@ from robosc.cli.arguments import (
     add_engine_options,
     add_livelock_argument,
     add_model_arguments,
+    given_path,
     read_bundle,
 )
 from robosc.cli.output import ExitCode, UsageError, print_json
+from robosc.errors import UnsupportedModelError
 from robosc.json_documents import diagnostics_json
 from robosc.source import Bundle
 
@@ -21,17 +22,46 @@ if TYPE_CHECKING:
     from robosc.supervisor import Made
     from robosc.targets import GeneratedFiles, GenerateOptions
 
+WRITTEN = "the files are written"
+NOT_WRITTEN = """\
+nothing is written: the model has errors, no supervisor exists, the target cannot do the model, or files were
+     changed since they were generated, or are not of RoboSC, and would be overwritten (see --force)"""
+"""What the exit statuses 0 and 1 tell."""
+
+_EPILOG = f"exit status:\n  0  {WRITTEN}\n  1  {NOT_WRITTEN}\n  2  wrong use\n"
+
 
 class _ListTargets(argparse.Action):
-    """`--list-targets`: print what can be generated and leave, without a model."""
+    """`--list-targets`: what can be generated is listed instead, for which nothing else is needed, and no server."""
 
-    def __call__(self, parser: argparse.ArgumentParser, *_: object, **__: object) -> None:
-        from robosc.targets import ALL, available_targets
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option: str | None = None
+    ) -> None:
+        for action in parser._actions:
+            action.required = False
+        namespace.run = namespace.run_alone = _list_targets
 
-        for target in available_targets():
-            sys.stdout.write(f"{target.name:10} {target.description}\n")
-        sys.stdout.write(f"{ALL:10} all of them, each in a folder of its own\n")
-        parser.exit()
+
+class _OneTarget(argparse.Action):
+    """`--target`: one, or all."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option: str | None = None
+    ) -> None:
+        if getattr(namespace, self.dest) is not None:
+            raise argparse.ArgumentError(self, "may be given once; all is for all of them")
+        setattr(namespace, self.dest, values)
+
+
+def _list_targets(arguments: argparse.Namespace) -> int:
+    from robosc.targets import ALL, TargetInfo, available_targets
+
+    targets = (*available_targets(), TargetInfo(ALL, "all of them, each in a folder of its own"))
+    if arguments.json:
+        print_json({"targets": [{"name": target.name, "description": target.description} for target in targets]})
+    else:
+        sys.stdout.write("".join(f"{target.name:10} {target.description}\n" for target in targets))
+    return ExitCode.OK
 
 
 def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -40,6 +70,8 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "generate",
         help="generate a package that runs the supervisor",
         description="Synthesize the supervisor of a model and write a complete package that runs it.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_model_arguments(parser)
     add_generate_arguments(parser)
@@ -52,18 +84,25 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 def add_generate_arguments(parser: argparse.ArgumentParser) -> None:
     """What to generate, and where to."""
     parser.add_argument(
-        "--target", required=True, metavar="NAME", help="what to generate: see --list-targets; all for everything"
+        "--target",
+        action=_OneTarget,
+        required=True,
+        metavar="NAME",
+        help="what to generate: see --list-targets; all for everything",
     )
     parser.add_argument("--list-targets", action=_ListTargets, nargs=0, help="list what can be generated")
     parser.add_argument(
         "-o",
         "--output",
-        type=Path,
+        type=given_path,
         metavar="DIR",
         help="folder to write to (default: the target's in outputLocations of controller-config.json beside the model)",
     )
     parser.add_argument(
-        "--package", metavar="NAME", help="name of the generated package (default: made from the robot's name)"
+        "--package",
+        metavar="NAME",
+        help="name of the generated package, in lower-case letters, digits and underscores (default: made from the "
+        "robot's name)",
     )
     parser.add_argument("--force", action="store_true", help="overwrite generated files even where you changed them")
 
@@ -84,10 +123,17 @@ def generate_options(arguments: argparse.Namespace) -> "GenerateOptions":
     """What is asked of the target; the folder to write to is set where it is not given.
 
     Raises:
-        UsageError: The file beside the model cannot be used, or there is no folder to write to.
+        UsageError: The package cannot be called so, the file beside the model cannot be used, or there is no folder to
+            write to.
     """
     from robosc.targets import CONFIG_FILE, ControllerConfigError, read_controller_config
+    from robosc.targets.python.package import require_package_name
 
+    try:
+        if arguments.package is not None:
+            require_package_name(arguments.package)
+    except UnsupportedModelError as error:
+        raise UsageError(str(error)) from error
     try:
         config = read_controller_config(arguments.model.parent)
     except ControllerConfigError as error:

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
+from robosc.cli.arguments import given_path
 from robosc.cli.output import ExitCode, UsageError, print_json
 
 
@@ -21,7 +22,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser.add_argument("robot", metavar="ROBOT", help="name of the robot, e.g. LineFollower")
     parser.add_argument(
         "--folder",
-        type=Path,
+        type=given_path,
         metavar="DIR",
         help="folder to write to, made if it is not there (default: one named after the robot, e.g. line_follower)",
     )

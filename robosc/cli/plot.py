@@ -5,6 +5,7 @@ import math
 import sys
 from pathlib import Path
 
+from robosc.cli.arguments import given_path
 from robosc.cli.output import ExitCode, UsageError, print_json
 from robosc.source import visible
 
@@ -19,11 +20,11 @@ event are left out, and the plot says how many.
 def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command."""
     parser = commands.add_parser("plot", help="draw the sequence of events in an event log", description=_DESCRIPTION)
-    parser.add_argument("log", type=Path, metavar="LOG", help="the event log, a file of JSON Lines")
+    parser.add_argument("log", type=given_path, metavar="LOG", help="the event log, a file of JSON Lines")
     parser.add_argument(
         "-o",
         "--output",
-        type=Path,
+        type=given_path,
         metavar="FILE",
         help="where to draw: .png or .svg for a picture, .html for a page that can be zoomed and needs no network "
         "(default: the log's name with .png, beside it)",

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robosc.cli import synth
-from robosc.cli.arguments import engine_options, read_bundle
+from robosc.cli.arguments import engine_options, given_path, read_bundle
 from robosc.cli.output import ExitCode, ProgressLine, UsageError, print_diagnostics, print_json
 from robosc.errors import LanguageError
 from robosc.json_documents import diagnostics_json
@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--properties",
         action="append",
         default=[],
-        type=Path,
+        type=given_path,
         metavar="FILE",
         help="a file with a property on each line; lines that begin with # are comments (may be repeated)",
     )

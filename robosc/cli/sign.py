@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from robosc.cli.arguments import given_path
 from robosc.cli.output import ExitCode, UsageError, print_json, write_bytes
 
 if TYPE_CHECKING:
@@ -25,14 +26,16 @@ key in its configuration, executes that supervisor without verifying it anew. Ve
 def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add both commands."""
     parser = commands.add_parser("key", help="make a key pair for signing supervisor files", description=_KEY)
-    parser.add_argument("name", type=Path, metavar="NAME", help="what NAME.key and NAME.pub are called")
+    parser.add_argument("name", type=given_path, metavar="NAME", help="what NAME.key and NAME.pub are called")
     parser.add_argument("--comment", default="", metavar="TEXT", help="whose key it is; stands in NAME.pub")
     parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
     parser.set_defaults(run=run_key)
 
     parser = commands.add_parser("sign", help="sign a supervisor file", description=_SIGN)
-    parser.add_argument("supervisor", type=Path, metavar="FILE.rsup", help="the supervisor to vouch for")
-    parser.add_argument("--key", type=Path, required=True, metavar="FILE.key", help="the private key to sign with")
+    parser.add_argument("supervisor", type=given_path, metavar="FILE.rsup", help="the supervisor to vouch for")
+    parser.add_argument(
+        "--key", type=given_path, required=True, metavar="FILE.key", help="the private key to sign with"
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
     parser.set_defaults(run=run_sign)
 

@@ -2,7 +2,6 @@
 
 import argparse
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from robosc.cli.arguments import (
@@ -13,6 +12,7 @@ from robosc.cli.arguments import (
     add_model_arguments,
     add_verify_limit_argument,
     engine_options,
+    given_path,
     read_bundle,
 )
 from robosc.cli.output import ExitCode, ProgressLine, print_diagnostics, print_json, require_other_file, write_bytes
@@ -55,7 +55,9 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 def add_output_argument(parser: argparse.ArgumentParser) -> None:
     """The supervisor's file."""
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE.rsup", help="write the supervisor to this file")
+    parser.add_argument(
+        "-o", "--output", type=given_path, metavar="FILE.rsup", help="write the supervisor to this file"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -89,10 +91,17 @@ def make(
 
 def report_synthesis(arguments: argparse.Namespace, made: "Made", bundle: Bundle) -> ExitCode:
     """Write the supervisor's file, print the outcome as asked and return the exit status."""
-    from robosc.supervisor import encode, summary_json, summary_text
+    from robosc.supervisor import encode
 
     if made.supervisor is not None and arguments.output is not None:
         write_bytes(arguments.output, encode(made.supervisor))
+    return report_written(arguments, made, bundle)
+
+
+def report_written(arguments: argparse.Namespace, made: "Made", bundle: Bundle) -> ExitCode:
+    """Print the outcome as asked and return the exit status: of a supervisor whose file is there, if it has one."""
+    from robosc.supervisor import summary_json, summary_text
+
     if arguments.json:
         print_json(
             {

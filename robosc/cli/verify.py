@@ -3,11 +3,16 @@
 import argparse
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robosc.cli import properties
-from robosc.cli.arguments import add_engine_options, add_model_arguments, add_verify_limit_argument, read_bundle
+from robosc.cli.arguments import (
+    add_engine_options,
+    add_model_arguments,
+    add_verify_limit_argument,
+    given_path,
+    read_bundle,
+)
 from robosc.cli.output import ExitCode, ProgressLine, UsageError, print_diagnostics, print_json
 from robosc.cli.sign import read_supervisor, signer_of
 from robosc.errors import Diagnostic, InvalidSupervisorError
@@ -46,7 +51,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     # Optional to the parser alone, so that another question about a MODEL can do without it.
-    parser.add_argument("supervisor", nargs="?", type=Path, metavar="FILE.rsup", help="the supervisor to check")
+    parser.add_argument("supervisor", nargs="?", type=given_path, metavar="FILE.rsup", help="the supervisor to check")
     add_model_arguments(parser)
     properties.add_arguments(parser)
     parser.add_argument(
@@ -60,7 +65,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "--signed-by",
         action="append",
         default=[],
-        type=Path,
+        type=given_path,
         metavar="FILE.pub",
         help="the supervisor file must be signed by a key of this file (may be repeated); without MODEL, that alone is "
         "checked",

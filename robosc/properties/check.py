@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable
 
-from robosc.automata.semantics import TooManyChoicesError
+from robosc.automata.semantics import Semantics, TooManyChoicesError
 from robosc.model.structure import Deployment, Model
 from robosc.properties.controller import Controller
 from robosc.properties.orders import Orders
@@ -26,6 +26,7 @@ def check_controller(
     is_nonblocking: bool,
     states: int = 0,
     limit: int = DEFAULT_LIMIT,
+    semantics: Semantics | None = None,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> Properties:
     """Finite response, confluence and nonblocking under control of a supervisor; the same for the same input.
@@ -40,13 +41,14 @@ def check_controller(
         states: States of the controlled system, as far as is known: where there are `HOPELESS` times as many as
             `limit` allows, nothing is searched for nonblocking alone, which only a whole search can tell.
         limit: Stable states beyond which a search is given up.
+        semantics: Of the model's automata there, where it was made already.
         should_stop: Asked now and then; once true, the work ends.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.
     """
     conditions = tuple(added)
-    controller = Controller(model, deployment, conditions)
+    controller = Controller(model, deployment, conditions, semantics)
     ends = always_end(controller.system, should_stop)
     is_confluent = ends and never_conflict(controller, conditions, should_stop)
     # Not without an end of silent steps: what comes after them would not.

@@ -134,6 +134,7 @@ class Controller:
         model: The checked robot.
         deployment: Where the supervisor stands.
         added: The conditions that synthesis adds.
+        semantics: Of the model's automata there, where it was made already.
 
     Attributes:
         is_deterministic: Whether no two transitions apply to one event in one state, whatever a model may say.
@@ -145,11 +146,20 @@ class Controller:
         requests: Events of requests, in source order.
     """
 
-    def __init__(self, model: Model, deployment: Deployment, added: Iterable[AddedCondition]) -> None:
-        written, model = model, executed(model)
-        self.is_deterministic = model == written
-        self.system: System = to_automata(model, deployment)
-        self._semantics = Semantics(self.system)
+    def __init__(
+        self,
+        model: Model,
+        deployment: Deployment,
+        added: Iterable[AddedCondition],
+        semantics: Semantics | None = None,
+    ) -> None:
+        alone = executed(model)
+        self.is_deterministic = alone == model
+        if not self.is_deterministic:
+            # What is executed has other automata than those that were given a meaning.
+            model, semantics = alone, None
+        self._semantics = semantics or Semantics(to_automata(model, deployment))
+        self.system: System = self._semantics.system
         self._added = state_predicates(self.system, added)
         places = {subject: place for place, subject in enumerate(subjects(self.system))}
         self.goals = tuple(_goals(model, places))

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from robosc._version import __version__
-from robosc.automata import System
+from robosc.automata.semantics import Semantics
 from robosc.errors import InternalError
 from robosc.model.structure import Deployment
 from robosc.source import Bundle
@@ -14,7 +14,7 @@ from robosc.verification import Limits, Outcome, judge
 
 
 def certify(
-    system: System,
+    semantics: Semantics,
     result: SynthesisResult,
     bundle: Bundle,
     deployment: Deployment,
@@ -26,7 +26,7 @@ def certify(
     """Let the independent verifier judge the result; a fault it finds is ours.
 
     Args:
-        system: Plants and event conditions.
+        semantics: Of plants and event conditions.
         result: A supervisor of them.
         bundle: The texts that they were made from.
         deployment: Where the supervisor will stand.
@@ -38,12 +38,14 @@ def certify(
         SynthesisCancelled: `should_stop` became true.
         InternalError: The verifier found fault with the result.
     """
+    system = semantics.system
     judgement = judge(
         system,
         state_predicates(system, result.added),
         limits,
         expected_states=result.statistics.states,
         engine=result.statistics.engine,
+        semantics=semantics,
         should_stop=should_stop,
         on_progress=on_progress,
     )

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from robosc import explanation as explanations
-from robosc.automata import System, to_automata
+from robosc.automata import Semantics, System, to_automata
 from robosc.errors import Diagnostic, NodeLimitError, sorted_diagnostics
 from robosc.model import check
 from robosc.model.layers import layer_findings
@@ -177,8 +177,9 @@ def make_supervisor(
             )
         return Made(MadeStatus.EMPTY, None, prepared.diagnostics, result.statistics, reason, explanation)
     on_progress(Progress("verification", f"{result.statistics.states} states"))
+    semantics = Semantics(system)
     certificate = certify(
-        system,
+        semantics,
         result,
         bundle,
         deployment,
@@ -193,6 +194,7 @@ def make_supervisor(
         result.added,
         is_nonblocking=certificate.nonblocking == "passed",
         states=result.statistics.states,
+        semantics=semantics,
         should_stop=should_stop,
     )
     diagnostics = sorted_diagnostics(

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from robosc._version import __version__
-from robosc.automata import System, to_automata
+from robosc.automata import Semantics, System, to_automata
 from robosc.automata.compile import State
 from robosc.automata.plants import communication_plant_name
 from robosc.automata.state import subjects
@@ -149,6 +149,7 @@ def recheck(
     if faults:
         return Recheck((), tuple(faults), notes, None)
     system = to_automata(checked.model, supervisor.deployment)
+    semantics = Semantics(system)
 
     def judged(expected_states: int) -> Judgement:
         return judge(
@@ -157,6 +158,7 @@ def recheck(
             limits,
             expected_states=expected_states,
             engine=engine,
+            semantics=semantics,
             should_stop=should_stop,
             on_progress=on_progress,
         )
@@ -176,6 +178,7 @@ def recheck(
             supervisor.added,
             is_nonblocking=found.nonblocking is Outcome.PASSED,
             states=found.states or told,
+            semantics=semantics,
             should_stop=should_stop,
         ).certified()
         faults += [Fault("certificate", text) for text in _false_properties(claimed, properties)]

@@ -5,11 +5,13 @@ what the two do differently (counting, restricting, complemented edges) is not u
 """
 
 import importlib
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from robosc.dd_modules import load_dd
 from robosc.errors import NodeLimitError, RoboscError
 
 ENTRY_POINTS = "robosc.bdd_engines"
@@ -23,9 +25,19 @@ _CUDD_NODE_BYTES = 64
 _SLACK = 4
 """How much more than the limit one operation may have for what it needs on its way."""
 
+_NEARLY = 0.9
+"""Of the memory that CUDD may have: at this much it was that which stopped it, and not the machine."""
+
 _CACHE_SLOTS = 2**14
 """Results of operations that CUDD remembers at the beginning; it takes more as they pay. Its own choice of 2^18 takes
 longer to set up than a supervisor of a dozen states."""
+
+
+_MEMORY_ESTIMATE_BYTES = 2**24
+_LOOSE_SLOTS = 6_710_886
+"""CUDD fills a row for dead nodes, of a size that goes by the memory that it expects to use: with dd's own estimate of
+1 GiB 8 MiB of it, longer than a small synthesis takes. How fast its tables grow is set as for that estimate; how large,
+by the limits of a synthesis alone."""
 
 
 class Manager(Protocol):
@@ -89,14 +101,14 @@ _READY: dict[str, Manager] = {}
 
 
 def _make_cudd() -> Manager:
-    manager = importlib.import_module("dd.cudd").BDD(initial_cache_size=_CACHE_SLOTS)
+    manager = load_dd("cudd").BDD(initial_cache_size=_CACHE_SLOTS, memory_estimate=_MEMORY_ESTIMATE_BYTES)
     # The order is chosen from the model; reordering would make results depend on sizes met on the way.
-    manager.configure(reordering=False)
+    manager.configure(reordering=False, loose_up_to=_LOOSE_SLOTS)
     return manager  # type: ignore[no-any-return]  # dd has no types
 
 
 def _make_autoref() -> Manager:
-    manager = importlib.import_module("dd.autoref").BDD()
+    manager = load_dd("autoref").BDD()
     manager.configure(reordering=False)
     return manager  # type: ignore[no-any-return]
 
@@ -183,22 +195,35 @@ def limited(manager: Manager, maximum_nodes: int | None) -> Iterator[None]:
 
     Raises:
         NodeLimitError: An operation would have grown too far.
+        MemoryError: CUDD was refused memory before that. Mostly it ends the process then, by `exit(1)`.
     """
     if maximum_nodes is None or not is_compiled(manager):
         yield
         return
-    is_full = False
-    manager.configure(max_memory=_CUDD_BASE_BYTES + _SLACK * _CUDD_NODE_BYTES * maximum_nodes)  # type: ignore[attr-defined]
+    has_failed = False
+    allowed_bytes = _CUDD_BASE_BYTES + _SLACK * _CUDD_NODE_BYTES * maximum_nodes
+    manager.configure(max_memory=allowed_bytes)  # type: ignore[attr-defined]
     try:
         yield
     except ValueError as error:
         # There is no error of its own for this.
-        is_full = "NULL" in str(error)
-        if not is_full:
+        has_failed = "NULL" in str(error)
+        if not has_failed:
             raise
     # Outside of the handler: the error would keep the frames, and they the nodes of a manager that is to end.
-    if is_full:
+    if has_failed:
+        # Which of CUDD's error codes it was, dd does not tell. Tables of the operation alone are free again already.
+        if _memory_of(manager) < _NEARLY * allowed_bytes:
+            raise MemoryError("the decision diagrams were refused memory")
         raise node_limit_error(maximum_nodes)
+
+
+def _memory_of(manager: Any) -> float:
+    """Bytes that CUDD has."""
+    with warnings.catch_warnings():
+        # That it counted in other units once is of no interest.
+        warnings.simplefilter("ignore", UserWarning)
+        return float(manager.statistics()["mem"])
 
 
 def node_check(manager: Manager, maximum_nodes: int | None) -> Callable[[], None]:
@@ -253,7 +278,7 @@ def reordering(manager: Manager, order: Sequence[str], *, is_wanted: bool = True
 
 def _has_cudd() -> bool:
     try:
-        importlib.import_module("dd.cudd")
+        load_dd("cudd")
     except ImportError:
         return False
     return True

@@ -8,7 +8,7 @@ IEEE Trans. Computers C-35(8), 1986, pp. 677-691 (counting).
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from robosc.synthesis.engines import Manager, is_compiled
+from robosc.synthesis.engines import Manager, is_compiled, is_reordering
 
 
 def cofactors(node: Any) -> tuple[Any, Any]:
@@ -50,10 +50,13 @@ def support(manager: Manager, node: Any) -> set[str]:
 def renamed(manager: Manager, names: Mapping[str, str], node: Any) -> Any:
     """A predicate with variables called otherwise, no two alike.
 
-    The plain engine would build anew what stands below all of them: here that is not looked at.
+    The plain engine would build anew what stands below all of them: here that is not looked at. What is below, and
+    which node a number stands for, holds only while the order does: an engine that changes it renames by itself.
     """
-    if not names or is_compiled(manager):
-        return manager.let(names, node) if names else node
+    if not names:
+        return node
+    if is_compiled(manager) or is_reordering(manager):
+        return manager.let(names, node)
     return _Renaming(manager, names).walk(node)
 
 

@@ -8,6 +8,7 @@ application of multi-level logic synthesis", EDAC 1991, pp. 50-54), judged by th
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
+from functools import cache
 from itertools import permutations
 
 from robosc.automata.state import Subject
@@ -91,6 +92,7 @@ def force(count: int, edges: Sequence[Sequence[int]]) -> tuple[int, ...]:
     """An order of `count` things with a small total span of `edges`; never worse than the order given."""
     best = order = list(range(count))
     best_span = span(order, edges)
+    known = {tuple(order)}
     # Aloul et al. find convergence within a small multiple of log2 of the size.
     for _ in range(20 + 5 * count.bit_length()):
         position = {item: place for place, item in enumerate(order)}
@@ -104,8 +106,9 @@ def force(count: int, edges: Sequence[Sequence[int]]) -> tuple[int, ...]:
         now = span(order, edges)
         if now < best_span:
             best, best_span = order, now
-        elif all(item == place for item, place in zip(order, position, strict=True)):
-            break
+        if tuple(order) in known:
+            break  # What follows has been seen.
+        known.add(tuple(order))
     return tuple(best)
 
 
@@ -140,24 +143,55 @@ def _best_permutation(
     window: list[int], start: int, edges: Sequence[Sequence[int]], position: dict[int, int]
 ) -> list[int]:
     """The permutation of a window with the least span of the edges that touch it; leaves `position` at it."""
-    inside = set(window)
-    # Outside of the window an edge reaches as far as it does, however the window is ordered.
-    outer = []
+    members = {item: 1 << number for number, item in enumerate(window)}
+    # An edge reaches as far outside of the window as it does, however the window is ordered: of what is inside, by the
+    # set of its members, the last place counts where nothing is beyond it, and the first one where nothing is before.
+    firsts, lasts = defaultdict[int, int](int), defaultdict[int, int](int)
     for edge in edges:
-        beyond = [position[item] for item in edge if item not in inside]
-        outer.append((min(beyond, default=None), max(beyond, default=None), [item for item in edge if item in inside]))
-    best, least = window, None
-    for candidate in permutations(window):
-        place = {item: start + offset for offset, item in enumerate(candidate)}
+        inside = 0
+        is_beyond = is_before = False
+        for item in edge:
+            member = members.get(item)
+            if member is not None:
+                inside |= member
+            elif position[item] < start:
+                is_before = True
+            else:
+                is_beyond = True
+        if not is_beyond:
+            lasts[inside] += 1
+        if not is_before:
+            firsts[inside] += 1
+    best, least = tuple(range(len(window))), None
+    for candidate, first, last in _permutations(len(window)):
         total = 0
-        for low, high, items in outer:
-            places = [place[item] for item in items]
-            first, last = min(places), max(places)
-            total += (last if high is None else max(high, last)) - (first if low is None else min(low, first))
+        for inside, count in lasts.items():
+            total += count * last[inside]
+        for inside, count in firsts.items():
+            total -= count * first[inside]
         if least is None or total < least:
-            best, least = list(candidate), total
-    position.update((item, start + offset) for offset, item in enumerate(best))
-    return best
+            best, least = candidate, total
+    chosen = [window[number] for number in best]
+    position.update((item, start + offset) for offset, item in enumerate(chosen))
+    return chosen
+
+
+@cache
+def _permutations(width: int) -> tuple[tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]], ...]:
+    """Each permutation of a window, with the first and the last place of each set of its members (its bits)."""
+    found = []
+    for candidate in permutations(range(width)):
+        places = [
+            [candidate.index(member) for member in range(width) if inside >> member & 1] for inside in range(2**width)
+        ]
+        found.append(
+            (
+                candidate,
+                tuple(min(some, default=0) for some in places),
+                tuple(max(some, default=0) for some in places),
+            )
+        )
+    return tuple(found)
 
 
 def span(order: Iterable[int], edges: Sequence[Sequence[int]]) -> int:

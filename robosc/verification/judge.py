@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from robosc.automata.controlled import TRANSITIONS_PER_STATE
 from robosc.automata.decision import Decision
+from robosc.automata.semantics import Semantics
 from robosc.automata.structure import System
 from robosc.verification.verify import Outcome, Verification, verify
 
@@ -58,6 +59,7 @@ def judge(
     *,
     expected_states: int = 0,
     engine: str = "auto",
+    semantics: Semantics | None = None,
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[str], None] = lambda message: None,
 ) -> Judgement:
@@ -70,6 +72,7 @@ def judge(
         expected_states: States that the controlled system is said to have: where these are too many, the search one
             by one is not even begun.
         engine: Engine of the symbolic search: see `verify_symbolically`.
+        semantics: Of the system, where it was made already.
         should_stop: Asked now and then; once true, the work ends.
         on_progress: Told now and then where the work is, in one short line.
 
@@ -83,6 +86,7 @@ def judge(
             added,
             limit=limits.states,
             permissive_limit=limits.recomputed,
+            semantics=semantics,
             should_stop=should_stop,
             on_progress=on_progress,
         )

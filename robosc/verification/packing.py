@@ -28,14 +28,18 @@ CodeTest = Callable[[int], bool]
 class Packing:
     """Where each place of a state has its field.
 
+    Args:
+        semantics: The uncontrolled system.
+
     Attributes:
         semantics: The uncontrolled system.
         places: Place of each subject.
         wide_steps: How many steps were worked out so far beyond `ORDINARY_STEPS` of an event in one state.
     """
 
-    def __init__(self, system: System) -> None:
-        self.semantics = Semantics(system)
+    def __init__(self, semantics: Semantics) -> None:
+        self.semantics = semantics
+        system = semantics.system
         order = subjects(system)
         self.places = {subject: place for place, subject in enumerate(order)}
         self._domains = [subject_domain(system, subject) for subject in order]
@@ -159,7 +163,7 @@ class EventTable:
 
     def _fresh(self) -> Semantics:
         """The meaning of this event alone, with nothing remembered."""
-        return Semantics(replace(self._packing.system, events=(self.event,), invariants=()))
+        return self._packing.semantics.only(self.event)
 
     def changes(self, code: int) -> tuple[int, ...]:
         """What each possible step in a state changes; see `known`.

@@ -11,6 +11,7 @@ from enum import StrEnum
 
 from robosc.automata.compile import State
 from robosc.automata.controlled import Added
+from robosc.automata.semantics import Semantics
 from robosc.automata.state import subjects
 from robosc.automata.structure import System
 from robosc.verification.packing import CodeTest, Packing
@@ -93,6 +94,7 @@ def verify(
     initial: Callable[[State], bool] | None = None,
     limit: int = DEFAULT_LIMIT,
     permissive_limit: int = DEFAULT_PERMISSIVE_LIMIT,
+    semantics: Semantics | None = None,
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[str], None] = lambda message: None,
 ) -> Verification:
@@ -105,6 +107,7 @@ def verify(
         limit: Number of states of the controlled system beyond which nothing is checked.
         permissive_limit: Number of states that the plants reach under the event conditions beyond which
             permissiveness is not checked. Both count `TRANSITIONS_PER_STATE` transitions as a state, too.
+        semantics: Of the system, where it was made already.
         should_stop: Asked now and then; once true, the work ends.
         on_progress: Told now and then where the work is, in one short line.
 
@@ -113,7 +116,7 @@ def verify(
         ValueError: A condition is added to something that is no event of the system.
     """
     require_known(system, added)
-    packing = Packing(system)
+    packing = Packing(semantics or Semantics(system))
     begins = (lambda code: True) if initial is None else packing.condition(initial)
     found = search(packing, added, Effort(limit, should_stop, on_progress, "states"), begins)
     if found is None:

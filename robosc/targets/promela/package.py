@@ -4,6 +4,7 @@ from robosc.automata import to_automata
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.promela.model import promela_model
+from robosc.targets.python.package import package_name
 from robosc.targets.registry import GenerateOptions
 
 _README = """\
@@ -47,7 +48,7 @@ def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles
         UnsupportedModelError: The model is outside what the target handles.
     """
     system = to_automata(supervisor.model, supervisor.deployment)
-    name = options.package or supervisor.model.name
+    name = supervisor.model.name if options.package is None else package_name(supervisor, options, "")
     file = f"{name}.pml"
     head = (
         f"/* The controlled system of {supervisor.model.name} ({supervisor.deployment}): "

@@ -69,13 +69,21 @@ def package_name(supervisor: Supervisor, options: GenerateOptions, suffix: str) 
     """
     if options.package is None:
         return f"{snake_case(supervisor.model.name)[:_MAXIMUM_NAME].rstrip('_')}_{suffix}"
-    is_name = snake_case(options.package) == options.package and not keyword.iskeyword(options.package)
-    if not is_name or len(options.package) > 2 * _MAXIMUM_NAME:
+    require_package_name(options.package)
+    return options.package
+
+
+def require_package_name(name: str) -> None:
+    """Do nothing if a package of any target may be called so.
+
+    Raises:
+        UnsupportedModelError: It may not.
+    """
+    if snake_case(name) != name or keyword.iskeyword(name) or len(name) > 2 * _MAXIMUM_NAME:
         raise UnsupportedModelError(
-            f"'{options.package}' is no name for a package: lower-case letters, digits and single underscores, "
+            f"'{name}' is no name for a package: lower-case letters, digits and single underscores, "
             "starting with a letter, and no keyword of Python"
         )
-    return options.package
 
 
 def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles:

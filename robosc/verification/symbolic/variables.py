@@ -1,6 +1,5 @@
 """Places of a state and received data as Boolean variables of a decision diagram."""
 
-import importlib
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Any
@@ -10,6 +9,7 @@ from robosc.automata.decision import Decision
 from robosc.automata.inputs import connected_inputs, valuations
 from robosc.automata.state import Subject, initial_values, subject_domain, subjects
 from robosc.automata.structure import InputVariable, System
+from robosc.dd_modules import load_dd
 from robosc.expressions import IntegerType, Received, Value, domain, leaves
 from robosc.recursion import allow_depth
 from robosc.verification.symbolic.order import place_order, tied
@@ -59,11 +59,11 @@ def make_manager(engine: str) -> Any:
     """
     if engine != "autoref":
         try:
-            manager = importlib.import_module("dd.cudd").BDD()
+            manager = load_dd("cudd").BDD()
         except ImportError:
-            manager = importlib.import_module("dd.autoref").BDD()
+            manager = load_dd("autoref").BDD()
     else:
-        manager = importlib.import_module("dd.autoref").BDD()
+        manager = load_dd("autoref").BDD()
     # The order is chosen below, so that the work is the same wherever it is done.
     manager.configure(reordering=False)
     return manager

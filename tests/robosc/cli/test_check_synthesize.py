@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from robosc.cli.main import main
-from support.models import EMPTY, EXAMPLES
+from support.models import EMPTY, EXAMPLES, UNSUPPORTED
 
 LINE_FOLLOWER = str(EXAMPLES / "line_follower" / "line_follower.rscd")
 
@@ -23,20 +23,6 @@ LIGHTS = """robot R {
     }
     requirement green needs Lights.lit
     requirement red needs Lights.dark or Lights.lit
-}"""
-
-UNSUPPORTED = """robot R {
-    component C {
-        incoming message m with type: none
-        outgoing message n with type: integer(0..2000)
-        behaviour {
-            variable x: integer(0..2000)
-            variable y: integer(0..2000)
-            on response from n do x := value, y := x
-            initial marked state s { }
-        }
-    }
-    requirement m needs C.x / C.y > 0.5
 }"""
 
 COMPETING = "'green' and 'red' can both be requested on '/light' after button.response"

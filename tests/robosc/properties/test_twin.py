@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from robosc.automata import Semantics, to_automata
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.model.structure import Deployment
 from robosc.properties import Properties, check_controller
@@ -14,6 +15,7 @@ from robosc.properties.orders import Orders
 from robosc.properties.search import search
 from robosc.properties.structure import always_end, never_conflict, stays_nonblocking
 from robosc.supervisor.structure import Supervisor
+from robosc.verification import verify
 from support.controller_twin import twin_of
 from support.random_controllers import ONE_FIELD, random_controller, random_robot
 from support.random_supervisors import random_supervisor
@@ -228,11 +230,21 @@ def test_what_is_proved_by_structure_is_true(record_property: Callable[[str, obj
 
 @pytest.mark.parametrize("seed", range(0, 60, 3))
 def test_any_supervisor_is_judged(seed: int) -> None:
-    """Supervisors that nobody synthesized, with everything that the language has; the same twice."""
+    """Supervisors that nobody synthesized, with everything that the language has; the same whatever came before."""
     supervisor = random_supervisor(seed)
-    first, second = (
-        check_controller(supervisor.model, supervisor.deployment, supervisor.added, is_nonblocking=False, limit=150)
-        for _ in range(2)
+    used = Semantics(to_automata(supervisor.model, supervisor.deployment))
+    before = verify(used.system, {}, limit=150, semantics=used)
+    assert before == verify(used.system, {}, limit=150)
+    first, second, third = (
+        check_controller(
+            supervisor.model,
+            supervisor.deployment,
+            supervisor.added,
+            is_nonblocking=False,
+            limit=150,
+            semantics=semantics,
+        )
+        for semantics in (None, used, used)
     )
-    assert first == second
+    assert first == second == third
     assert len(first.method) < 500

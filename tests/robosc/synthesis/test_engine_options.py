@@ -83,6 +83,14 @@ def test_an_expression_is_broken_off_in_the_middle(engine: str) -> None:
         synthesize(_product(), engine=EngineOptions(engine, maximum_nodes=20_000))
 
 
+def test_memory_that_cudd_is_refused_is_told_as_such() -> None:
+    """As dd tells it, far below what the limit of nodes leaves to it."""
+    pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+    manager = make_manager("cudd")
+    with pytest.raises(MemoryError, match="were refused memory"), limited(manager, 10**7):
+        raise ValueError("`DdNode *node` is `NULL` pointer.")
+
+
 def test_other_errors_pass_the_limit(engine: str) -> None:
     manager = make_manager(engine)
     with pytest.raises(ValueError, match="something else"), limited(manager, 1_000):

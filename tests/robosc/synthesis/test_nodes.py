@@ -65,6 +65,36 @@ def test_renaming(manager: Any, formula: Any, places: set[int]) -> None:
     assert renamed(manager, names, build(manager, own)) == build(manager, with_names(own, names))
 
 
+def _chosen(manager: Any, names: tuple[str, ...], table: int) -> Any:
+    """The function whose value for each choice of bits is a bit of a number."""
+    if not names:
+        return manager.true if table & 1 else manager.false
+    half = 2 ** (len(names) - 1)
+    high, low = _chosen(manager, names[1:], table >> half), _chosen(manager, names[1:], table & (2**half - 1))
+    return manager.ite(manager.var(names[0]), high, low)
+
+
+@settings(max_examples=200, deadline=None)
+@given(table=st.integers(0, 2**64 - 1), order=st.permutations([*NAMES, *(f"{name}'" for name in NAMES)]))
+@pytest.mark.parametrize("engine", ["cudd", "autoref"])
+def test_names_are_right_whatever_becomes_of_the_order_meanwhile(engine: str, table: int, order: list[str]) -> None:
+    if engine == "cudd":
+        pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+    manager: Any = make_manager(engine)
+    manager.declare(*order)
+    before = _chosen(manager, tuple(f"{name}'" for name in NAMES), table)
+    expected = _chosen(manager, NAMES, table)
+    others = [
+        _chosen(manager, (*NAMES[3:], *(f"{name}'" for name in NAMES[:3])), table ^ number) for number in range(3)
+    ]
+    manager.configure(reordering=True)
+    if engine == "autoref":
+        # It asks for another order when it has grown to twice this, which is in the middle of the work then.
+        manager._bdd._last_len = len(manager) // 2 + table % 16
+    assert renamed(manager, {f"{name}'": name for name in NAMES}, before) == expected
+    assert len(others) == 3
+
+
 @settings(max_examples=100, deadline=None)
 @given(formula=formulas)
 def test_counting(manager: Any, formula: Any) -> None:

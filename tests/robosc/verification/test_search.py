@@ -38,13 +38,13 @@ def random_conditions(made: System, seed: int) -> Added:
 
 
 def searched(made: System, added: Added, limit: int = 20_000) -> Reached:
-    found = search(Packing(made), added, effort(limit))
+    found = search(Packing(Semantics(made)), added, effort(limit))
     assert found is not None
     return found
 
 
 def _allowed(made: System) -> tuple[Packing, Allowed]:
-    packing = Packing(made)
+    packing = Packing(Semantics(made))
     tables = packing.tables(made.events, {})
     found = allowed(packing, tables, effort())
     assert found is not None
@@ -137,7 +137,7 @@ def test_what_is_forgotten_is_worked_out_again(monkeypatch: pytest.MonkeyPatch) 
 @settings(deadline=None, max_examples=10)
 @given(any_systems())
 def test_packing_and_back(made: System) -> None:
-    packing = Packing(made)
+    packing = Packing(Semantics(made))
     for dice in map(Random, range(5)):
         state = tuple(dice.choice(list(subject_domain(made, subject))) for subject in subjects(made))
         assert packing.decode(packing.encode(state)) == state
@@ -146,8 +146,8 @@ def test_packing_and_back(made: System) -> None:
 def test_the_limit_is_exact() -> None:
     made = FAMILIES["random robot"](3)
     states = len(searched(made, {}).codes)
-    assert search(Packing(made), {}, effort(states)) is not None
-    assert search(Packing(made), {}, effort(states - 1)) is None
+    assert search(Packing(Semantics(made)), {}, effort(states)) is not None
+    assert search(Packing(Semantics(made)), {}, effort(states - 1)) is None
 
 
 @pytest.mark.timeout(60)
@@ -161,12 +161,12 @@ def test_steps_without_number_end_the_search() -> None:
         ),
         inputs=[InputVariable("u_got", ("x",), wide), InputVariable("u_got", ("y",), wide)],
     )
-    assert search(Packing(made), {}, effort(10**6)) is None
+    assert search(Packing(Semantics(made)), {}, effort(10**6)) is None
     one = system(
         automaton("A", [edge("l -u_got-> l", n=received("x"))], variables=[DiscreteVariable("n", wide, (0,))]),
         inputs=[InputVariable("u_got", ("x",), wide)],
     )
-    assert search(Packing(one), {}, effort(20_000)) is None
+    assert search(Packing(Semantics(one)), {}, effort(20_000)) is None
 
 
 def test_a_range_too_wide_to_list_is_packed() -> None:
@@ -183,10 +183,10 @@ def test_a_range_too_wide_to_list_is_packed() -> None:
 
 def test_progress_is_told_and_the_search_stops(monkeypatch: pytest.MonkeyPatch) -> None:
     made, told = FAMILIES["dining philosophers"](8), list[str]()
-    search(Packing(made), {}, Effort(50_000, lambda: False, told.append, "states"))
+    search(Packing(Semantics(made)), {}, Effort(50_000, lambda: False, told.append, "states"))
     assert told == []
     monkeypatch.setattr(search_module, "PROGRESS_INTERVAL", 1024)
-    search(Packing(made), {}, Effort(50_000, lambda: False, told.append, "states"))
+    search(Packing(Semantics(made)), {}, Effort(50_000, lambda: False, told.append, "states"))
     assert told[:1] == ["1024 states"]
     with pytest.raises(SynthesisCancelled):
-        search(Packing(made), {}, Effort(50_000, lambda: bool(told), told.append, "states"))
+        search(Packing(Semantics(made)), {}, Effort(50_000, lambda: bool(told), told.append, "states"))

@@ -40,12 +40,14 @@ class Facts:
         needs_turtlebot3: Whether its argument `robot` is a `devices.robots.Robot`, whose motors or board it drives;
             else it is a `devices.robots.Body`, and the robot may be any.
         turn_s: How long a turn of a range scanner takes; None: that is not known.
+        torque_on_s: Within which motors that are told to hold do so and tell it; None: as the safety layer has it.
     """
 
     buttons: tuple[str, ...] = ()
     has_imu: bool = False
     needs_turtlebot3: bool = False
     turn_s: float | None = None
+    torque_on_s: float | None = None
 
     @property
     def has_bumpers(self) -> bool:
@@ -97,7 +99,8 @@ _BUILT_IN: dict[Kind, dict[str, tuple[str, str, Facts | None]]] = {
         "mavlink-rover": (
             "a MAVLink rover: ArduPilot Rover, driven in its mode GUIDED over a serial line, UDP or TCP",
             "robosc_bridge.devices.mavlink_drivers:make_rover",
-            Facts(has_imu=True),
+            # Its mode and its arming show in a heartbeat each; there is one a second, of which two may be lost.
+            Facts(has_imu=True, torque_on_s=8.0),
         ),
         "opencr": (
             "a stock TurtleBot3: its OpenCR board with the ROS 2 firmware",

@@ -1,4 +1,4 @@
-"""Asking a service of this machine how it is, by gRPC's health checks: for containers, units and probes."""
+"""Asking a service how it is, by gRPC's health checks: for containers, units, probes and people."""
 
 import socket
 from collections.abc import Sequence
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import grpc
-from grpc_health.v1 import health_pb2, health_pb2_grpc
+from google.protobuf.wrappers_pb2 import StringValue, UInt32Value
 
 from robosc_api.security.addresses import joined, split
 from robosc_api.security.client import Credentials, open_channel
@@ -19,6 +19,11 @@ _ANYWHERE = {"0.0.0.0": "127.0.0.1", "": "127.0.0.1", "::": "::1"}  # noqa: S104
 _UNANSWERED = (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED, grpc.StatusCode.CANCELLED)
 
 
+_METHOD = "/grpc.health.v1.Health/Check"
+
+_STATUSES = ("UNKNOWN", "SERVING", "NOT_SERVING", "SERVICE_UNKNOWN")
+
+
 @dataclass(frozen=True, slots=True)
 class Condition:
     """How a service is.
@@ -28,11 +33,13 @@ class Condition:
             where a certificate does not suit. One that takes connections and says nothing hangs, and is not there.
         is_serving: Whether it said that it is well.
         words: Its answer, or why there is none.
+        has_answered: Whether there is an answer, well or not.
     """
 
     is_there: bool
     is_serving: bool
     words: str
+    has_answered: bool = False
 
 
 def local_address(address: str) -> str:
@@ -71,18 +78,44 @@ def ask_health(
         credentials = Credentials(ca=certificate, certificate=shown and shown[0], key=shown and shown[1])
         # The certificate is for the name that others call the machine by.
         options = (*options, ("grpc.ssl_target_name_override", _name_in(certificate)))
+    return ask_service(address, service, credentials, timeout_s=timeout_s, options=options)
+
+
+def ask_service(
+    address: str,
+    service: str,
+    credentials: Credentials,
+    *,
+    timeout_s: float,
+    options: tuple[tuple[str, str | int], ...] = (),
+) -> Condition:
+    """Ask a service anywhere how it is.
+
+    Args:
+        address: `HOST:PORT`.
+        service: Full name of one; empty: the program as a whole.
+        credentials: How it is reached.
+        timeout_s: Longest time for connection and answer, in seconds.
+        options: Of the channel.
+
+    Raises:
+        SecurityError: A file cannot be used.
+    """
     with open_channel(address, credentials, options) as channel:
-        stub = health_pb2_grpc.HealthStub(channel)
+        # A request has one text, and an answer one number: messages that everybody has, whose bytes are the same.
+        ask = channel.unary_unary(
+            _METHOD, request_serializer=StringValue.SerializeToString, response_deserializer=UInt32Value.FromString
+        )
         try:
-            answer = stub.Check(health_pb2.HealthCheckRequest(service=service), timeout=timeout_s)
+            answer = ask(StringValue(value=service), timeout=timeout_s)
         except grpc.RpcError as error:
             is_there = error.code() not in _UNANSWERED or (
                 # Nobody listens, or a handshake has failed.
                 error.code() is grpc.StatusCode.UNAVAILABLE and _takes_connections(address, timeout_s)
             )
             return Condition(is_there, False, f"{error.code().name}: {error.details()}")
-    status = health_pb2.HealthCheckResponse.ServingStatus
-    return Condition(True, answer.status == status.SERVING, status.Name(answer.status))
+    status = _STATUSES[answer.value] if answer.value < len(_STATUSES) else f"status {answer.value}"
+    return Condition(True, status == "SERVING", status, has_answered=True)
 
 
 def ask_alive(

@@ -4,10 +4,10 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Any
 
 import grpc
-import grpc.aio
 from google.protobuf.message import DecodeError
 
 from robosc_api.failures import failure_metadata
+from robosc_api.layers import Layer
 from robosc_api.streams import write_responses
 
 _MALFORMED = object()
@@ -20,32 +20,27 @@ class MalformedError(Exception):
 _CODE, _MESSAGE = grpc.StatusCode.INVALID_ARGUMENT, "the request is no message of this service"
 
 
-class MalformedRequests(grpc.aio.ServerInterceptor):
+class MalformedRequests(Layer):
     """Answers them for the methods of some services; methods that take bytes as they come look at them themselves.
 
     Args:
         services: Their full names.
+        limit: Bytes of a request; longer ones are not even parsed. None: any number.
     """
 
-    def __init__(self, *services: str) -> None:
+    def __init__(self, *services: str, limit: int | None = None) -> None:
+        super().__init__()
+        self._limit = limit
         self._prefixes = tuple(f"/{service}/" for service in services)
-        # By method: the handler that was there, and the one behind a check, made once and not for each call.
-        self._made: dict[str, tuple[Any, Any]] = {}
 
-    async def intercept_service(self, continuation: Callable[[Any], Awaitable[Any]], handler_call_details: Any) -> Any:
-        """The method's handler, behind a check of its requests."""
-        handler = await continuation(handler_call_details)
-        method: str = handler_call_details.method
-        if handler is None or handler.request_deserializer is None or not method.startswith(self._prefixes):
-            return handler
-        made = self._made.get(method)
-        if made is None or made[0] is not handler:
-            made = self._made[method] = handler, self._behind(handler)
-        return made[1]
+    def around(self, inner: Any, method: str) -> Any:
+        """A handler behind a check of its requests."""
+        if inner.request_deserializer is None or not method.startswith(self._prefixes):
+            return inner
+        return self._behind(inner)
 
-    @staticmethod
-    def _behind(handler: Any) -> Any:
-        parse, serialize = _tolerant(handler.request_deserializer), handler.response_serializer
+    def _behind(self, handler: Any) -> Any:
+        parse, serialize = _tolerant(handler.request_deserializer, self._limit), handler.response_serializer
         if handler.unary_unary:
             return grpc.unary_unary_rpc_method_handler(_checked(handler.unary_unary), parse, serialize)
         if handler.unary_stream:
@@ -53,8 +48,10 @@ class MalformedRequests(grpc.aio.ServerInterceptor):
         return grpc.stream_stream_rpc_method_handler(_checked_each(handler.stream_stream), parse, serialize)
 
 
-def _tolerant(parse: Callable[[bytes], Any]) -> Callable[[bytes], Any]:
+def _tolerant(parse: Callable[[bytes], Any], limit: int | None) -> Callable[[bytes], Any]:
     def tolerant(content: bytes) -> Any:
+        if limit is not None and len(content) > limit:
+            return _MALFORMED
         try:
             return parse(content)
         except DecodeError:
@@ -81,16 +78,16 @@ def _checked_stream(answer: Callable[[Any, Any], Any]) -> Callable[[Any, Any], A
     return checked
 
 
-def _checked_each(answer: Callable[[Any, Any], Awaitable[Any]]) -> Callable[[Any, Any], Awaitable[Any]]:
+def _checked_each(answer: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Awaitable[None]]:
     async def requests(given: AsyncIterator[Any]) -> AsyncIterator[Any]:
         async for request in given:
             if request is _MALFORMED:
                 raise MalformedError
             yield request
 
-    async def checked(given: AsyncIterator[Any], context: Any) -> Any:
+    async def checked(given: AsyncIterator[Any], context: Any) -> None:
         try:
-            return await answer(requests(given), context)
+            await write_responses(answer(requests(given), context), context)
         except MalformedError:
             # Here and not where it is read: that may be another task, which cannot end the call.
             await _refuse(context)

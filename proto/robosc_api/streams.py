@@ -1,6 +1,6 @@
 """Handlers of streams of grpc.aio, of either kind, behind something."""
 
-from collections.abc import AsyncIterator, Awaitable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import aclosing
 from typing import Any
 
@@ -18,3 +18,12 @@ async def write_responses(made: Awaitable[Any] | AsyncIterator[Any], context: An
     async with aclosing(made) as responses:  # type: ignore[type-var]  # generators of handlers can be closed
         async for response in responses:
             await context.write(response)
+
+
+def writing(answer: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Awaitable[None]]:
+    """A handler of a stream, of either kind, as a coroutine that writes by itself."""
+
+    async def write(request: Any, context: Any) -> None:
+        await write_responses(answer(request, context), context)
+
+    return write

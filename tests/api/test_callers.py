@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from robosc_api.security import ENTRY, Entry, Scope, caller_of, is_admin
+from robosc_api.security import ENTRY, Entry, Scope, caller_of, is_admin, network_of
 from robosc_api.security.callers import CALLER, host_of
 
 
@@ -52,3 +52,21 @@ def test_only_a_token_of_that_scope_makes_an_admin() -> None:
             assert is_admin() is expected
         finally:
             ENTRY.reset(token)
+
+
+@pytest.mark.parametrize(
+    ("caller", "network"),
+    [
+        ("2001:db8:1:2::1", "2001:db8:1:2::/64"),
+        ("2001:db8:1:2:ffff::9", "2001:db8:1:2::/64"),
+        ("2001:db8:1:3::1", "2001:db8:1:3::/64"),
+        ("fe80::1%eth0", "fe80::/64"),
+        ("::1", "::1"),
+        ("::ffff:192.0.2.1", "::ffff:192.0.2.1"),
+        ("192.0.2.1", "192.0.2.1"),
+        ("laptop", "laptop"),
+        ("unix", "unix"),
+    ],
+)
+def test_who_has_one_address_has_all_of_its_network(caller: str, network: str) -> None:
+    assert network_of(caller) == network

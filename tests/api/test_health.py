@@ -1,40 +1,21 @@
 """Asking a service for its health by its own configuration: with and without TLS, well and not well."""
 
 import socket
-from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from pathlib import Path
 
-import grpc
 import pytest
-from grpc_health.v1 import health, health_pb2, health_pb2_grpc
+from grpc_health.v1 import health_pb2
 
 from robosc_api.health import ask_alive, ask_health, local_address
-from robosc_api.security import SecurityError, ServerSecurity, add_port
+from robosc_api.security import SecurityError, ServerSecurity
 from robosc_api.security.addresses import joined
 from robosc_bridge.health_check import main as bridge_health
 from robosc_server.health_check import main as server_health
 from support.certificates import Authority
+from support.health_servers import answering
 
 Status = health_pb2.HealthCheckResponse
 IN_THE_CLEAR = ServerSecurity()
-
-
-@contextmanager
-def answering(status: int, security: ServerSecurity = IN_THE_CLEAR, most_calls: int | None = None) -> Iterator[str]:
-    """A service that is as it is said to be, and answers so many calls at once; yields its address."""
-    servicer = health.HealthServicer()
-    servicer.set("", status)
-    with ThreadPoolExecutor(2) as threads:
-        server = grpc.server(threads, maximum_concurrent_rpcs=most_calls)
-        health_pb2_grpc.add_HealthServicer_to_server(servicer, server)
-        address = add_port(server, "127.0.0.1:0", security)
-        server.start()
-        try:
-            yield address
-        finally:
-            server.stop(None).wait()
 
 
 @pytest.fixture

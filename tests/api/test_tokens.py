@@ -121,6 +121,35 @@ def test_a_file_that_becomes_wrong_changes_nothing(tmp_path: Path, caplog: pytes
     assert caplog.text.count("the tokens stay as they were") == 2
 
 
+def test_that_nobody_is_let_in_is_told_once_each_time_it_becomes_so(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    clock = Clock()
+    useless = [make_token(name, (Scope.WATCH, Scope.ADMIN))[1] for name in ("a", "b")]
+    useful = make_token("c", (Scope.SYNTHESIZE,))[1]
+    file = written(tmp_path, useless[0])
+    tokens = TokenFile(file, clock, needed=Scope.SYNTHESIZE)
+    for number, (lines, times) in enumerate(
+        [(useless[:1], 1), (useless, 1), ([*useless, useful], 1), (useless, 2), ([], 2), ([useful], 2)], 1
+    ):
+        written(tmp_path, *lines)
+        clock.now_s = number
+        assert len(tokens.entries) == len(lines)
+        told = caplog.text.count(f"{file}: no token has the scope 'synthesize', so nobody is let in")
+        assert told == times, lines
+    caplog.clear()
+    TokenFile(written(tmp_path, *useless))
+    assert caplog.text == ""
+
+
+def test_a_scope_that_there_is_not(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as raised:
+        arguments("laptop", "--scope", "nonsense")
+    assert raised.value.code == 2
+    told = capsys.readouterr().err
+    assert "there is no scope 'nonsense', only watch, operate, synthesize, admin" in told
+
+
 @pytest.mark.parametrize("mode", [0o620, 0o602])
 def test_a_file_that_others_may_write_is_refused(mode: int, tmp_path: Path) -> None:
     file = written(tmp_path)

@@ -32,7 +32,7 @@ from robosc_bridge.devices.interface import DriveBase, RangeScanner, Velocity
 from robosc_bridge.devices.options import checked_options
 from robosc_bridge.devices.registry import make_drive_base, make_range_scanner
 from robosc_bridge.devices.robots import ROBOTS, Body, Robot
-from robosc_bridge.drivers import Kind, facts_of, find_driver
+from robosc_bridge.drivers import Facts, Kind, facts_of, find_driver
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.protocol.mavlink_signing import SigningError
 from robosc_bridge.remote import settings_of
@@ -68,6 +68,7 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
         AssemblyError: They do not go together.
     """
     robot, chosen = _robot(configuration), configuration.safety
+    facts = facts_of(configuration.drive.driver) or Facts()
     if configuration.execution.period_s > LONGEST_PERIOD_S:
         raise AssemblyError(f"execution.period_s may be {LONGEST_PERIOD_S:g} at most")
     can = robot.limits if isinstance(robot, Body) else robot.limits(robot.motor.velocity_limit_raw)
@@ -90,6 +91,7 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
             operator_timeout_s=chosen.operator_link_timeout_s,
             battery_warn_v=chosen.battery_warning_v,
             battery_stop_v=chosen.battery_stop_v,
+            torque_on_s=facts.torque_on_s or SafetyLimits.torque_on_s,
             min_valid_share=chosen.min_valid_share,
             is_torque_off_on_operator_stop=chosen.torque_off_on_operator_stop,
             is_stopped_when_blind=chosen.stops_when_blind,

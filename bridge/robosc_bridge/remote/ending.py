@@ -8,37 +8,29 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 import grpc
-import grpc.aio
 
-from robosc_api.streams import write_responses
+from robosc_api.layers import Layer, behaviour_of, with_behaviour
+from robosc_api.streams import writing
 
 OWN_END_S = 0.2
 """Time for a call to end by itself, with a last word."""
 
 
-class EndingCalls(grpc.aio.ServerInterceptor):
+class EndingCalls(Layer):
     """Before `PromptRequests`, after which every method takes a stream of requests."""
 
     def __init__(self) -> None:
+        super().__init__()
         self._closing = asyncio.Event()
 
     def close(self) -> None:
         """Let every call end."""
         self._closing.set()
 
-    async def intercept_service(self, continuation: Callable[[Any], Awaitable[Any]], handler_call_details: Any) -> Any:
-        """The method's handler, which ends with the bridge."""
-        handler = await continuation(handler_call_details)
-        if handler is None:
-            return handler
-        parse, serialize = handler.request_deserializer, handler.response_serializer
-        if handler.stream_unary:
-            return grpc.stream_unary_rpc_method_handler(self._ending(handler.stream_unary), parse, serialize)
-
-        async def answer(requests: Any, context: Any) -> None:
-            await write_responses(handler.stream_stream(requests, context), context)
-
-        return grpc.stream_stream_rpc_method_handler(self._ending(answer), parse, serialize)
+    def around(self, inner: Any, method: str) -> Any:
+        """A handler that ends with the bridge."""
+        answer = behaviour_of(inner)
+        return with_behaviour(inner, self._ending(writing(answer) if inner.response_streaming else answer))
 
     def _ending(self, answer: Callable[[Any, Any], Awaitable[Any]]) -> Callable[[Any, Any], Awaitable[Any]]:
         async def ending(requests: Any, context: Any) -> Any:

@@ -14,7 +14,9 @@ import grpc.aio
 from grpc_health.v1 import health, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection
 
+from robosc_api.layers import Layers
 from robosc_api.malformed import MalformedRequests
+from robosc_api.prompt import REFLECTION_METHODS, PromptRequests
 from robosc_api.security import Guard, SecurityError, ServerSecurity, TokenFile, add_port
 from robosc_bridge.configuration.structure import Configuration
 from robosc_bridge.daemon.operations import Operations
@@ -24,7 +26,6 @@ from robosc_bridge.remote import convert
 from robosc_bridge.remote.condition import Condition
 from robosc_bridge.remote.connections import Places
 from robosc_bridge.remote.ending import EndingCalls
-from robosc_bridge.remote.prompt import PromptRequests
 from robosc_bridge.remote.service import RULES, BridgeService
 
 _log = logging.getLogger(__name__)
@@ -39,6 +40,12 @@ IDLE_S = 3.0
 
 MAXIMUM_CALLS = 200
 """On one connection; more than watchers, programs and commands, so that one is left for a stop."""
+
+REQUEST_LIMIT_S = 5.0
+"""Time for the request of a call that has one."""
+
+REFLECTION_IDLE_S = 30.0
+"""Time between two requests of a stream about what is served here."""
 
 PING_S, PING_LIMIT_S = 5.0, 3.0
 """After so long without a word a caller is asked whether it is there, and taken for gone if it does not answer."""
@@ -117,8 +124,10 @@ class RemoteFace(ServedFace):
             has_client_certificates=security.client_ca is not None,
         )
         ending = EndingCalls()
-        interceptors = [ending, PromptRequests(), guard, MalformedRequests(convert.SERVICE_NAME)]
-        server = grpc.aio.server(interceptors=interceptors, options=_options())
+        prompt = PromptRequests(REQUEST_LIMIT_S, dict.fromkeys(REFLECTION_METHODS, REFLECTION_IDLE_S))
+        # Whatever looks at a call sees it with its request.
+        layers = Layers(ending, prompt, guard, MalformedRequests(convert.SERVICE_NAME))
+        server = grpc.aio.server(interceptors=[layers], options=_options())
         service = BridgeService(self._operations, settings.operator_timeout_s)
         convert.add_service(service, server)  # type: ignore[no-untyped-call]  # generated
         health_pb2_grpc.add_HealthServicer_to_server(Condition(self._operations.feed), server)

@@ -14,12 +14,12 @@ from robosc_api.security.arguments import (
     server_security_of,
     written_token,
 )
-from robosc_api.security.callers import CALLER, ENTRY, caller_of, is_admin
+from robosc_api.security.callers import CALLER, ENTRY, caller_of, is_admin, network_of, token_or_host_of
 from robosc_api.security.client import Credentials, check_credentials, open_async_channel, open_channel
 from robosc_api.security.errors import SecurityError
 from robosc_api.security.guard import Guard, Rule
 from robosc_api.security.listening import ServerSecurity, add_port, check_files, check_listening
-from robosc_api.security.tokens import Entry, Quota, Scope, TokenFile, make_token
+from robosc_api.security.tokens import Entry, Quota, Scope, TokenFile, make_token, nobody_let_in
 
 __all__ = [
     "CALLER",
@@ -47,8 +47,11 @@ __all__ = [
     "is_loopback_peer",
     "joined",
     "make_token",
+    "network_of",
+    "nobody_let_in",
     "open_async_channel",
     "open_channel",
     "server_security_of",
+    "token_or_host_of",
     "written_token",
 ]

@@ -86,10 +86,9 @@ def add_token_arguments(
     parser.add_argument(
         "--scope",
         action="append",
-        type=Scope,
-        choices=list(Scope),
+        type=_scope,
         metavar="SCOPE",
-        help=f"what it is for: {', '.join(Scope)}; may be given again (default: {', '.join(scopes)})",
+        help=f"what it is for; may be given again (default: {', '.join(scopes)}). {_SCOPES_HELP}",
     )
     parser.add_argument(
         "-o",
@@ -98,16 +97,31 @@ def add_token_arguments(
         metavar="FILE",
         help="where the token is written, for its owner alone; a file that is there stays; default: standard output",
     )
-    parser.set_defaults(default_scopes=scopes, waiting=None, per_minute=None, cpu_seconds_per_hour=None)
+    parser.set_defaults(default_scopes=scopes, waiting=None, per_minute=None, cpu_seconds_per_hour=None, calls=None)
     if has_quotas:
         for name, words in _QUOTA_HELP.items():
             parser.add_argument(f"--{name.replace('_', '-')}", type=_amount, metavar="N", help=words)
+
+
+_SCOPES_HELP = (
+    "Of a synthesis server: synthesize: everything that is the caller's own, without which nothing can be called; "
+    "admin, besides synthesize: jobs of all callers. Of a bridge: watch: status and the stream of states; operate: "
+    "this, and commands"
+)
+
+
+def _scope(text: str) -> Scope:
+    try:
+        return Scope(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"there is no scope {text!r}, only {', '.join(Scope)}") from None
 
 
 _QUOTA_HELP = {
     "waiting": "tasks of it that may wait at once (default: what the server's settings say)",
     "per_minute": "tasks that it may ask for in a minute (default: any number)",
     "cpu_seconds_per_hour": "seconds of a processor's time that its tasks may take in an hour (default: any number)",
+    "calls": "calls of it that may be open at once (default: what the server's settings say)",
 }
 
 
@@ -123,7 +137,7 @@ def written_token(arguments: argparse.Namespace) -> tuple[str, str]:
     Raises:
         SecurityError: The name cannot stand in a file of tokens, or the file for the token is there or cannot be made.
     """
-    quota = Quota(arguments.waiting, arguments.per_minute, arguments.cpu_seconds_per_hour)
+    quota = Quota(arguments.waiting, arguments.per_minute, arguments.cpu_seconds_per_hour, arguments.calls)
     token, line = make_token(arguments.name, tuple(arguments.scope or arguments.default_scopes), quota)
     if arguments.output is None:
         return f"{token}\n", f"Keep the token secret; it is not shown again. The line for the file of tokens:\n{line}\n"

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import grpc
-import grpc.aio
 
 from robosc_api.failures import failure_metadata
+from robosc_api.layers import Layer, behaviour_of, with_behaviour
 from robosc_api.security.addresses import is_loopback_peer
 from robosc_api.security.callers import CALLER, ENTRY
 from robosc_api.security.tokens import Entry, Scope, TokenFile
-from robosc_api.streams import write_responses
+from robosc_api.streams import writing
 
 _log = logging.getLogger(__name__)
 
@@ -35,7 +35,7 @@ class Rule:
     is_open: bool = True
 
 
-class Guard(grpc.aio.ServerInterceptor):
+class Guard(Layer):
     """Looks at the token of each call, or at where it comes from. Health checks need none.
 
     Args:
@@ -47,26 +47,21 @@ class Guard(grpc.aio.ServerInterceptor):
     def __init__(
         self, rules: Mapping[str, Rule], tokens: TokenFile | None, *, has_client_certificates: bool = False
     ) -> None:
+        super().__init__()
         self._rules = rules
         self._tokens = tokens
         self._has_client_certificates = has_client_certificates
-        # By method: the handler that was there, and the one behind a look at the caller, made once, not for each call.
-        self._made: dict[str, tuple[Any, Any]] = {}
 
-    async def intercept_service(self, continuation: Callable[[Any], Awaitable[Any]], handler_call_details: Any) -> Any:
-        """The method's handler, behind a look at the caller."""
-        handler = await continuation(handler_call_details)
-        method: str = handler_call_details.method
-        if handler is None or method.startswith(_HEALTH):
-            return handler
-        if self._tokens is not None and self._entry(self._tokens, handler_call_details.invocation_metadata) is None:
+    def handler(self, inner: Any, details: Any) -> Any:
+        """The handler of a call, behind a look at the caller."""
+        method: str = details.method
+        if inner is None or method.startswith(_HEALTH):
+            return inner
+        if self._tokens is not None and self._entry(self._tokens, details.invocation_metadata) is None:
             # Whoever shows none is told so at once: a handler of single requests would wait for one that never comes,
             # and hold one of the calls that a server can have.
             return grpc.stream_stream_rpc_method_handler(self._refuse(method))
-        made = self._made.get(method)
-        if made is None or made[0] is not handler:
-            made = self._made[method] = handler, self._behind(handler, method)
-        return made[1]
+        return super().handler(inner, details)
 
     def _refuse(self, method: str) -> Any:
         async def refuse(requests: Any, context: Any) -> None:
@@ -77,11 +72,11 @@ class Guard(grpc.aio.ServerInterceptor):
 
         return refuse
 
-    def _behind(self, handler: Any, method: str) -> Any:
+    def around(self, inner: Any, method: str) -> Any:
         """A handler that does nothing before the caller is admitted."""
         rule = self._rules.get(method, Rule())
         if self._tokens is None and (rule.is_open or self._has_client_certificates):
-            return handler
+            return inner
 
         async def admit(context: Any) -> None:
             refusal = self._refusal(rule, method, context.invocation_metadata(), context.peer())
@@ -89,15 +84,8 @@ class Guard(grpc.aio.ServerInterceptor):
                 code, message = refusal
                 await context.abort(code, message, failure_metadata(code, message, code.name, context=context))
 
-        wrap = {
-            (False, False): (grpc.unary_unary_rpc_method_handler, _answer),
-            (False, True): (grpc.unary_stream_rpc_method_handler, _stream),
-            (True, False): (grpc.stream_unary_rpc_method_handler, _answer),
-            (True, True): (grpc.stream_stream_rpc_method_handler, _stream),
-        }
-        make, guarded = wrap[handler.request_streaming, handler.response_streaming]
-        inner = handler.unary_unary or handler.unary_stream or handler.stream_unary or handler.stream_stream
-        return make(guarded(inner, admit), handler.request_deserializer, handler.response_serializer)
+        answer = behaviour_of(inner)
+        return with_behaviour(inner, _guarded(writing(answer) if inner.response_streaming else answer, admit))
 
     def _refusal(self, rule: Rule, method: str, metadata: Any, peer: str) -> tuple[grpc.StatusCode, str] | None:
         """Why a call is not admitted; None: it is."""
@@ -129,17 +117,9 @@ class Guard(grpc.aio.ServerInterceptor):
         return tokens.find(given[0][len(_SCHEME) :].strip())
 
 
-def _answer(inner: Any, admit: Callable[[Any], Awaitable[None]]) -> Any:
+def _guarded(answer: Any, admit: Callable[[Any], Awaitable[None]]) -> Any:
     async def guarded(request: Any, context: Any) -> Any:
         await admit(context)
-        return await inner(request, context)
-
-    return guarded
-
-
-def _stream(inner: Any, admit: Callable[[Any], Awaitable[None]]) -> Any:
-    async def guarded(request: Any, context: Any) -> None:
-        await admit(context)
-        await write_responses(inner(request, context), context)
+        return await answer(request, context)
 
     return guarded

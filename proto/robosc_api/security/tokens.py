@@ -13,7 +13,7 @@ import secrets
 import stat
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from pathlib import Path
@@ -52,11 +52,13 @@ class Quota:
         waiting: Tasks that may wait at once.
         per_minute: Tasks that may be asked for in a minute.
         cpu_seconds_per_hour: Seconds that the tasks of an hour may take of a processor.
+        calls: Calls that may be open at once.
     """
 
     waiting: int | None = None
     per_minute: int | None = None
     cpu_seconds_per_hour: int | None = None
+    calls: int | None = None
 
     def __str__(self) -> str:
         """As it stands in the file of tokens."""
@@ -147,6 +149,13 @@ def _quota(words: list[str], place: str) -> Quota:
     return Quota(**amounts)
 
 
+def nobody_let_in(entries: Iterable[Entry], needed: Scope) -> str | None:
+    """That no token of a file has the scope without which nothing can be called; None: one has it."""
+    if any(needed in entry.scopes for entry in entries):
+        return None
+    return f"no token has the scope '{needed}', so nobody is let in"
+
+
 class TokenFile:
     """The tokens of a file; one that is changed is read again within a second, so that a token can be withdrawn.
 
@@ -155,16 +164,20 @@ class TokenFile:
     Args:
         path: Of the file.
         clock: Seconds of a monotonic clock.
+        needed: The scope without which nothing can be called; the log tells when no token has it. None: any will do.
 
     Raises:
         SecurityError: The file cannot be read, is wrong, or others than its owner may write it.
     """
 
-    def __init__(self, path: Path, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, path: Path, clock: Callable[[], float] = time.monotonic, *, needed: Scope | None = None) -> None:
         self._path = path
         self._clock = clock
+        self._needed = needed
+        self._is_nobody_let_in = False
         self._lock = threading.Lock()
         self._entries, self._stamp = _read(path)
+        self._tell_who_is_let_in()
         self._looked_s = clock()
 
     def find(self, token: str) -> Entry | None:
@@ -193,9 +206,17 @@ class TokenFile:
                     if _stamp(self._path.stat()) != self._stamp:
                         self._entries, self._stamp = _read(self._path)
                         _log.info("%s: read again", self._path)
+                        self._tell_who_is_let_in()
                 except (OSError, SecurityError) as error:
                     _log.error("the tokens stay as they were: %s", error)
             return self._entries
+
+    def _tell_who_is_let_in(self) -> None:
+        """Tell when it has become nobody."""
+        words = None if self._needed is None else nobody_let_in(self._entries, self._needed)
+        if words is not None and not self._is_nobody_let_in:
+            _log.warning("%s: %s", self._path, words)
+        self._is_nobody_let_in = words is not None
 
 
 def _stamp(status: os.stat_result) -> tuple[int, int, int]:

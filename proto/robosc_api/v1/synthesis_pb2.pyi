@@ -114,18 +114,20 @@ class Diagnostic(_message.Message):
     def __init__(self, severity: _Optional[_Union[Severity, str]] = ..., code: _Optional[str] = ..., message: _Optional[str] = ..., location: _Optional[_Union[Location, _Mapping]] = ..., mend: _Optional[str] = ..., related: _Optional[_Iterable[_Union[RelatedPlace, _Mapping]]] = ...) -> None: ...
 
 class SynthesisOptions(_message.Message):
-    __slots__ = ("deployment", "engine", "allow_livelock", "allow_reordering", "maximum_nodes")
+    __slots__ = ("deployment", "engine", "allow_livelock", "allow_reordering", "maximum_nodes", "verified_states")
     DEPLOYMENT_FIELD_NUMBER: _ClassVar[int]
     ENGINE_FIELD_NUMBER: _ClassVar[int]
     ALLOW_LIVELOCK_FIELD_NUMBER: _ClassVar[int]
     ALLOW_REORDERING_FIELD_NUMBER: _ClassVar[int]
     MAXIMUM_NODES_FIELD_NUMBER: _ClassVar[int]
+    VERIFIED_STATES_FIELD_NUMBER: _ClassVar[int]
     deployment: Deployment
     engine: str
     allow_livelock: bool
     allow_reordering: bool
     maximum_nodes: int
-    def __init__(self, deployment: _Optional[_Union[Deployment, str]] = ..., engine: _Optional[str] = ..., allow_livelock: _Optional[bool] = ..., allow_reordering: _Optional[bool] = ..., maximum_nodes: _Optional[int] = ...) -> None: ...
+    verified_states: int
+    def __init__(self, deployment: _Optional[_Union[Deployment, str]] = ..., engine: _Optional[str] = ..., allow_livelock: _Optional[bool] = ..., allow_reordering: _Optional[bool] = ..., maximum_nodes: _Optional[int] = ..., verified_states: _Optional[int] = ...) -> None: ...
 
 class CheckRequest(_message.Message):
     __slots__ = ("bundle",)

@@ -82,7 +82,9 @@ class SynthesisServiceServicer:
     """
 
     def Check(self, request, context):
-        """Finds everything that is wrong with a model or library.
+        """Finds everything that is wrong with a model or library. What only a synthesis can tell (no supervisor at all, events
+        that can never happen, requirements that never restrict, requests that compete) is among the diagnostics of
+        Synthesize.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

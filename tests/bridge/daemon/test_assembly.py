@@ -14,11 +14,15 @@ from robosc_bridge.configuration import parse, tie
 from robosc_bridge.daemon.assembly import AssemblyError, Machine, assemble, check_settings, safety_limits
 from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.errors import BridgeError
+from robosc_bridge.safety import Reason
 from robosc_bridge.simulated import SimulatedTurtleBot3
+from robosc_bridge.simulated.mavlink_packets import Encoder
 from support.certificates import Authority
 from support.daemons import CONFIGURATION, MODEL
 from support.driven import driven
 from support.models import bundle_of
+
+SET_MESSAGE_INTERVAL = 511
 
 
 @pytest.fixture(scope="module")
@@ -135,6 +139,20 @@ def test_a_rover_is_driven_within_its_own_limits() -> None:
     with driven("mavlink-rover", safety=patient) as bridge:
         assert bridge.limits.linear_m_s == 0.22
         bridge.moves()
+
+
+def test_a_rover_may_take_as_long_to_arm_as_its_heartbeats_need() -> None:
+    """Mode and arming show in a heartbeat each: with the second and third of a slow radio lost, after 5 s."""
+
+    def slowed(robot: SimulatedTurtleBot3) -> None:
+        assert robot.rover is not None
+        words = {"target_system": 1, "target_component": 1, "command": SET_MESSAGE_INTERVAL}
+        packet = Encoder(255, 190).encode("COMMAND_LONG", parameters=(0.0, 2.5e6, *(0.0,) * 5), **words)
+        robot.rover.receive(packet, 0)
+
+    with driven("mavlink-rover", before=slowed) as bridge:
+        bridge.moves()
+        assert Reason.TORQUE_LOST not in bridge.messages
 
 
 class RecordedFace:

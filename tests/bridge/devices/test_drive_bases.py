@@ -9,7 +9,6 @@ import math
 import threading
 import time
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -18,6 +17,7 @@ from robosc_bridge.devices.kinematics import wheel_speeds
 from robosc_bridge.devices.registry import make_drive_base
 from robosc_bridge.devices.robots import ROBOTS
 from robosc_bridge.errors import DeviceError, DeviceSilentError, LineLostError, LineMissingError
+from support.descriptors import open_descriptors
 from support.drive import Rig, rig
 
 KINDS = ("opencr", "dynamixel")
@@ -316,17 +316,14 @@ def test_a_busy_port_is_told_as_such(bench: Rig) -> None:
 
 
 def test_no_descriptor_is_left_behind(bench: Rig) -> None:
-    def count() -> int:
-        return len(list(Path("/proc/self/fd").iterdir()))
-
-    before = count()
+    before = open_descriptors()
     for _ in range(3):
         bench.base.open()
         bench.base.close()
     bench.robot.base_faults.is_deaf = True
     with rig("opencr") as _:
         pass
-    assert count() == before
+    assert open_descriptors() == before
 
 
 def test_wheels_that_are_held_are_told(bench: Rig) -> None:

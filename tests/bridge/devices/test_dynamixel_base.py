@@ -316,7 +316,8 @@ def test_a_motor_that_restarts_in_motion_has_not_jumped_and_stops_both(turns: in
         assert MotorFault.TORQUE_LOST in reading.faults
         assert not reading.is_torque_on
         assert reading.pose.x_m == pytest.approx(bench.robot.world.pose[0], abs=0.01)
-        assert reading.pose.heading_rad == pytest.approx(bench.robot.world.pose[2], abs=0.1)
+        # The wheel rolls on unseen for a part of the time above; a jump would be a turn of it, 0.7 rad.
+        assert reading.pose.heading_rad == pytest.approx(bench.robot.world.pose[2], abs=0.2)
         assert bench.goals_rad_s() == (0.0, 0.0)
         bench.take_time()
         bench.base.reset()

@@ -19,6 +19,7 @@ from robosc_bridge.errors import (
 )
 from robosc_bridge.protocol.mavlink_signing import Signing
 from robosc_bridge.simulated import SimulatedLine
+from support.descriptors import open_descriptors
 from support.rovers import BODY, FORWARD, KEY, Bench, rig
 from support.wire import wait_until
 
@@ -117,7 +118,7 @@ def test_a_busy_port_is_told(bench: Bench) -> None:
 
 def test_nothing_is_left_behind(any_bench: Bench) -> None:
     def count() -> tuple[int, int]:
-        return len(list(Path("/proc/self/fd").iterdir())), threading.active_count()
+        return open_descriptors(), threading.active_count()
 
     before = count()
     for _ in range(2):

@@ -92,7 +92,7 @@ def test_a_plug_in_is_found_by_its_entry_point(monkeypatch: pytest.MonkeyPatch) 
 def test_what_a_drive_base_has_is_declared_by_its_driver(monkeypatch: pytest.MonkeyPatch) -> None:
     assert facts_of("opencr") == Facts(PANEL, has_imu=True, needs_turtlebot3=True)
     assert facts_of("dynamixel") == Facts(needs_turtlebot3=True)
-    assert facts_of("mavlink-rover") == Facts(has_imu=True)
+    assert facts_of("mavlink-rover") == Facts(has_imu=True, torque_on_s=8.0)
     assert facts_of("plug") is None
     # A plug-in declares its own, or none.
     facts = Facts(("button_9",))

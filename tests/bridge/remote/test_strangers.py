@@ -6,22 +6,22 @@ import struct
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
 from typing import Any
 
 import grpc
 import pytest
 from grpc_health.v1 import health_pb2, health_pb2_grpc
+from grpc_reflection.v1alpha import reflection_pb2
 
+from robosc_api.prompt import REFLECTION_METHODS
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_bridge.daemon.states import Command, State
-from robosc_bridge.remote import RemoteFace, prompt
+from robosc_bridge.remote import RemoteFace
+from robosc_bridge.remote import face as face_module
 from robosc_bridge.remote.connections import Places
 from robosc_bridge.remote.face import IDLE_S, MAXIMUM_CALLS, MAXIMUM_CONNECTIONS
 from support.remote import PATIENCE_S, FakeDaemon, connected, eventually, served
-
-PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + b"\0\0\0\4\0\0\0\0\0"
-PING, SETTINGS, ACKNOWLEDGED = 6, 4, 1
+from support.strangers import SETTINGS, strangers
 
 
 @pytest.fixture
@@ -36,58 +36,10 @@ def face(daemon: FakeDaemon) -> Any:
         yield made
 
 
-class Stranger:
-    """A connection that speaks HTTP/2 and answers pings, and otherwise says what a test says (RFC 9113)."""
-
-    def __init__(self, face: RemoteFace) -> None:
-        host, _, port = face.address.rpartition(":")
-        self.line = socket.create_connection((host, int(port)))
-        self.line.sendall(PREFACE)
-        self.is_open = True
-        self.frames: list[tuple[int, int, bytes]] = []
-        self._thread = threading.Thread(target=self._answer)
-        self._thread.start()
-
-    def send(self, kind: int, flags: int, stream: int, content: bytes) -> None:
-        """A frame."""
-        self.line.sendall(struct.pack(">I", len(content))[1:] + struct.pack(">BBI", kind, flags, stream) + content)
-
-    def close(self) -> None:
-        with suppress(OSError):
-            self.line.shutdown(socket.SHUT_RDWR)
-        self._thread.join(PATIENCE_S)
-        self.line.close()
-
-    def _answer(self) -> None:
-        data = b""
-        try:
-            while more := self.line.recv(65536):
-                data += more
-                while len(data) >= 9 and len(data) >= 9 + int.from_bytes(data[:3]):
-                    size, kind, flags = int.from_bytes(data[:3]), data[3], data[4]
-                    content, data = data[9 : 9 + size], data[9 + size :]
-                    self.frames.append((kind, flags, content))
-                    if kind in (PING, SETTINGS) and not flags & ACKNOWLEDGED:
-                        self.send(kind, ACKNOWLEDGED, 0, content if kind == PING else b"")
-        except OSError:
-            pass
-        self.is_open = False
-
-
-@contextmanager
-def strangers(face: RemoteFace, count: int) -> Iterator[list[Stranger]]:
-    made = [Stranger(face) for _ in range(count)]
-    try:
-        yield made
-    finally:
-        for each in made:
-            each.close()
-
-
 def test_idle_connections_are_ended_so_that_a_stop_comes_through(
     daemon: FakeDaemon, face: RemoteFace, caplog: pytest.LogCaptureFixture
 ) -> None:
-    with strangers(face, MAXIMUM_CONNECTIONS) as held:
+    with strangers(face.address, MAXIMUM_CONNECTIONS) as held:
         begin_s = time.monotonic()
         eventually(lambda: "connections of the remote face are taken" in caplog.text)
         eventually(lambda: not any(each.is_open for each in held))
@@ -116,23 +68,22 @@ def test_that_all_places_are_taken_is_told_once(caplog: pytest.LogCaptureFixture
             first.close()
 
 
-def _headers(path: str) -> bytes:
-    """Of a call, in HPACK without indexing (RFC 7541, 6.2.2)."""
-    found = b""
-    fields = {":method": "POST", ":scheme": "http", ":path": path, ":authority": "robot"}
-    fields |= {"te": "trailers", "content-type": "application/grpc"}
-    for name, value in fields.items():
-        found += b"\0" + bytes([len(name)]) + name.encode() + bytes([len(value)]) + value.encode()
-    return found
-
-
 @pytest.mark.parametrize("path", ["/grpc.health.v1.Health/Check", "/robosc_api.v1.BridgeService/Stop"])
-def test_a_call_without_its_request_is_ended(path: str, face: RemoteFace, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(prompt, "REQUEST_LIMIT_S", 0.1)
-    with strangers(face, 1) as (stranger,):
-        end_of_headers = 4
-        stranger.send(1, end_of_headers, 1, _headers(path))
-        eventually(lambda: any(kind == 1 and b"within 0.1 seconds" in content for kind, _, content in stranger.frames))
+def test_a_call_without_its_request_is_ended(path: str, daemon: FakeDaemon, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(face_module, "REQUEST_LIMIT_S", 0.1)
+    with served(daemon) as face, strangers(face.address, 1) as (stranger,):
+        stranger.call(1, path)
+        eventually(lambda: stranger.was_told(b"within 0.1 seconds"))
+
+
+def test_a_stream_about_what_is_served_is_ended_when_it_says_nothing_more(
+    daemon: FakeDaemon, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(face_module, "REFLECTION_IDLE_S", 0.1)
+    with served(daemon) as face, strangers(face.address, 1) as (stranger,):
+        stranger.call(1, REFLECTION_METHODS[-1])
+        stranger.message(1, reflection_pb2.ServerReflectionRequest(list_services="").SerializeToString())
+        eventually(lambda: stranger.was_told(b"each further one within 0.1"))
 
 
 def test_health_is_not_watched(face: RemoteFace) -> None:
@@ -162,7 +113,7 @@ def test_health_follows_the_loop(daemon: FakeDaemon, face: RemoteFace) -> None:
 
 
 def test_calls_of_a_connection_are_bounded(face: RemoteFace) -> None:
-    with strangers(face, 1) as (stranger,):
+    with strangers(face.address, 1) as (stranger,):
         eventually(lambda: any(kind == SETTINGS and not flags for kind, flags, _ in stranger.frames))
         told = next(content for kind, flags, content in stranger.frames if kind == SETTINGS and not flags)
         settings = {struct.unpack_from(">HI", told, at) for at in range(0, len(told), 6)}

@@ -10,15 +10,12 @@ import serial
 
 from robosc.execution.clock import ManualClock
 from robosc_bridge.simulated import SimulatedTurtleBot3
+from support.descriptors import open_descriptors
 from support.wire import Host, wait_until
 
 PING = "ff ff fd 00 01 03 00 01 19 4e"
 PONG = "ff ff fd 00 01 07 00 55 00 24 04 2d f4 df"
 LENGTH = 14
-
-
-def open_files() -> int:
-    return len(list(Path("/proc/self/fd").iterdir()))
 
 
 @pytest.fixture
@@ -194,16 +191,16 @@ def test_links_are_where_they_are_wanted(tmp_path: Path) -> None:
 
 def test_what_is_there_already_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "scanner").write_text("mine")
-    files, threads = open_files(), threading.active_count()
+    files, threads = open_descriptors(), threading.active_count()
     with pytest.raises(FileExistsError):
         SimulatedTurtleBot3(base_link=tmp_path / "base", scanner_link=tmp_path / "scanner", clock=ManualClock())
     assert (tmp_path / "scanner").read_text() == "mine"
-    assert (open_files(), threading.active_count()) == (files, threads)
+    assert (open_descriptors(), threading.active_count()) == (files, threads)
     assert not (tmp_path / "base").is_symlink()
 
 
 def test_nothing_is_left_behind() -> None:
-    files, threads = open_files(), threading.active_count()
+    files, threads = open_descriptors(), threading.active_count()
     for _ in range(3):
         robot = SimulatedTurtleBot3()
         folder = Path(robot.base_path).parent
@@ -212,7 +209,7 @@ def test_nothing_is_left_behind() -> None:
         robot.close()
         robot.close()
         assert not folder.exists()
-    assert (open_files(), threading.active_count()) == (files, threads)
+    assert (open_descriptors(), threading.active_count()) == (files, threads)
 
 
 def test_a_host_that_does_not_read_loses_bytes_and_blocks_nobody() -> None:

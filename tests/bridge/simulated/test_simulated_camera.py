@@ -23,6 +23,7 @@ from robosc_bridge.simulated import (
 )
 from robosc_bridge.simulated.commands import UnknownCommandError, obey
 from robosc_bridge.simulated.floor import SHADE as LINE
+from support.descriptors import open_descriptors
 
 HEAD = b"P5 160 120 255\n"
 SIZE = len(HEAD) + 160 * 120
@@ -159,13 +160,13 @@ def test_only_a_few_are_served() -> None:
 def test_what_is_there_already_is_left_alone(tmp_path: Path) -> None:
     path = tmp_path / "camera"
     path.write_text("mine")
-    descriptors = len(list(Path("/proc/self/fd").iterdir()))
+    before = open_descriptors()
     with pytest.raises(FileExistsError, match="something at"):
         SimulatedTurtleBot3(camera_link=path, clock=ManualClock())
     with pytest.raises(OSError, match="too long"):
         SimulatedTurtleBot3(camera_link=tmp_path / ("x" * 120), clock=ManualClock())
     assert path.read_text() == "mine"
-    assert len(list(Path("/proc/self/fd").iterdir())) == descriptors
+    assert open_descriptors() == before
 
 
 def test_it_is_told_what_to_do() -> None:

@@ -4,7 +4,6 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -12,6 +11,7 @@ from robosc_bridge.errors import LineBusyError, LineError, LineLostError, LineMi
 from robosc_bridge.transport.lines import open_line
 from robosc_bridge.transport.network_line import NetworkLine, is_network_address
 from robosc_bridge.transport.serial_line import SerialLine
+from support.descriptors import open_descriptors
 from support.pty_end import PtyEnd
 
 
@@ -138,12 +138,12 @@ def test_waiting_ends_in_time_or_when_woken(peer: socket.socket) -> None:
 
 
 def test_a_closed_line_is_told_and_leaves_nothing(peer: socket.socket) -> None:
-    before = len(list(Path("/proc/self/fd").iterdir()))
+    before = open_descriptors()
     line = NetworkLine(f"udpout:127.0.0.1:{_port(peer)}")
     line.close()
     line.close()
     line.wake()
-    assert len(list(Path("/proc/self/fd").iterdir())) == before
+    assert open_descriptors() == before
     with pytest.raises(LineLostError, match="closed"):
         line.read(0.0)
     with pytest.raises(LineLostError, match="closed"):

@@ -24,6 +24,7 @@ from robosc_bridge.errors import (
     LineMissingError,
 )
 from robosc_bridge.transport.serial_line import SerialLine
+from support.descriptors import open_descriptors
 from support.pty_end import LIMIT_S, PtyEnd
 
 
@@ -85,10 +86,6 @@ class Background:
         self._thread.join(LIMIT_S)
         assert not self._thread.is_alive()
         return self.result
-
-
-def _descriptors() -> int:
-    return len(os.listdir("/proc/self/fd"))  # noqa: PTH208  # its numbers, of which one is of this very listing
 
 
 # Reading and writing
@@ -342,7 +339,7 @@ def test_a_line_that_is_gone_can_be_closed(pty: PtyEnd, line: SerialLine) -> Non
 
 
 def test_no_descriptor_is_left(pty: PtyEnd, tmp_path: Path) -> None:
-    before = _descriptors()
+    before = open_descriptors()
     for _ in range(20):
         with SerialLine(pty.path, 115200) as line:
             line.wake()
@@ -351,7 +348,7 @@ def test_no_descriptor_is_left(pty: PtyEnd, tmp_path: Path) -> None:
         for path, baud in (("/dev/no-such-port", 9600), ("/dev/null", 9600), (str(tmp_path), 9600), (pty.path, 2**40)):
             with pytest.raises(LineError):
                 SerialLine(path, baud)
-    assert _descriptors() == before
+    assert open_descriptors() == before
 
 
 def test_a_file_number_above_1024_does_not_matter() -> None:

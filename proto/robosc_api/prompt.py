@@ -1,0 +1,148 @@
+"""Calls that begin and then say nothing: they would hold a place, and where tokens are shown never show one."""
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from typing import Any
+
+import grpc
+import grpc.aio
+
+from robosc_api.failures import failure_metadata
+from robosc_api.layers import Layer
+from robosc_api.streams import writing
+
+REFLECTION_METHODS = tuple(
+    f"/grpc.reflection.{version}.ServerReflection/ServerReflectionInfo" for version in ("v1", "v1alpha")
+)
+"""The standard methods whose callers may leave their stream of requests open."""
+
+_CODE = grpc.StatusCode.INVALID_ARGUMENT
+
+
+class _SilentError(Exception):
+    """A caller has said nothing for too long."""
+
+
+class PromptRequests(Layer):
+    """Ends them. What stands before it sees a call as soon as it begins; what stands behind it, with its request.
+
+    What stands before it is given handlers of streams of requests alone.
+
+    Args:
+        limit_s: Time for the request of a call that has one, and for the first one of a stream, in seconds.
+        idle_s: By method (`/package.Service/Method`) with a stream of requests, the seconds for each further one; of
+            other such methods nothing is asked.
+    """
+
+    def __init__(self, limit_s: float, idle_s: Mapping[str, float] | None = None) -> None:
+        super().__init__()
+        self._first = _Patience(limit_s)
+        self._next = {method: _Patience(seconds) for method, seconds in (idle_s or {}).items()}
+
+    def around(self, inner: Any, method: str) -> Any:
+        """A handler behind a wait for its request."""
+        if inner.request_streaming and method not in self._next:
+            return inner
+        return self._behind(inner, method)
+
+    def _behind(self, handler: Any, method: str) -> Any:
+        if handler.request_streaming:
+            answer = self._each(handler.stream_unary or writing(handler.stream_stream), method)
+        else:
+            answer = self._one(handler.unary_unary or writing(handler.unary_stream))
+        is_stream = handler.response_streaming
+        make = grpc.stream_stream_rpc_method_handler if is_stream else grpc.stream_unary_rpc_method_handler
+        return make(answer, handler.request_deserializer, handler.response_serializer)
+
+    def _one(self, answer: Callable[[Any, Any], Awaitable[Any]]) -> Callable[[Any, Any], Awaitable[Any]]:
+        wait, end = self._first.wait, grpc.aio.EOF
+
+        async def prompt(requests: Any, context: Any) -> Any:
+            try:
+                request = await wait(context.read())
+            except _SilentError:
+                request = end
+            if request is end:
+                await _abort(context, f"the request comes within {self._first.limit_s:g} seconds")
+            return await answer(request, context)
+
+        return prompt
+
+    def _each(self, answer: Callable[[Any, Any], Awaitable[Any]], method: str) -> Callable[[Any, Any], Awaitable[Any]]:
+        first, following = self._first, self._next[method]
+
+        async def spoken(requests: AsyncIterator[Any]) -> AsyncIterator[Any]:
+            patience = first
+            try:
+                while True:
+                    yield await patience.wait(anext(requests))
+                    patience = following
+            except StopAsyncIteration:
+                return
+
+        async def prompt(requests: Any, context: Any) -> Any:
+            try:
+                return await answer(spoken(aiter(requests)), context)
+            except _SilentError:
+                # Here and not where it is read: that may be another task, which cannot end the call.
+                limits = f"{first.limit_s:g} seconds, and each further one within {following.limit_s:g}"
+                await _abort(context, f"the first request comes within {limits}")
+
+        return prompt
+
+
+class _Patience:
+    """Waits of one length: one timer for all of them, since most are over at once.
+
+    A timer for each (`asyncio.timeout`) costs a call ten times as much.
+
+    Attributes:
+        limit_s: How long, in seconds.
+    """
+
+    def __init__(self, limit_s: float) -> None:
+        self.limit_s = limit_s
+        # Since when each task waits, the one that has waited longest first.
+        self._since_s: dict[asyncio.Task[Any], float] = {}
+        self._overdue: set[asyncio.Task[Any]] = set()
+        self._is_looking = False
+
+    async def wait(self, answer: Awaitable[Any]) -> Any:
+        """What is waited for.
+
+        Raises:
+            _SilentError: It does not come in time.
+        """
+        loop = asyncio.get_running_loop()
+        task: Any = asyncio.current_task()
+        self._since_s[task] = loop.time()
+        if not self._is_looking:
+            self._is_looking = True
+            loop.call_later(self.limit_s, self._look)
+        try:
+            return await answer
+        except asyncio.CancelledError:
+            # Somebody else may have cancelled it as well.
+            if task in self._overdue and task.uncancel() == 0:
+                raise _SilentError from None
+            raise
+        finally:
+            self._since_s.pop(task, None)
+            self._overdue.discard(task)
+
+    def _look(self) -> None:
+        loop = asyncio.get_running_loop()
+        late_s = loop.time() - self.limit_s
+        while self._since_s:
+            task, since_s = next(iter(self._since_s.items()))
+            if since_s > late_s:
+                loop.call_at(since_s + self.limit_s, self._look)
+                return
+            del self._since_s[task]
+            self._overdue.add(task)
+            task.cancel()
+        self._is_looking = False
+
+
+async def _abort(context: Any, message: str) -> None:
+    await context.abort(_CODE, message, failure_metadata(_CODE, message, "MALFORMED_REQUEST", context=context))

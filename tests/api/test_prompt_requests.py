@@ -1,0 +1,186 @@
+"""Calls of each kind that begin and say nothing, or say it late, over real sockets."""
+
+import asyncio
+import time
+from collections.abc import AsyncIterator
+from typing import Any
+
+import grpc
+import pytest
+
+from robosc_api.prompt import PromptRequests
+from support.small_server import PATIENCE_S, SERVICE, call, small_server
+
+LIMIT_S = 0.2
+LONG_S = 60.0
+
+
+async def answer(request: bytes, context: Any) -> bytes:
+    return request
+
+
+async def generator(request: bytes, context: Any) -> AsyncIterator[bytes]:
+    yield request
+    yield b"end"
+
+
+async def writer(request: bytes, context: Any) -> None:
+    await context.write(request)
+    await context.write(b"end")
+
+
+async def echo(requests: AsyncIterator[bytes], context: Any) -> AsyncIterator[bytes]:
+    async for request in requests:
+        yield request
+
+
+async def collect(requests: AsyncIterator[bytes], context: Any) -> bytes:
+    return b"".join([request async for request in requests])
+
+
+def with_all_kinds(server: grpc.aio.Server) -> None:
+    handlers: dict[str, Any] = {
+        "Unary": grpc.unary_unary_rpc_method_handler(answer),
+        "Generator": grpc.unary_stream_rpc_method_handler(generator),
+        "Writer": grpc.unary_stream_rpc_method_handler(writer),
+        "Both": grpc.stream_stream_rpc_method_handler(echo),
+        "Collect": grpc.stream_unary_rpc_method_handler(collect),
+    }
+    server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("test.Kinds", handlers),))
+
+
+def silent(channel: Any, name: str) -> Any:
+    """A call that has begun, with a stream of requests that nothing is written to."""
+    return channel.stream_stream(f"/test.Kinds/{name}")(timeout=PATIENCE_S)
+
+
+async def refusal(made: Any) -> tuple[Any, str]:
+    """Status and words of a call that must end."""
+    found = await made.code(), await made.details()
+    assert b"MALFORMED_REQUEST" in dict(await made.trailing_metadata())["grpc-status-details-bin"]
+    return found
+
+
+@pytest.mark.parametrize("name", ["Unary", "Generator", "Writer"])
+def test_a_request_comes_in_time_or_the_call_ends(name: str) -> None:
+    async def run() -> None:
+        async with small_server(interceptors=[PromptRequests(LIMIT_S)], setup=with_all_kinds) as (channel, _):
+            begun_s = time.monotonic()
+            made = [silent(channel, name) for _ in range(3)]
+            for each in made:
+                assert await refusal(each) == (
+                    grpc.StatusCode.INVALID_ARGUMENT,
+                    "the request comes within 0.2 seconds",
+                )
+            assert LIMIT_S <= time.monotonic() - begun_s < PATIENCE_S / 2
+            # One that ends its requests without any need not be waited for, and the next ones are answered.
+            spoken: Any = channel.stream_stream(f"/test.Kinds/{name}")(timeout=PATIENCE_S)
+            await spoken.write(b"said")
+            assert await spoken.read() == b"said"
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize("name", ["Unary", "Writer"])
+def test_an_end_without_a_request_is_told_at_once(name: str) -> None:
+    async def run() -> None:
+        async with small_server(interceptors=[PromptRequests(LONG_S)], setup=with_all_kinds) as (channel, _):
+            made = silent(channel, name)
+            await made.done_writing()
+            assert (await refusal(made))[0] is grpc.StatusCode.INVALID_ARGUMENT
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize("name", ["Both", "Collect"])
+def test_a_stream_of_requests_goes_on_as_long_as_they_come(name: str) -> None:
+    async def run() -> None:
+        path = f"/test.Kinds/{name}"
+        for limits, words in (((LIMIT_S, LONG_S), "within 0.2 s"), ((LONG_S, LIMIT_S), "each further one within 0.2")):
+            prompt = PromptRequests(limits[0], {path: limits[1]})
+            async with small_server(interceptors=[prompt], setup=with_all_kinds) as (channel, _):
+                made = silent(channel, name)
+                if limits[0] == LONG_S:
+                    for text in (b"a", b"b"):
+                        await made.write(text)
+                        assert name == "Collect" or await made.read() == text
+                code, told = await refusal(made)
+                assert code is grpc.StatusCode.INVALID_ARGUMENT
+                assert words in told
+                open_stream: Any = channel.stream_stream(path)
+                whole = open_stream(iter([b"a", b"b"]), timeout=PATIENCE_S)
+                assert b"".join([each async for each in whole]) == b"ab"
+
+    asyncio.run(run())
+
+
+def test_streams_that_nothing_is_said_of_are_left_alone() -> None:
+    async def run() -> None:
+        async with small_server(interceptors=[PromptRequests(LIMIT_S)], setup=with_all_kinds) as (channel, _):
+            quiet, other = silent(channel, "Both"), silent(channel, "Unary")
+            await refusal(other)
+            await quiet.write(b"at last")
+            assert await quiet.read() == b"at last"
+
+    asyncio.run(run())
+
+
+def test_the_wait_is_for_the_request_alone() -> None:
+    """What is done with a request may take as long as it likes, and a caller may go at any time."""
+    goes_on = asyncio.Event()
+    cancelled: list[str] = []
+
+    async def slow(request: bytes, context: Any) -> bytes:
+        try:
+            await goes_on.wait()
+        except asyncio.CancelledError:
+            cancelled.append(request.decode())
+            raise
+        return request
+
+    async def run() -> None:
+        async with small_server(interceptors=[PromptRequests(LIMIT_S)], unary=slow) as (channel, _):
+            made: Any = channel.unary_unary(f"/{SERVICE}/Unary")
+            stays, goes = made(b"stays", timeout=PATIENCE_S), made(b"goes", timeout=PATIENCE_S)
+            late: Any = channel.stream_unary(f"/{SERVICE}/Unary")(timeout=PATIENCE_S)
+            assert await late.code() is grpc.StatusCode.INVALID_ARGUMENT
+            goes.cancel()
+            while not cancelled:
+                await asyncio.sleep(0.01)
+            assert cancelled == ["goes"]
+            goes_on.set()
+            assert await stays == b"stays"
+            assert (await call(channel, b"x")).answer == b"x"
+
+    asyncio.run(run())
+
+
+def test_who_cancels_at_the_same_moment_is_obeyed() -> None:
+    async def run() -> None:
+        patience = PromptRequests(LIMIT_S)._first
+        never: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        task: asyncio.Task[Any] = asyncio.create_task(patience.wait(asyncio.shield(never)))
+        while not patience._since_s:
+            await asyncio.sleep(0)
+        patience._since_s[task] -= LIMIT_S
+        patience._look()
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        assert not patience._since_s and not patience._overdue
+        never.cancel()
+
+    asyncio.run(run())
+
+
+def test_those_that_begin_while_others_wait_are_looked_for_later() -> None:
+    async def run() -> None:
+        async with small_server(interceptors=[PromptRequests(LIMIT_S)], setup=with_all_kinds) as (channel, _):
+            made = []
+            for _ in range(4):
+                made.append(silent(channel, "Unary"))
+                await asyncio.sleep(LIMIT_S / 3)
+            for each in made:
+                assert (await refusal(each))[0] is grpc.StatusCode.INVALID_ARGUMENT
+
+    asyncio.run(run())

@@ -12,8 +12,10 @@ from grpc_health.v1 import health_pb2_grpc
 from grpc_reflection.v1alpha import reflection
 
 from robosc import __version__
+from robosc_api.layers import Layers
 from robosc_api.malformed import MalformedRequests
-from robosc_api.security import Guard, Rule, Scope, SecurityError, TokenFile, add_port
+from robosc_api.prompt import REFLECTION_METHODS, PromptRequests
+from robosc_api.security import Guard, Rule, Scope, SecurityError, TokenFile, add_port, caller_of, token_or_host_of
 from robosc_server.desk import Desk
 from robosc_server.jobs import (
     JOB_METHODS,
@@ -26,20 +28,21 @@ from robosc_server.jobs import (
     Scheduler,
     add_job_service,
 )
-from robosc_server.operations.drain import drain
+from robosc_server.operations.drain import drain, stop
 from robosc_server.operations.health import Health
 from robosc_server.operations.interceptor import CallInterceptor
 from robosc_server.operations.metrics import Metrics, MetricsEndpoint, check_metrics_address
 from robosc_server.operations.observed import ObservedWorkers
+from robosc_server.operations.open_calls import HEALTH_CALLS, CallLimits, OpenCalls
 from robosc_server.operations.quotas import Quotas
-from robosc_server.operations.settings import Settings
+from robosc_server.operations.settings import Confinement, Settings
 from robosc_server.operations.tracing import TracingError, open_tracing
 from robosc_server.outgoing import Outgoing
 from robosc_server.signing import SigningError, read_signing_key, signed
 from robosc_server.store import StoreError, StoreUnavailableError, open_store
 from robosc_server.synthesis_service import METHODS, SERVICE_NAME, SynthesisService
 from robosc_server.tasks.describe import server_limits, targets_response, version_response
-from robosc_server.tasks.requests import RequestLimits, accepted
+from robosc_server.tasks.requests import QUICK_BYTES, RequestLimits, accepted
 from robosc_server.tasks.task import Result, TaskKind
 from robosc_server.workers import Workers, WorkersError
 from robosc_server.workers.opening import open_workers
@@ -57,20 +60,26 @@ KEEPALIVE = (
 )
 """Who has gone without a word is found out, so that nobody works for it."""
 
-_OPTIONS = (
-    # Without this two servers could share a port and each get some of the requests.
-    ("grpc.so_reuseport", 0),
-    ("grpc.http2.min_ping_interval_without_data_ms", 10_000),
-)
-
-_SUBMISSION_BYTES = 4096
-"""What a job's submission has beside its request."""
+_RESERVED_TASKS = 1
+"""Tasks that may run beyond the workers' number, of callers of whom none runs."""
 
 _UNREAD_RESULTS = 8
 """Results of the greatest size that may be on their way to their readers."""
 
-_MAXIMUM_CALLS = 10_000
-"""Calls under way at once, those that only watch included."""
+_REFUSED_CALLS = 1000
+"""Calls that are being refused at once, before gRPC itself refuses, which tells no reason and no log."""
+
+_IDLE_S = 300.0
+"""A connection on which nothing is called for so long is ended; clients make a new one by themselves."""
+
+_REFLECTION_IDLE_S = 60.0
+"""Time between two requests of a stream about what is served here."""
+
+_HANDSHAKE_LIMIT_S = 10.0
+"""Time for TLS, and for the first words of HTTP/2."""
+
+_METADATA_BYTES = 8 * 1024
+"""Of a call, all names and values together."""
 
 
 class StartError(Exception):
@@ -101,7 +110,7 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
     if settings.metrics_address:
         check_metrics_address(settings.metrics_address, beyond_loopback=settings.metrics_beyond_loopback)
     finish = _finish(settings)
-    tokens = None if settings.tokens is None else TokenFile(settings.tokens)
+    tokens = None if settings.tokens is None else TokenFile(settings.tokens, needed=Scope.SYNTHESIZE)
     request_limits = RequestLimits(
         bundle_bytes=settings.bundle_bytes, bundle_files=settings.bundle_files, nodes=settings.task_nodes
     )
@@ -115,35 +124,51 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         tokens,
         has_client_certificates=settings.client_ca is not None,
     )
+    # Before the wait for the request: whoever sends none has a call open all the same.
+    open_calls = OpenCalls(
+        CallLimits(settings.open_calls, settings.open_calls_per_caller),
+        # Reading certificates that nobody has shown takes longer than all the rest of it.
+        caller_of if settings.client_ca is not None else token_or_host_of,
+    )
+    prompt = PromptRequests(settings.request_seconds, dict.fromkeys(REFLECTION_METHODS, _REFLECTION_IDLE_S))
+    # What takes more looks at it by itself.
+    malformed = MalformedRequests(
+        JOB_SERVICE_NAME, health_names.SERVICE_NAME, reflection.SERVICE_NAME, limit=QUICK_BYTES
+    )
     server = grpc.aio.server(
-        interceptors=[calls, guard, MalformedRequests(JOB_SERVICE_NAME)],
-        options=[
-            *_OPTIONS,
-            *KEEPALIVE,
-            ("grpc.max_receive_message_length", request_limits.request_bytes + _SUBMISSION_BYTES),
-        ],
-        maximum_concurrent_rpcs=_MAXIMUM_CALLS,
+        interceptors=[Layers(calls, guard, open_calls, prompt, malformed)],
+        options=_options(settings, request_limits.submission_bytes),
+        maximum_concurrent_rpcs=settings.open_calls + 2 * HEALTH_CALLS + _REFUSED_CALLS,
     )
     address = add_port(server, settings.address, settings.security)
-    stack.push_async_callback(server.stop, None)
+    stack.push_async_callback(stop, server)
     store = await asyncio.to_thread(open_store, settings.state_dir, settings.database_url)
     stack.push_async_callback(asyncio.to_thread, store.close)
-    workers: Any = given_workers or open_workers(settings.workers, settings.worker_processes)
+    workers: Any = given_workers or open_workers(
+        settings.workers,
+        settings.worker_processes,
+        must_be_confined=settings.confinement is Confinement.REQUIRED,
+    )
     await stack.enter_async_context(workers)
     observed = ObservedWorkers(workers, metrics, tracing)
     quotas = Quotas(tokens)
     scheduler = Scheduler(
-        observed, QueueLimits(settings.waiting_tasks, settings.waiting_tasks_per_caller), accounts=quotas
+        observed,
+        QueueLimits(settings.waiting_tasks, settings.waiting_tasks_per_caller, _RESERVED_TASKS),
+        accounts=quotas,
     )
     results = await stack.enter_async_context(Results(store, settings.memory_cache_bytes, finish))
     manager = await stack.enter_async_context(
         JobManager(
             store,
             scheduler,
-            observed,
             results,
             settings.task_limits,
-            JobLimits(retention_s=settings.retention_seconds, results_bytes=settings.results_bytes),
+            JobLimits(
+                retention_s=settings.retention_seconds,
+                results_bytes=settings.results_bytes,
+                jobs_per_owner=settings.jobs_per_caller,
+            ),
             tracing=tracing,
         )
     )
@@ -156,7 +181,8 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         manager,
         lambda kind, request: accepted(kind, request, request_limits),
         admit=quotas.admit,
-        send=outgoing.send_one,
+        send=outgoing.send_each,
+        limits=request_limits,
     )
 
     server.add_generic_rpc_handlers((synthesis.handler(),))
@@ -187,12 +213,31 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
     async def end() -> None:
         scheduler.close()
         await asyncio.gather(
-            manager.drain(settings.drain_seconds), drain(server, health, calls, settings.drain_seconds, _IDLE_METHODS)
+            manager.drain(settings.drain_seconds),
+            drain(server, health, calls, settings.drain_seconds, _IDLE_METHODS, lambda: outgoing.unread_bytes),
         )
 
     await server.start()
     stack.push_async_callback(end)
     return address
+
+
+def _options(settings: Settings, request_bytes: int) -> list[tuple[str, int]]:
+    """Arguments of gRPC's core."""
+    return [
+        *KEEPALIVE,
+        # Without this two servers could share a port and each get some of the requests.
+        ("grpc.so_reuseport", 0),
+        ("grpc.http2.min_ping_interval_without_data_ms", 10_000),
+        ("grpc.server_handshake_timeout_ms", int(_HANDSHAKE_LIMIT_S * 1000)),
+        ("grpc.max_connection_idle_ms", int(_IDLE_S * 1000)),
+        # Beyond it a client has calls wait without a word: those that are refused are to fit.
+        ("grpc.max_concurrent_streams", settings.open_calls_per_caller + _REFUSED_CALLS),
+        ("grpc.max_metadata_size", _METADATA_BYTES),
+        ("grpc.absolute_max_metadata_size", _METADATA_BYTES),
+        # What is too large is refused with a reason, by us; beyond this it is by gRPC, without one.
+        ("grpc.max_receive_message_length", 2 * request_bytes),
+    ]
 
 
 async def _is_true(condition: Any) -> bool:

@@ -46,9 +46,20 @@ class Desk:
             self._metrics.cache_hit("store")
             return found
         self._metrics.cache_miss()
+        # What is refused since there is too much to do is not counted.
+        self._scheduler.require_room(caller)
         self._quotas.admit(caller)
-        outcome = await self._scheduler.run(task, caller, self._limits, on_report)
+
+        def made_meanwhile() -> Result | None:
+            nonlocal found
+            found = self._results.at_hand(task.key)
+            return found
+
+        outcome = await self._scheduler.run(task, caller, self._limits, on_report, made_meanwhile)
+        if found is not None:
+            self._metrics.cache_hit("memory")
+            return found
         if isinstance(outcome, Failure):
             told = for_callers(outcome)
             raise RefusedError(told.reason, told.message)
-        return self._results.keep(task.key, task.kind, outcome)
+        return self._results.keep(task.key, task.kind, outcome, caller)

@@ -72,8 +72,7 @@ def for_callers(failure: Failure) -> Failure:
     """A failure as it is told to callers; what only the log should know goes there, under an id that they are told."""
     if not failure.details:
         return failure
-    # How a worker died is the kernel's to tell; an exception in it may quote the model.
-    fault = tell_fault(failure.details, failure.reason, is_ours=failure.reason is Reason.WORKER_DIED)
+    fault = tell_fault(failure.details, failure.reason)
     return Failure(failure.reason, f"{failure.message}; {fault_words(fault)}")
 
 

@@ -4,6 +4,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 
+from robosc.cli.running import Parser
 from robosc_api.health import Condition, ask_alive, ask_health, local_address
 from robosc_api.security import SecurityError
 from robosc_server.operations.settings import Settings, SettingsError, add_settings_arguments, settings_of
@@ -22,7 +23,7 @@ exit status:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Ask; returns the exit status."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="robosc-server health",
         description="Ask the server that the same settings have started how it is, by gRPC's health check.",
         epilog=_EPILOG,

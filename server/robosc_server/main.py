@@ -1,8 +1,8 @@
 """`robosc-server`: start, tell where, stop gracefully; other commands beside."""
 
 import asyncio
+import logging
 import os
-import signal
 import sys
 from collections.abc import Sequence
 
@@ -10,8 +10,10 @@ from collections.abc import Sequence
 os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 
 from robosc_server.operations.commands import run_command
+from robosc_server.operations.ending import Ending
 from robosc_server.operations.logs import set_up_logs
 from robosc_server.operations.settings import Settings, load_settings
+from robosc_server.workers.kernel import keep_memory_private
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -22,6 +24,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return status
     settings = load_settings(words)
     set_up_logs(settings.log_format, settings.log_level)
+    keep_memory_private()
     return _serve(settings)
 
 
@@ -30,22 +33,33 @@ def _serve(settings: Settings) -> int:
     # Other commands, such as the health check of a container, need nothing of it, and it takes a while to import.
     from robosc_server.application import StartError, running_server
 
+    ending = Ending(settings.drain_seconds)
+
     async def serve_until_signal() -> None:
-        stop = asyncio.Event()
-        loop = asyncio.get_running_loop()
-        for number in (signal.SIGTERM, signal.SIGINT):
-            loop.add_signal_handler(number, stop.set)
+        ending.listen()
         async with running_server(settings) as address:
-            sys.stdout.write(f"robosc-server listening on {address}\n")
-            sys.stdout.flush()
-            await stop.wait()
+            _tell(address)
+            await ending.wanted()
 
     try:
         asyncio.run(serve_until_signal())
     except StartError as error:
         sys.stderr.write(f"robosc-server: {error}\n")
         return 1
+    finally:
+        ending.over()
     return 0
+
+
+def _tell(address: str) -> None:
+    """Print where the server listens; that nobody takes that is no reason to serve nobody."""
+    try:
+        sys.stdout.write(f"robosc-server listening on {address}\n")
+        sys.stdout.flush()
+    except OSError as error:
+        logging.getLogger(__name__).warning("listening on %s, which standard output does not take: %s", address, error)
+        # The interpreter would try once more at its end.
+        sys.stdout = None
 
 
 if __name__ == "__main__":

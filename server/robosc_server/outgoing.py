@@ -5,6 +5,7 @@ large results and reads none of them would fill the server's memory without this
 """
 
 from collections import Counter
+from collections.abc import AsyncIterable, Callable
 from typing import Any
 
 from robosc_api.security import caller_of
@@ -35,37 +36,40 @@ class Outgoing:
         """Bytes of the results that are on their way."""
         return self._unread.total()
 
-    async def send(self, context: Any, messages: tuple[bytes, ...]) -> None:
+    async def send_each(self, context: Any, messages: AsyncIterable[bytes]) -> None:
         """Send the messages of a result as fast as they are read.
 
         Args:
             context: Of the call (of grpc.aio), whose responses are bytes.
-            messages: Each serialized.
+            messages: Serialized, each made when the one before it is on its way.
 
         Raises:
             RefusedError: Too much that was sent before is not read yet.
         """
-        self.hold(context, messages)
-        await self.send_held(context, messages)
-
-    async def send_one(self, context: Any, message: bytes) -> None:
-        """Send one of the messages of a result; see `send`."""
-        await self.send(context, (message,))
-
-    async def send_held(self, context: Any, messages: tuple[bytes, ...]) -> None:
-        """Send what is counted already."""
-        for message in messages:
+        read: Callable[[], None] = _nothing
+        async for message in messages:
+            is_read = self.hold(context, (message,))
             await context.write(message)
+            # gRPC takes one when there is room for it, which those before it have left.
+            read()
+            read = is_read
 
-    def hold(self, context: Any, messages: tuple[bytes, ...]) -> None:
-        """Count a result that is there, and may have to wait before it can be sent.
+    def hold(self, context: Any, messages: tuple[bytes, ...]) -> Callable[[], None]:
+        """Count a result until its call is over; it may have to wait before it can be sent.
+
+        Args:
+            context: Of the call (of grpc.aio).
+            messages: Of the result, each serialized.
+
+        Returns:
+            To be called where it is known sooner that it has been read.
 
         Raises:
-            RefusedError: As `send`.
+            RefusedError: Too much that was sent before is not read yet.
         """
         size = sum(map(len, messages))
         if size <= SMALL_BYTES:
-            return
+            return _nothing
         caller = caller_of(context)
         unread = self._unread[caller]
         if unread and unread + size > self._per_caller_bytes:
@@ -73,11 +77,20 @@ class Outgoing:
         if self._unread and self.unread_bytes + size > self._bytes_in_all:
             raise RefusedError(Reason.SERVER_BUSY, "too many results wait to be read by others", _RETRY_S)
         self._unread[caller] += size
+        is_held = True
 
-        def forget(_: Any) -> None:
-            self._unread[caller] -= size
-            if not self._unread[caller]:
-                del self._unread[caller]
+        def forget(_: Any = None) -> None:
+            nonlocal is_held
+            if is_held:
+                is_held = False
+                self._unread[caller] -= size
+                if not self._unread[caller]:
+                    del self._unread[caller]
 
         # When the call has ended for gRPC, too: a handler that has ended has only handed its messages over.
         context.add_done_callback(forget)
+        return forget
+
+
+def _nothing() -> None:
+    """Nothing was counted."""

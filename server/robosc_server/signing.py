@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from google.protobuf.message import DecodeError
+
 from robosc.signatures import SignatureError, SigningUnavailableError, read_private_key, sign
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.tasks.task import Result, TaskKind
@@ -36,7 +38,10 @@ def signed(kind: TaskKind, result: Result, key: "Ed25519PrivateKey") -> Result:
     """
     if kind is not TaskKind.SYNTHESIZE:
         return result
-    response = pb.SynthesizeResponse.FromString(result.messages[-1])
+    try:
+        response = pb.SynthesizeResponse.FromString(result.messages[-1])
+    except DecodeError:
+        return result  # A worker has made it: it may be anything.
     if not response.result.supervisor:
         return result
     response.result.signature = sign(response.result.supervisor, key)

@@ -5,7 +5,6 @@ and one that is kept is sent as it is. What the generated bindings would do in b
 """
 
 import asyncio
-from collections import deque
 from collections.abc import Awaitable, Callable
 from typing import Any, Protocol, Self
 
@@ -17,15 +16,15 @@ from robosc_api.security import caller_of
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.failures import RefusedError
 from robosc_server.outgoing import Outgoing
-from robosc_server.tasks.requests import NOT_A_MESSAGE, RequestLimits, accepted
+from robosc_server.tasks.requests import NOT_A_MESSAGE, QUICK_BYTES, RecentRequests, RequestLimits, require_short
 from robosc_server.tasks.task import Reason, Report, Result, Task, TaskKind
 
 _SERVICE = pb.DESCRIPTOR.services_by_name["SynthesisService"]
 SERVICE_NAME = _SERVICE.full_name
 METHODS = tuple(method.name for method in _SERVICE.methods)
 
-WAITING_REPORTS = 64
-"""Reports of progress that wait for a caller to read them."""
+PATIENCE_S = 0.05
+"""How long work may take before its caller is told of it, and between one such message and the next."""
 
 type Context = grpc.aio.ServicerContext[Any, Any]
 type OnReport = Callable[[Report], Awaitable[None]]
@@ -67,7 +66,7 @@ class SynthesisService:
     def __init__(self, desk: Desk, outgoing: Outgoing, limits: RequestLimits, targets: bytes, version: bytes) -> None:
         self._desk = desk
         self._outgoing = outgoing
-        self._limits = limits
+        self._requests = RecentRequests(limits)
         self._fixed = {"ListTargets": (pb.ListTargetsRequest, targets), "GetVersion": (pb.GetVersionRequest, version)}
 
     def handler(self) -> grpc.GenericRpcHandler:
@@ -76,39 +75,46 @@ class SynthesisService:
         for name, kind in _UNARY.items():
             methods[name] = grpc.unary_unary_rpc_method_handler(self._unary(kind))
         for name, kind in _STREAMS.items():
-            methods[name] = grpc.unary_stream_rpc_method_handler(self._stream(kind))
+            # On the line a method that answers once is a stream of one message. gRPC sends the answer of such a
+            # handler together with the status, at once, and lets it write other messages before.
+            methods[name] = grpc.unary_unary_rpc_method_handler(self._stream(kind))
         for name, (message, answer) in self._fixed.items():
             methods[name] = grpc.unary_unary_rpc_method_handler(_answering(message, answer))
         return grpc.method_handlers_generic_handler(SERVICE_NAME, methods)
 
     def _unary(self, kind: TaskKind) -> Any:
         async def answer(request: bytes, context: Context) -> bytes:
-            task = accepted(kind, request, self._limits)
+            task = self._requests.accepted(kind, request)
             result = self._desk.kept(task.key)
             if result is None:
                 result = await self._desk.result(task, caller_of(context), _drop)
+            self._outgoing.hold(context, result.messages)
             return result.messages[0]
 
         return answer
 
     def _stream(self, kind: TaskKind) -> Any:
-        async def answer(request: bytes, context: Context) -> None:
-            task = accepted(kind, request, self._limits)
+        async def answer(request: bytes, context: Context) -> bytes:
+            task = self._requests.accepted(kind, request)
             result = self._desk.kept(task.key)
             if result is None:
                 async with _Progress(context) as progress:
                     result = await self._desk.result(task, caller_of(context), progress.tell)
                     # Now: a caller that does not read its reports has the result wait.
                     self._outgoing.hold(context, result.messages)
-                await self._outgoing.send_held(context, result.messages)
             else:
-                await self._outgoing.send(context, result.messages)
+                self._outgoing.hold(context, result.messages)
+            *first, last = result.messages
+            for message in first:
+                await context.write(message)
+            return last
 
         return answer
 
 
 def _answering(request_type: Any, answer: bytes) -> Any:
     async def fixed(request: bytes, context: Context) -> bytes:
+        require_short(request, QUICK_BYTES)
         try:
             request_type.FromString(request)
         except DecodeError as error:
@@ -119,39 +125,54 @@ def _answering(request_type: Any, answer: bytes) -> Any:
 
 
 class _Progress:
-    """Tells a caller where the work is; one who reads slowly misses the oldest reports, and holds no worker up."""
+    """Tells a caller where the work is, if it takes a while: what is newest, and not too often.
+
+    Each message costs server and client as much as a small call; who reads slowly misses some, and holds no worker up.
+    """
 
     def __init__(self, context: Context) -> None:
         self._context = context
-        self._reports: deque[Report] = deque(maxlen=WAITING_REPORTS)
-        self._is_new = asyncio.Event()
-        self._is_over = False
+        self._newest: Report | None = None
+        self._may_tell = False
+        self._writer: asyncio.Task[None] | None = None
 
     async def __aenter__(self) -> Self:
-        self._writer = asyncio.create_task(self._write())
+        self._pause = asyncio.get_running_loop().call_later(PATIENCE_S, self._resume)
         return self
 
     async def __aexit__(self, kind: type[BaseException] | None, *details: object) -> None:
-        self._is_over = True
-        self._is_new.set()
+        self._pause.cancel()
+        self._may_tell = False
+        if self._writer is None:
+            return
         if kind is not None and issubclass(kind, asyncio.CancelledError):
             self._writer.cancel()  # Nobody is there to read it.
             await asyncio.gather(self._writer, return_exceptions=True)
             return
         # A message that is on its way cannot be taken back: the next one has to wait for it.
         await self._writer
+        self._pause.cancel()
 
     async def tell(self, report: Report) -> None:
-        """Tell it soon."""
-        self._reports.append(report)
-        self._is_new.set()
+        """Tell it soon, unless there is something newer by then."""
+        self._newest = report
+        if self._may_tell:
+            self._begin()
+
+    def _resume(self) -> None:
+        self._may_tell = True
+        if self._newest is not None:
+            self._begin()
+
+    def _begin(self) -> None:
+        self._may_tell = False
+        self._writer = asyncio.create_task(self._write())
 
     async def _write(self) -> None:
-        while self._reports or not self._is_over:
-            await self._is_new.wait()
-            self._is_new.clear()
-            while self._reports:
-                await self._context.write(progress_message(self._reports.popleft()))
+        report, self._newest = self._newest, None
+        if report is not None:
+            await self._context.write(progress_message(report))
+        self._pause = asyncio.get_running_loop().call_later(PATIENCE_S, self._resume)
 
 
 def progress_message(report: Report) -> bytes:

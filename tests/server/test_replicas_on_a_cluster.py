@@ -29,7 +29,7 @@ _WORKERS = 2
 _BUSY_TICKS = 20
 """A process that has taken so much time of a processor is at a task: one that stands ready takes none."""
 
-_LONG_BITS = 7
+_LONG_BITS = 10
 """Of factors: their product takes some seconds, and is known then."""
 
 

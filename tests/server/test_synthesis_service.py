@@ -23,6 +23,10 @@ from robosc_server.application import StartError
 from robosc_server.main import main
 from support.fake_tasks import TASK_FUNCTION as FAKE
 from support.service import PATIENCE_S, eventually, is_running, served
+from support.strangers import strangers
+
+INITIAL_WINDOW = 4
+"""HTTP/2's setting of that name, by its number."""
 
 STUB: Any = synthesis_pb2_grpc.SynthesisServiceStub
 
@@ -124,14 +128,32 @@ class TestRequests:
 
 class TestWork:
     def test_reports_come_in_order_and_one_result_ends_them(self, fake: Any) -> None:
-        request = pb.SynthesizeRequest(bundle=bundle("reports 20\necho because"))
+        request = pb.SynthesizeRequest(bundle=bundle("reports 20\nsleep 1\necho because"))
         responses = list(STUB(fake).Synthesize(request, timeout=PATIENCE_S))
-        told = [response.progress.message for response in responses[:-1]]
-        assert told == [f"step {number}" for number in range(20)]
+        told = [int(response.progress.message.removeprefix("step ")) for response in responses[:-1]]
+        # What is newest is told in any case, and nothing is told after what is newer.
+        assert told == sorted(set(told)) and told[-1] == 19
         assert responses[-1].result.reason == "because"
 
+    def test_nobody_is_told_of_work_more_often_than_is_of_use(self, fake: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr("robosc_server.synthesis_service.PATIENCE_S", 0.4)
+        request = pb.SynthesizeRequest(bundle=bundle("sleep 0.5\nreports 300\nsleep 0.5\necho done"))
+        begun_s = time.monotonic()
+        responses = list(STUB(fake).Synthesize(request, timeout=PATIENCE_S))
+        took_s = time.monotonic() - begun_s
+        assert responses[-1].result.reason == "done"
+        assert 1 <= len(responses) - 1 <= took_s / 0.4
+
+    def test_what_is_done_at_once_tells_nothing_of_its_progress(
+        self, fake: Any, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("robosc_server.synthesis_service.PATIENCE_S", PATIENCE_S)
+        request = pb.SynthesizeRequest(bundle=bundle("reports 20\necho silence"))
+        (response,) = STUB(fake).Synthesize(request, timeout=PATIENCE_S)
+        assert response.result.reason == "silence"
+
     def test_an_equal_request_is_not_done_again(self, fake: Any) -> None:
-        request = pb.SynthesizeRequest(bundle=bundle("pid\necho once"))
+        request = pb.SynthesizeRequest(bundle=bundle("pid\nsleep 1\necho once"))
         first = list(STUB(fake).Synthesize(request, timeout=PATIENCE_S))
         again = list(STUB(fake).Synthesize(request, timeout=PATIENCE_S))
         assert [response.WhichOneof("event") for response in first] == ["progress", "result"]
@@ -206,7 +228,7 @@ class TestEnding:
     def test_who_does_not_read_holds_no_worker_up(self) -> None:
         with served(FAKE) as address, grpc.insecure_channel(address) as channel:
             # Far more than fits on the way; nobody reads it.
-            unread = STUB(channel).Synthesize(pb.SynthesizeRequest(bundle=bundle("reports 200000\necho done")))
+            unread = STUB(channel).Synthesize(pb.SynthesizeRequest(bundle=bundle("long reports 900\necho done")))
             assert check(channel, "echo others") == "others"
             unread.cancel()
 
@@ -230,6 +252,17 @@ class TestEnding:
             assert all(error.code() is grpc.StatusCode.RESOURCE_EXHAUSTED for error in refused)
             # They are read: there is room again.
             assert len(list(synthesize(request, timeout=PATIENCE_S))) == 1
+
+    def test_who_reads_no_findings_gets_no_more_of_them(self) -> None:
+        with served(FAKE, result_bytes=3_000_000) as address:
+            with strangers(address, 1, settings={INITIAL_WINDOW: 0}) as (deaf,):
+                for number in range(1, 12, 2):
+                    deaf.call(number, "/robosc_api.v1.SynthesisService/Check")
+                    deaf.message(number, pb.CheckRequest(bundle=bundle("size 2900000")).SerializeToString())
+                assert eventually(lambda: deaf.was_told(b"sent before are to be read first"))
+            # The line is gone, and with it what was unread.
+            with grpc.insecure_channel(address) as channel:
+                assert eventually(lambda: len(check(channel, "size 2900000")) > 2_000_000)
 
     def test_a_connection_of_a_stranger_disturbs_nobody(self, fake: Any) -> None:
         # Not HTTP/2, and half of it.
@@ -336,8 +369,18 @@ class TestStart:
         assert left.value.code == 2
         assert capsys.readouterr().err
 
-    def test_no_thread_is_left(self) -> None:
-        before = set(threading.enumerate())
+    def test_no_thread_is_left(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        # Those of servers that other tests share come and go meanwhile: what counts is who has started a thread.
+        ours, start = {threading.current_thread()}, threading.Thread.start
+
+        def noted(thread: threading.Thread) -> None:
+            if threading.current_thread() in ours:
+                ours.add(thread)
+            start(thread)
+
+        monkeypatch.setattr(threading.Thread, "start", noted)
         with served(FAKE):
             pass
-        assert eventually(lambda: not {thread for thread in threading.enumerate() if not thread.daemon} - before)
+        ours.remove(threading.current_thread())
+        assert len(ours) > 1
+        assert eventually(lambda: not any(thread.is_alive() for thread in ours))

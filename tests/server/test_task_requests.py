@@ -2,6 +2,8 @@
 
 import random
 import re
+from collections.abc import Callable
+from functools import partial
 from pathlib import PurePosixPath, PureWindowsPath
 from typing import Any
 
@@ -10,10 +12,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import robosc_server.tasks.requests as requests_module
+from robosc.verification import DEFAULT_STATES
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.failures import RefusedError
-from robosc_server.tasks.requests import NOT_A_MESSAGE, RequestLimits, accepted
-from robosc_server.tasks.task import Reason, TaskKind
+from robosc_server.tasks.requests import NOT_A_MESSAGE, RecentRequests, RequestLimits, accepted
+from robosc_server.tasks.task import Reason, Task, TaskKind
 from support.models import EXAMPLES
 from support.requests import MESSAGES, bundle_at, small_request
 
@@ -94,6 +97,7 @@ class TestAcceptance:
             (TaskKind.SYNTHESIZE, {"options": pb.SynthesisOptions(deployment=9)}, "deployment"),  # type: ignore[arg-type]
             (TaskKind.SYNTHESIZE, {"options": pb.SynthesisOptions(engine="\x1b[2J")}, "printed"),
             (TaskKind.SYNTHESIZE, {"options": pb.SynthesisOptions(engine="x" * 256)}, "256 bytes"),
+            (TaskKind.SYNTHESIZE, {"options": pb.SynthesisOptions(verified_states=10**9 + 1)}, "verified_states"),
             (TaskKind.GENERATE, {"target": ""}, "no target"),
             (TaskKind.GENERATE, {"target": "x" * 256}, "256 bytes"),
             (TaskKind.GENERATE, {"generation": pb.GenerateOptions(package="\n")}, "printed"),
@@ -269,6 +273,7 @@ OPTIONS = st.fixed_dictionaries(
         "allow_livelock": st.booleans(),
         "allow_reordering": st.booleans(),
         "maximum_nodes": st.sampled_from([0, 5, 20_000_000, 30_000_000]),
+        "verified_states": st.sampled_from([0, 5, 200_000]),
     },
 )
 SUPERVISED = st.fixed_dictionaries({"package": st.sampled_from(["p", "q"]), "executable": st.sampled_from(["", "x"])})
@@ -358,6 +363,8 @@ def meaning_of(kind: TaskKind, given_: dict[str, Any]) -> Any:
         options.get("allow_reordering", False),
         min(options.get("maximum_nodes", 0) or LIMITS.nodes, LIMITS.nodes),
     ]
+    if not is_given:
+        how.append(options.get("verified_states", DEFAULT_STATES))
     if kind in (TaskKind.SYNTHESIZE, TaskKind.GENERATE):
         how.append(options.get("allow_livelock", False))
     if kind is TaskKind.SYNTHESIZE:
@@ -418,6 +425,8 @@ class TestKeys:
             pb.SynthesisOptions(allow_livelock=True),
             pb.SynthesisOptions(allow_reordering=True),
             pb.SynthesisOptions(maximum_nodes=5),
+            pb.SynthesisOptions(verified_states=5),
+            pb.SynthesisOptions(verified_states=0),
         ]
         claims: list[dict[str, Any]] = [
             {"supervisor": b"x"},
@@ -481,3 +490,63 @@ class TestKeys:
         bundle = bundle_at(EXAMPLES / "line_follower" / "line_follower.rscd")
         task = accepted(TaskKind.SYNTHESIZE, pb.SynthesizeRequest(bundle=bundle).SerializeToString(), LIMITS)
         assert task.main_file == "line_follower.rscd"
+
+
+class TestRecentRequests:
+    def test_says_the_same_as_a_look_at_each(self) -> None:
+        recent = RecentRequests(LIMITS)
+        contents = [small_request(kind).SerializeToString() for kind in MESSAGES] + [b"", b"\xff", b"no message"]
+        for _ in range(2):
+            for kind in MESSAGES:
+                for content in contents:
+                    assert told(recent.accepted, kind, content) == told(partial(accepted, limits=LIMITS), kind, content)
+
+    def test_one_that_came_before_is_not_looked_at_again(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        recent = RecentRequests(LIMITS)
+        content = small_request(TaskKind.CHECK).SerializeToString()
+        task = recent.accepted(TaskKind.CHECK, content)
+        monkeypatch.setattr(requests_module, "accepted", None)
+        assert recent.accepted(TaskKind.CHECK, bytes(bytearray(content))) is task
+
+    def test_is_bounded_and_forgets_what_was_asked_for_longest_ago(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        recent = RecentRequests(LIMITS)
+        requests = [
+            pb.CheckRequest(bundle=pb.Bundle(main=pb.SourceFile(name="m", text=f"{number:060000}"))).SerializeToString()
+            for number in range(100)
+        ]
+        first, *others = requests
+        tasks = [recent.accepted(TaskKind.CHECK, first)]
+        for request in others:
+            tasks.append(recent.accepted(TaskKind.CHECK, request))
+            assert recent.accepted(TaskKind.CHECK, first) is tasks[0]
+        assert sum(map(len, recent_contents(recent))) <= 4 * 2**20
+        assert recent.accepted(TaskKind.CHECK, requests[1]) is not tasks[1]
+        assert recent.accepted(TaskKind.CHECK, requests[-1]) is tasks[-1]
+
+    def test_many_small_ones_are_bounded_too(self) -> None:
+        recent = RecentRequests(LIMITS)
+        for number in range(10_000):
+            file = pb.SourceFile(name="m", text=str(number))
+            recent.accepted(TaskKind.CHECK, pb.CheckRequest(bundle=pb.Bundle(main=file)).SerializeToString())
+        # Each takes some four hundred bytes beside its own.
+        assert len(recent_contents(recent)) < 8500
+
+    def test_a_long_one_is_looked_at_each_time(self) -> None:
+        recent = RecentRequests(LIMITS)
+        bundle = pb.Bundle(main=pb.SourceFile(name="m", text="x" * 70_000))
+        content = pb.CheckRequest(bundle=bundle).SerializeToString()
+        assert recent.accepted(TaskKind.CHECK, content) is not recent.accepted(TaskKind.CHECK, content)
+        assert not recent_contents(recent)
+
+
+def told(accept: Callable[[TaskKind, bytes], Task], kind: TaskKind, content: bytes) -> object:
+    """What came of a request: a task, or the refusal's reason and words."""
+    try:
+        return accept(kind, content)
+    except RefusedError as error:
+        return error.reason, error.message
+
+
+def recent_contents(recent: RecentRequests) -> list[bytes]:
+    """The requests that are remembered."""
+    return [content for _, content in recent._tasks]

@@ -139,6 +139,15 @@ class TestSynthesize:
         assert result.statistics.state_bits > 0
         assert (result.reason, result.explanation, result.signature) == ("", "", b"")
 
+    @pytest.mark.parametrize("states", [0, 5, 200_000])
+    def test_verified_as_far_as_it_is_asked_for(self, tmp_path: Path, told: Told, states: int) -> None:
+        file = tmp_path / "out.rsup"
+        assert told("synth", LINE_FOLLOWER, "--verify-limit", states, "-o", file)[0] == 0
+        options = pb.SynthesisOptions(verified_states=states)
+        (answer,) = answers(TaskKind.SYNTHESIZE, pb.SynthesizeRequest(bundle=bundle_at(LINE_FOLLOWER), options=options))
+        assert answer.result.supervisor == file.read_bytes()
+        assert (b'"not checked"' in file.read_bytes()) is (states < 10)
+
     def test_no_supervisor(self, tmp_path: Path, told: Told) -> None:
         model = model_in(tmp_path, EMPTY)
         (answer,) = answers(TaskKind.SYNTHESIZE, pb.SynthesizeRequest(bundle=bundle_at(model)))

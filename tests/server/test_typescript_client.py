@@ -60,7 +60,8 @@ def test_the_supervisor_is_that_of_the_command_line(answers: Any, tmp_path: Path
     found = answers["synthesis"]
     assert base64.b64decode(found["supervisor"]) == file.read_bytes()
     assert (found["status"], found["states"]) == ("SYNTHESIS_STATUS_SUPERVISOR", "16")
-    assert found["stages"][0] == "check"
+    # How much is told depends on how long it took.
+    assert set(found["stages"]) <= {"check", "synthesis", "verification", "controller"}
     job = answers["job"]
     assert base64.b64decode(job["supervisor"]) == file.read_bytes()
     assert (job["label"], job["mainFile"]) == ("a job of another language", MODEL.name)

@@ -58,6 +58,11 @@ def is_running(pid: int) -> bool:
     return True
 
 
+def is_stopped(pid: int) -> bool:
+    """Whether a process rests, as after Ctrl-Z."""
+    return _fields(pid)[0] == "T"
+
+
 def parent_of(pid: int) -> int:
     """The process that a process was started by."""
     return int(_fields(pid)[1])

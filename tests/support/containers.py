@@ -316,8 +316,14 @@ class Container:
 
     def stop(self, limit_s: float) -> int:
         """Tell it to end, and wait; returns its exit status."""
-        os.kill(self.pid, signal.SIGTERM)
-        return self._outer.wait(limit_s)
+        first = self.pid
+        os.kill(first, signal.SIGTERM)
+        try:
+            return self._outer.wait(limit_s)
+        except subprocess.TimeoutExpired:
+            threads = sorted(Path(f"/proc/{first}/task").glob("*/wchan"))
+            waiting = {file.parent.name: file.read_text() for file in threads}
+            raise AssertionError(f"it goes on after {limit_s} s, waiting in {waiting}:\n{self.output}") from None
 
     def __enter__(self) -> Self:
         return self

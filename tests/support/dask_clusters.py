@@ -16,21 +16,29 @@ _END_S = 20.0
 
 
 class Cluster:
-    """A scheduler and its workers."""
+    """A scheduler and its workers.
 
-    def __init__(self, folder: Path) -> None:
+    Args:
+        folder: For what they write.
+        protocol: `tcp` or `tls`.
+        environment: Of all of them, beside this process's own.
+    """
+
+    def __init__(self, folder: Path, protocol: str = "tcp", environment: Mapping[str, str] | None = None) -> None:
         self.folder = folder
+        self._environment = dict(environment or {})
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             self.port = probe.getsockname()[1]
-        self.address = f"tcp://127.0.0.1:{self.port}"
+        self.address = f"{protocol}://127.0.0.1:{self.port}"
         self.scheduler: subprocess.Popen[bytes] | None = None
         self.workers: list[subprocess.Popen[bytes]] = []
         self._stack = ExitStack()
 
     def start_scheduler(self) -> None:
         """Start it, on the same port as before."""
-        self.scheduler = self._start("scheduler", "--host", "127.0.0.1", "--port", str(self.port), "--no-dashboard")
+        where = ("--host", self.address.rpartition(":")[0], "--port", str(self.port))
+        self.scheduler = self._start("scheduler", *where, "--no-dashboard")
         assert eventually(self._is_listening)
 
     def _is_listening(self) -> bool:
@@ -52,6 +60,7 @@ class Cluster:
         variables = {
             **os.environ,
             "PYTHONPATH": os.pathsep.join(path for path in sys.path if path),
+            **self._environment,
             **(environment or {}),
         }
         with (self.folder / f"{program}.log").open("ab") as log:
@@ -85,9 +94,11 @@ def kill(process: subprocess.Popen[bytes]) -> None:
 
 
 @contextmanager
-def dask_cluster(folder: Path, workers: int) -> Iterator[Cluster]:
-    """A cluster with some workers of one thread each."""
-    cluster = Cluster(folder)
+def dask_cluster(
+    folder: Path, workers: int, protocol: str = "tcp", environment: Mapping[str, str] | None = None
+) -> Iterator[Cluster]:
+    """A cluster with some workers of one thread each; see `Cluster`."""
+    cluster = Cluster(folder, protocol, environment)
     try:
         cluster.start_scheduler()
         for _ in range(workers):

@@ -4,9 +4,11 @@ Behaviour (`A` stands for the rest of the line):
 
     pid             reports its process's number, as stage `pid`
     reports A       reports A times
+    long reports A  reports A times, as long as a report may be
     echo A          answers A: in a finding, a reason or a text, wherever the kind of answer has room
     size A          answers with a text of A bytes in all
     sleep A         waits for A seconds
+    work A          works for A seconds of a processor's time
     spin            works for ever
     stuck           works for ever in one call in C, which keeps the interpreter to itself
     stop            stops its process, as Ctrl-Z would
@@ -17,12 +19,13 @@ Behaviour (`A` stands for the rest of the line):
     raise           has a fault
     refuse A        fails with reason MALFORMED_REQUEST and message A
     noise           prints much to standard output and error
-    write A         writes to the file A
+    try A           does what a hostile program would (see `hostile_code`), and answers how that went
+    flood           reports without end
     claim A         sends the beginning of a message of A bytes, and nothing more
     garbage         sends what is no frame to whoever started it
     modules         answers which of the modules that no worker may hold are loaded
     limits          answers the limits of its process on processor time, files and memory
-    environment     answers the names of its environment that are for the server alone
+    environment     answers the names of its environment
 """
 
 import collections
@@ -32,17 +35,18 @@ import itertools
 import os
 import resource
 import signal
-import socket
 import stat
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, Task, TaskKind, TaskLimits
 from robosc_server.workers.frames import HEADER, Tag
+from support.hostile_code import rehearse, tried
+
+__all__ = ["TASK_FUNCTION", "fake_task", "rehearse", "run_task", "said"]
 
 TASK_FUNCTION = "support.fake_tasks:run_task"
 
@@ -92,6 +96,9 @@ def _do(line: str, on_report: Callable[[Report], None]) -> str | Failure | None:
         case "reports":
             for number in range(int(rest)):
                 on_report(Report("synthesis", f"step {number}"))
+        case "long":
+            for number in range(int(rest.removeprefix("reports "))):
+                on_report(Report("synthesis", f"step {number} ".ljust(4000, "x")))
         case "echo":
             return rest
         case "size":
@@ -104,13 +111,16 @@ def _do(line: str, on_report: Callable[[Report], None]) -> str | Failure | None:
             kinds = (resource.RLIMIT_CPU, resource.RLIMIT_CORE, resource.RLIMIT_FSIZE, resource.RLIMIT_AS)
             return " ".join(str(resource.getrlimit(kind)[0]) for kind in kinds)
         case "environment":
-            return " ".join(name for name in os.environ if name.startswith("ROBOSC_SERVER_"))
+            return " ".join(sorted(os.environ))
         case "refuse":
             return Failure(Reason.MALFORMED_REQUEST, rest)
         case "raise":
             raise ValueError("a fault, on purpose")
-        case "write":
-            Path(rest).write_text("written by a worker\n")
+        case "try":
+            return tried(rest)
+        case "flood":
+            while True:
+                on_report(Report("synthesis", "x" * 1000))
         case "noise":
             for stream in (sys.stdout, sys.stderr):
                 print("a library that prints\n" * 10_000, file=stream, flush=True)
@@ -122,6 +132,10 @@ def _do(line: str, on_report: Callable[[Report], None]) -> str | Failure | None:
 
 def _misbehave(line: str) -> None:
     match line.split():
+        case ["work", seconds]:
+            end_s = time.process_time() + float(seconds)
+            while time.process_time() < end_s:
+                pass
         case ["spin"]:
             while True:
                 pass
@@ -154,8 +168,7 @@ def _send(content: bytes) -> None:
     for descriptor in range(3, 64):
         with contextlib.suppress(OSError):
             if stat.S_ISSOCK(os.fstat(descriptor).st_mode):
-                with socket.socket(fileno=os.dup(descriptor)) as connection:
-                    connection.sendall(content)
+                os.write(descriptor, content)
     time.sleep(600)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import grpc.aio
+import pytest
 
 from robosc_api.v1 import jobs_pb2_grpc
 from robosc_server.jobs import (
@@ -22,6 +23,8 @@ from robosc_server.jobs import (
     add_job_service,
     caller_of,
 )
+from robosc_server.jobs.retention import Retention
+from robosc_server.jobs.scheduler import Accounts
 from robosc_server.jobs.service import Context
 from robosc_server.operations.interceptor import CallInterceptor
 from robosc_server.operations.metrics import Metrics
@@ -70,6 +73,7 @@ class Choices:
     capacity: int = 2
     memory_bytes: int = 2**20
     times: Times = field(default_factory=Times)
+    accounts: Accounts | None = None
 
 
 @asynccontextmanager
@@ -79,15 +83,23 @@ async def parts(folder: Path, choices: Choices | None = None) -> AsyncIterator[P
     store = await asyncio.to_thread(open_store, folder, chosen.url, chosen.times.wall)
     try:
         workers = ScriptedWorkers(chosen.capacity)
-        scheduler = Scheduler(workers, chosen.queue)
+        scheduler = Scheduler(workers, chosen.queue, accounts=chosen.accounts)
         async with Results(store, chosen.memory_bytes) as results:
-            manager = JobManager(
-                store, scheduler, workers, results, TaskLimits(), chosen.limits, chosen.times.monotonic
-            )
+            manager = JobManager(store, scheduler, results, TaskLimits(), chosen.limits, chosen.times.monotonic)
             async with manager:
                 yield Parts(store, workers, scheduler, results, manager)
     finally:
         await asyncio.to_thread(store.close)
+
+
+def sweep_by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have a test say when it is swept: else it may be in the middle of it."""
+
+    async def never(retention: Retention) -> None:
+        """Nothing is swept unless the test says so."""
+        await asyncio.Event().wait()
+
+    monkeypatch.setattr(Retention, "sweep_often", never)
 
 
 @asynccontextmanager

@@ -1,7 +1,7 @@
 """A whole server as a program that a test may kill: job_server.py FOLDER DATABASE_URL WORKERS.
 
-WORKERS is `scripted` (see job_workers), or `local`: real ones, two. The database's URL may be empty. It prints its
-address.
+WORKERS is `scripted` (see job_workers); or `local`, two real ones; or `fake`, two real ones whose tasks behave as their
+text says (see fake_tasks). The database's URL may be empty. It prints its address.
 """
 
 import asyncio
@@ -9,8 +9,9 @@ import contextlib
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -19,6 +20,7 @@ from robosc_server.application import running_server
 from robosc_server.operations.logs import set_up_logs
 from robosc_server.operations.settings import Settings
 from robosc_server.workers.local import LocalWorkers
+from support.fake_tasks import TASK_FUNCTION
 from support.job_workers import ScriptedWorkers
 
 _PREFIX = "listening on "
@@ -42,7 +44,12 @@ async def serve(folder: str, url: str, workers: str) -> None:
     chosen: dict[str, Any] = {"port": 0, "state_dir": Path(folder), "database_url": url or None}
     settings = Settings(**chosen, waiting_tasks_per_caller=1000)
     set_up_logs(settings.log_format, settings.log_level)
-    made = StartedWorkers(2) if workers == "scripted" else LocalWorkers(2)
+    kinds: dict[str, Callable[[int], Any]] = {
+        "scripted": StartedWorkers,
+        "local": LocalWorkers,
+        "fake": partial(LocalWorkers, task_function=TASK_FUNCTION),
+    }
+    made = kinds[workers](2)
     async with running_server(settings, made) as address:
         sys.stdout.write(f"{_PREFIX}{address}\n")
         sys.stdout.flush()

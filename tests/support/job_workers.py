@@ -1,7 +1,8 @@
 """Workers that do what the text of a task's main file says, in this process: one command a line.
 
 `log FILE` writes a line into a file; `until FILE` waits until there is one; `report N` tells N things; `fail REASON`;
-`big N` has a result of N bytes; `fault` raises. Without any of it, the result holds the text.
+`big N` has a result of N bytes; `fault` raises; `spend S` takes S
+seconds of a processor's time; `lose` takes what starts workers with it. Without any of it, the result holds the text.
 """
 
 import asyncio
@@ -11,7 +12,7 @@ from pathlib import Path
 from robosc_api.v1 import jobs_pb2 as jobs
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, Task, TaskKind, TaskLimits
-from robosc_server.workers import OnReport, WorkersError
+from robosc_server.workers import OnReport, OnSpent, WorkerLostError, WorkersError, uncounted
 
 _LOOK_S = 0.005
 
@@ -31,7 +32,7 @@ class ScriptedWorkers:
         self.most_running = 0
         self.killed = 0
 
-    async def run(self, task: Task, limits: TaskLimits, on_report: OnReport) -> Outcome:
+    async def run(self, task: Task, limits: TaskLimits, on_report: OnReport, on_spent: OnSpent = uncounted) -> Outcome:
         if self.is_away:
             raise WorkersError("the workers are away")
         assert self.running < self.capacity
@@ -46,6 +47,7 @@ class ScriptedWorkers:
             raise
         finally:
             self.running -= 1
+            on_spent(sum(float(line.split()[1]) for line in text.splitlines() if line.startswith("spend ")))
 
     async def _do(self, text: str, kind: TaskKind, on_report: OnReport) -> Outcome:
         size = 0
@@ -66,6 +68,8 @@ class ScriptedWorkers:
                     return Failure(Reason(reason), "it failed")
                 case ["big", number]:
                     size = int(number)
+                case ["lose"]:
+                    raise WorkerLostError("the worker was lost")
                 case ["fault"]:
                     raise ZeroDivisionError
         return Result(messages_for(kind, text, size))

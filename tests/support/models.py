@@ -23,6 +23,21 @@ EXAMPLE_DEPLOYMENTS = tuple(
     if (name, deployment) != ("line_follower/line_follower", Deployment.LAYER)
 )
 
+# A robot whose synthesis is given up: the condition of its requirement has too many values.
+UNSUPPORTED = """robot R {
+    component C {
+        incoming message m with type: none
+        outgoing message n with type: integer(0..2000)
+        behaviour {
+            variable x: integer(0..2000)
+            variable y: integer(0..2000)
+            on response from n do x := value, y := x
+            initial marked state s { }
+        }
+    }
+    requirement m needs C.x / C.y > 0.5
+}"""
+
 # A robot for which there is no supervisor: nothing controllable leads back from where a message leads to.
 EMPTY = """robot R {
     component C {

@@ -144,6 +144,10 @@ class Porter:
     def until(self, condition: Callable[[], bool], what: str, repeat: Callable[[], object] = lambda: None) -> None:
         self.peer.spin_until(condition, LIMIT_S, what, self.layer, repeat)
 
+    def settle(self) -> None:
+        """Return when the layer has looked at all that was sent to it."""
+        self.peer.settle(self.layer, LIMIT_S)
+
     def state(self, component: str) -> str | None:
         return json.loads(self._states[-1].data)["current"][component]["state"] if self._states else None
 

@@ -132,10 +132,13 @@ class Porter:
         if self._parameters == parameters and self.layer is not None and self.layer.is_running:
             self._parameters = None
             self.peer.do("clear")
+            # One that came late would be the first call of the next test.
+            self.until(lambda: self.peer.called <= self.peer.replies.keys(), "every call to be answered")
             self.until(lambda: self.state("Power") == self.state("Counter") == "idle", "the layer to be idle")
             self.allow(False)
         else:
             self.start(*parameters)
+            self.peer.called.clear()
         self._parameters = parameters
 
     def leave(self) -> None:

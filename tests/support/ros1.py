@@ -142,6 +142,7 @@ class Peer:
         requests: What services were asked, by name.
         goals: What actions were asked, by name.
         cancels: How often an action was cancelled, by name.
+        called: The numbers of calls that it made; may be emptied.
         replies: What became of calls that it made, by number.
         sent: What was heard of goals that it sent, by number.
     """
@@ -162,6 +163,7 @@ class Peer:
         self.requests: dict[str, list[Any]] = {}
         self.goals: dict[str, list[Any]] = {}
         self.cancels: dict[str, int] = {}
+        self.called: set[int] = set()
         self.replies: dict[int, dict[str, Any]] = {}
         self.sent: dict[int, list[dict[str, Any]]] = {}
         self._count = 0
@@ -227,6 +229,7 @@ class Peer:
     def call(self, name: str, type_name: str, **fields: Any) -> int:
         """Call a service: a number, under which the reply will be in `replies`."""
         self._count += 1
+        self.called.add(self._count)
         self.do("call", id=self._count, name=name, type=type_name, message=fields)
         return self._count
 

@@ -129,7 +129,6 @@ class Server(ActionServer):  # type: ignore[misc]
         self.start()
 
     def goal_came(self, handle: Any) -> None:
-        report(action=self.name, goal=plain(handle.get_goal()))
         if self.accepts == "later":
             self.pending.append(handle)
         elif self.accepts:
@@ -137,6 +136,8 @@ class Server(ActionServer):  # type: ignore[misc]
             self.running.append(handle)
         else:
             handle.set_rejected()
+        # Last: whoever has read it may let the goal go on.
+        report(action=self.name, goal=plain(handle.get_goal()))
 
     def cancel_came(self, handle: Any) -> None:
         report(action=self.name, cancel=True)

@@ -16,7 +16,11 @@ from support.process import Process
 
 __all__ = ["Peer", "RosProcess", "environment", "own_domain", "wait_until"]
 
-DISCOVERY_LIMIT_S = 15.0
+PEER_NODE, SERVERS_NODE = "test_peer", "test_servers"
+OWN_NODES = frozenset({PEER_NODE, SERVERS_NODE})
+"""Nodes of the tests themselves."""
+
+DISCOVERY_LIMIT_S = 60.0
 ORDERLY_END_S = 3.0
 
 _PROFILE = """<?xml version="1.0" encoding="UTF-8"?>
@@ -109,10 +113,11 @@ class Peer:
         os.environ.update(variables)
         self._context = rclpy.context.Context()
         rclpy.init(context=self._context, domain_id=domain)
-        self.node = rclpy.create_node("test_peer", context=self._context)
+        self.node = rclpy.create_node(PEER_NODE, context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._publishers: dict[str, Any] = {}
+        self._asking: Any = None
 
     def __enter__(self) -> Self:
         return self
@@ -188,6 +193,25 @@ class Peer:
                 repeat()
                 next_repeat = time.monotonic() + repeat_every_s
             self._executor.spin_once(timeout_sec=0.02)
+
+    def settle(self, process: RosProcess, limit_s: float) -> None:
+        """Return when the one node that is no test's has looked at all that was sent to it.
+
+        Two questions to it, one after the other: between the answers it has.
+
+        Args:
+            process: The node's.
+            limit_s: For each part, after which it is a failure.
+        """
+        from rcl_interfaces.srv import GetParameters
+
+        if self._asking is None:
+            (name,) = set(self.node.get_node_names()) - OWN_NODES
+            self._asking = self.node.create_client(GetParameters, f"/{name}/get_parameters")
+            self.spin_until(self._asking.service_is_ready, limit_s, "the node's parameters", process)
+        for _ in range(2):
+            future = self._asking.call_async(GetParameters.Request(names=["period"]))
+            self.spin_until(future.done, limit_s, "an answer of the node", process)
 
     def spin_for(self, duration_s: float) -> None:
         """Handle messages for a while: to show that nothing happens."""

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from enum import Enum
 from typing import Any, Self
 
-from support.ros2 import Peer, wait_until
+from support.ros2 import SERVERS_NODE, Peer, wait_until
 
 LIMIT_S = 60.0
 
@@ -24,7 +24,7 @@ class ServerHost:
 
         self._context = rclpy.context.Context()
         rclpy.init(context=self._context, domain_id=domain)
-        self.node = rclpy.create_node("test_servers", context=self._context)
+        self.node = rclpy.create_node(SERVERS_NODE, context=self._context)
         self.group = ReentrantCallbackGroup()
         self.gates: list[Gate] = []
         self.action_servers: list[Any] = []

@@ -98,12 +98,21 @@ def _served(chosen: Settings, workers: Any) -> Iterator[str]:
 @contextmanager
 def server_process(*arguments: str, **environment: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """`robosc-server` as a program, with a folder of its own for its state; yields the process and its address."""
+    with logged_server_process(*arguments, **environment) as (process, address, _):
+        yield process, address
+
+
+@contextmanager
+def logged_server_process(
+    *arguments: str, **environment: str
+) -> Iterator[tuple[subprocess.Popen[str], str, list[str]]]:
+    """The same; yields the lines of its log, too, which come as it writes them."""
     with tempfile.TemporaryDirectory() as folder:
         usual = ["--port", "0", "--worker-processes", "1", "--state-dir", folder, "--drain-seconds", "0.5"]
         command = [sys.executable, "-m", "robosc_server.main", *usual, *arguments]
-        process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, **environment}
-        )
+        # Where it waits is told should it not end.
+        variables = {**os.environ, "PYTHONFAULTHANDLER": "1", **environment}
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=variables)
         # Its log must not fill the pipe while nobody reads.
         log: list[str] = []
         assert process.stdout is not None and process.stderr is not None
@@ -115,12 +124,16 @@ def server_process(*arguments: str, **environment: str) -> Iterator[tuple[subpro
                 process.kill()
                 reader.join(PATIENCE_S)
                 raise AssertionError(line + "".join(log))
-            yield process, line.split()[-1]
+            yield process, line.split()[-1], log
         finally:
             if process.poll() is None:
                 process.send_signal(signal.SIGTERM)
             try:
                 process.wait(PATIENCE_S)
+            except subprocess.TimeoutExpired:
+                process.send_signal(signal.SIGABRT)
+                reader.join(PATIENCE_S)
+                raise AssertionError("the server does not end:\n" + "".join(log)) from None
             finally:
                 process.kill()
                 reader.join(PATIENCE_S)

@@ -6,11 +6,14 @@ from base64 import urlsafe_b64decode, urlsafe_b64encode
 from typing import Any
 
 from google.protobuf import timestamp_pb2
+from google.protobuf.message import DecodeError
 
 from robosc_api.v1 import jobs_pb2 as pb
 from robosc_api.v1 import jobs_pb2_grpc, synthesis_pb2
 from robosc_server.failures import RefusedError, code_of
 from robosc_server.store import JobFilter, JobRecord, JobState
+from robosc_server.tasks.fields import nested_of
+from robosc_server.tasks.requests import NOT_A_MESSAGE, RequestLimits, require_parsable, require_short
 from robosc_server.tasks.task import Reason, TaskKind
 
 JOB_SERVICE_NAME: str = pb.DESCRIPTOR.services_by_name["JobService"].full_name
@@ -35,10 +38,27 @@ _TOKEN = struct.Struct(">Q16s8s")
 _TOKEN_CHARACTERS = 44
 _LENGTH_DELIMITED = 2
 
+_SUBMISSION = nested_of(pb.SubmitJobRequest)
+
 
 def refusal(message: str) -> RefusedError:
     """A request that is wrong."""
     return RefusedError(Reason.MALFORMED_REQUEST, message)
+
+
+def submission(content: bytes, limits: RequestLimits) -> pb.SubmitJobRequest:
+    """A submission, parsed.
+
+    Raises:
+        RefusedError: It is none, or has too much.
+    """
+    require_short(content, limits.submission_bytes)
+    require_parsable(content, _SUBMISSION, limits)
+    try:
+        return pb.SubmitJobRequest.FromString(content)
+    except DecodeError:
+        # The parser's own words may quote the message.
+        raise refusal(NOT_A_MESSAGE) from None
 
 
 def kind_and_request(task: pb.Task) -> tuple[TaskKind, bytes]:

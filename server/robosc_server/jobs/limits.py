@@ -9,9 +9,10 @@ class JobLimits:
 
     Attributes:
         retention_s: Longest time that a job is kept after its end.
-        results_bytes: Of kept results; results that no kept job refers to are deleted beyond it, and new jobs refused
-            when those that jobs do refer to are as large.
-        jobs_per_owner: Kept jobs of one caller.
+        results_bytes: Of kept results. Beyond it, results that no kept job refers to are deleted; where those that jobs
+            do refer to are as large, jobs that have ended are forgotten before their time, and new ones are refused
+            until then. Each time those of the caller who has most.
+        jobs_per_owner: Kept jobs of one caller; beyond it, those that ended first are forgotten.
         look_s: How often a server that shares its database looks what others have done there; one that has a database
             of its own needs it only after that was away.
         lease_s: After how long without a sign of life a server is taken for dead by those that share its database.

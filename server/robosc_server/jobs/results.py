@@ -19,6 +19,8 @@ _AT_ONCE = 100
 _AT_ONCE_BYTES = 4 * 2**20
 _TOUCHED = 10_000
 _TOUCH_S = 30.0
+_GATHER_S = 0.1
+"""How long a result waits for others that are written with it: a transaction costs as much as a small task."""
 
 
 def _as_it_is(kind: TaskKind, result: Result) -> Result:
@@ -42,7 +44,7 @@ class Results:
         self._store, self._memory_bytes, self._finish = store, memory_bytes, finish
         self._memory: OrderedDict[str, Result] = OrderedDict()
         self._taken_bytes = 0
-        self._unwritten: OrderedDict[str, tuple[TaskKind, Result]] = OrderedDict()
+        self._unwritten: OrderedDict[str, tuple[TaskKind, Result, str]] = OrderedDict()
         self._unwritten_bytes = 0
         self._has_unwritten = asyncio.Event()
         self._writes_singly = False
@@ -84,10 +86,12 @@ class Results:
         unwritten = self._unwritten.get(key)
         if unwritten is not None:
             self.hits += 1
-            return self.remember(key, *unwritten)
+            return self.remember(key, *unwritten[:2])
         there = None
-        with contextlib.suppress(StoreUnavailableError):
-            there = await self._store.find_result(key)
+        # While it is known to be away nobody waits for it: that may take longer than the work.
+        if self._store.is_readable:
+            with contextlib.suppress(StoreUnavailableError):
+                there = await self._store.find_result(key)
         if there is None:
             self.misses += 1
             return None
@@ -100,8 +104,14 @@ class Results:
         found = self._unwritten.get(key)
         return None if found is None else found[1]
 
-    def keep(self, key: str, kind: TaskKind, result: Result) -> Result:
+    def keep(self, key: str, kind: TaskKind, result: Result, owner: str) -> Result:
         """Keep a new result in memory, and before long in the database, unless too much waits to be written there.
+
+        Args:
+            key: Of its task.
+            kind: Of its task.
+            result: As it was made.
+            owner: Who asked for it.
 
         Returns:
             The result as it is sent.
@@ -109,7 +119,7 @@ class Results:
         finished = self.remember(key, kind, result)
         size = _size_of(result)
         if key not in self._unwritten and self._unwritten_bytes + size <= _UNWRITTEN_BYTES:
-            self._unwritten[key] = kind, result
+            self._unwritten[key] = kind, result, owner
             self._unwritten_bytes += size
             self._has_unwritten.set()
         return finished
@@ -141,6 +151,7 @@ class Results:
         """Write what is kept, in its order."""
         while True:
             await self._has_unwritten.wait()
+            await asyncio.sleep(_GATHER_S)
             try:
                 await self._write_some()
             except StoreUnavailableError as error:
@@ -174,7 +185,7 @@ class Results:
         """Keys of what is written next."""
         found: list[str] = []
         size = 0
-        for key, (_, result) in self._unwritten.items():
+        for key, (_, result, _) in self._unwritten.items():
             size += _size_of(result)
             if found and (self._writes_singly or len(found) >= _AT_ONCE or size > _AT_ONCE_BYTES):
                 break
@@ -182,7 +193,7 @@ class Results:
         return found
 
     def _forget(self, key: str) -> None:
-        _, result = self._unwritten.pop(key)
+        _, result, _ = self._unwritten.pop(key)
         self._unwritten_bytes -= _size_of(result)
         if not self._unwritten:
             self._has_unwritten.clear()

@@ -7,14 +7,17 @@ Round-Robin", IEEE/ACM Transactions on Networking 4(3), 1996, pages 375-385; her
 
 import asyncio
 import time
-from collections import OrderedDict, deque
-from collections.abc import Awaitable, Callable
+from collections import Counter, OrderedDict, deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
+from robosc_api.security.callers import network_of
 from robosc_server.failures import RefusedError
-from robosc_server.tasks.task import Outcome, Reason, Task, TaskLimits
-from robosc_server.workers import OnReport, Workers, WorkersError
+from robosc_server.tasks.task import Failure, Outcome, Reason, Task, TaskLimits
+from robosc_server.workers import OnReport, WorkerLostError, Workers, WorkersError
 
 _LOOK_S = 1.0
 """While tasks wait: how often it is looked whether there are more workers."""
@@ -32,10 +35,13 @@ class QueueLimits:
     Attributes:
         waiting: Of all callers.
         waiting_per_caller: Of one.
+        reserved: Tasks that may run beyond what the workers are for, one for each caller of whom none runs: whoever
+            has all workers taken for a long time makes everybody a little slower, and nobody wait.
     """
 
     waiting: int = 1000
     waiting_per_caller: int = 100
+    reserved: int = 0
 
 
 class Accounts(Protocol):
@@ -44,8 +50,15 @@ class Accounts(Protocol):
     def waiting(self, caller: str) -> int | None:
         """How many tasks of a caller may wait; None: as many as anybody's."""
 
-    def spent(self, caller: str, seconds: float) -> None:
-        """Note for how long a worker was taken by a task of a caller."""
+    def check(self, caller: str) -> None:
+        """See whether a task of a caller may begin.
+
+        Raises:
+            RefusedError: It may not yet.
+        """
+
+    def spent(self, caller: str, cpu_s: float) -> None:
+        """Note how many seconds of a processor's time a task of a caller has taken."""
 
 
 class Place:
@@ -53,12 +66,16 @@ class Place:
 
     Args:
         caller: Whose.
+
+    Attributes:
+        line: Where it stands: all addresses of one network stand in one line.
     """
 
-    __slots__ = ("_begun_s", "_turn", "caller")
+    __slots__ = ("_begun_s", "_turn", "caller", "line")
 
     def __init__(self, caller: str) -> None:
         self.caller = caller
+        self.line = network_of(caller)
         self._turn: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._begun_s: float | None = None
 
@@ -93,6 +110,8 @@ class Scheduler:
         self._ring: OrderedDict[str, deque[Place]] = OrderedDict()
         self._waiting = 0
         self._running = 0
+        self._running_of: Counter[str] = Counter()
+        self._aside: Counter[str] = Counter()
         self._mean_s: float | None = None
         self._is_closed = False
         self._look: asyncio.TimerHandle | None = None
@@ -118,7 +137,7 @@ class Scheduler:
         caller: str,
         limits: TaskLimits,
         on_report: OnReport,
-        on_begin: Callable[[], Awaitable[None]] | None = None,
+        known: Callable[[], Outcome | None] = lambda: None,
     ) -> Outcome:
         """The outcome of a task that is bound to its call; cancelling this ends it.
 
@@ -127,23 +146,49 @@ class Scheduler:
             caller: Whose it is.
             limits: What it may take.
             on_report: Is told where the work is.
-            on_begin: Is told when a worker begins.
+            known: Asked when it has its turn: the outcome, if there is one by now, since an equal task was done.
 
         Raises:
-            RefusedError: There is too much to do, there are no workers, or the server ends.
+            RefusedError: There is too much to do, there are no workers, the server ends, or the caller has used up what
+                it may take while this waited.
         """
         if self._workers.capacity < 1:
             raise _no_workers()
         place = self.enter(caller)
         try:
             await place.turn()
-            if on_begin is not None:
-                await on_begin()
-            return await self._workers.run(task, limits, on_report)
+            if (outcome := known()) is not None:
+                return outcome
+            self.check(caller)
+            return await self.work(place, task, limits, on_report)
+        except WorkerLostError:
+            # Whoever asked would try the same again, if it were told that there are no workers.
+            return Failure(Reason.WORKER_DIED, "the worker was lost while it did this task, more than once")
         except WorkersError as error:
             raise _no_workers() from error
         finally:
             self.leave(place)
+
+    def check(self, caller: str) -> None:
+        """See whether a task of a caller may begin whose turn it is.
+
+        Raises:
+            RefusedError: It may not yet.
+        """
+        if self._accounts is not None:
+            self._accounts.check(caller)
+
+    async def work(self, place: Place, task: Task, limits: TaskLimits, on_report: OnReport) -> Outcome:
+        """The outcome of a task that has its turn; what it takes is noted for its caller, however it ends.
+
+        Raises:
+            WorkersError: See `Workers.run`.
+        """
+        return await self._workers.run(task, limits, on_report, partial(self._note_spent, place.caller))
+
+    def _note_spent(self, caller: str, cpu_s: float) -> None:
+        if self._accounts is not None:
+            self._accounts.spent(caller, cpu_s)
 
     def enter(self, caller: str) -> Place:
         """A place in the line, or at once at a worker.
@@ -151,17 +196,33 @@ class Scheduler:
         Raises:
             RefusedError: There is too much to do, or the server ends.
         """
+        self.require_room(caller)
+        return self.enter_anyway(caller)
+
+    def require_room(self, caller: str) -> None:
+        """Do nothing if `enter` would give a place.
+
+        Raises:
+            RefusedError: It would not.
+        """
         if self._is_closed:
             raise RefusedError(Reason.SHUTTING_DOWN, "the server ends; ask another one, or later", retry_after_s=1.0)
-        if self._waiting or self._running >= self._workers.capacity:
-            line = self._ring.get(caller)
-            if line is not None and len(line) >= self._waiting_of(caller):
-                after_s = self._retry_after_s(len(line) * len(self._ring))
+        waiting = self._waiting + self._aside.total()
+        is_free = not waiting and self._running < self._workers.capacity
+        name = network_of(caller)
+        if not is_free and not self._is_reserved_for(name):
+            own = len(self._ring.get(name, ())) + self._aside[name]
+            if own and own >= self._waiting_of(caller):
+                after_s = self._retry_after_s(own * max(1, len(self._ring)))
                 raise RefusedError(Reason.SERVER_BUSY, "too many requests of yours wait already", after_s)
-            if self._waiting >= self._limits.waiting:
-                after_s = self._retry_after_s(self._waiting)
+            if waiting >= self._limits.waiting:
+                after_s = self._retry_after_s(waiting)
                 raise RefusedError(Reason.SERVER_BUSY, "the server has too much to do; try again later", after_s)
-        return self.enter_anyway(caller)
+
+    def _is_reserved_for(self, line: str) -> bool:
+        """Whether a task of a line may begin though workers are taken."""
+        capacity = self._workers.capacity
+        return 0 < capacity <= self._running < capacity + self._limits.reserved and not self._running_of[line]
 
     def _waiting_of(self, caller: str) -> int:
         own = None if self._accounts is None else self._accounts.waiting(caller)
@@ -170,7 +231,7 @@ class Scheduler:
     def enter_anyway(self, caller: str) -> Place:
         """A place for a task that was accepted before: no bound holds."""
         place = Place(caller)
-        self._ring.setdefault(caller, deque()).append(place)
+        self._ring.setdefault(place.line, deque()).append(place)
         self._waiting += 1
         self._give_turns()
         return place
@@ -181,18 +242,29 @@ class Scheduler:
             took_s = self._clock() - place._begun_s
             self._mean_s = took_s if self._mean_s is None else self._mean_s + _WEIGHT * (took_s - self._mean_s)
             place._begun_s = None
-            if self._accounts is not None:
-                self._accounts.spent(place.caller, took_s)
             self._running -= 1
+            self._running_of[place.line] -= 1
+            self._running_of += Counter()  # Without those that are none.
             self._give_turns()
             return
-        line = self._ring.get(place.caller)
+        line = self._ring.get(place.line)
         if line is not None and place in line:
             line.remove(place)
             self._waiting -= 1
             self._order = None
             if not line:
-                del self._ring[place.caller]
+                del self._ring[place.line]
+
+    @contextmanager
+    def aside(self, place: Place) -> Iterator[None]:
+        """Give a place back and wait beside the line for something else, which counts like waiting in it."""
+        self.leave(place)
+        self._aside[place.line] += 1
+        try:
+            yield
+        finally:
+            self._aside[place.line] -= 1
+            self._aside += Counter()
 
     def before(self, place: Place) -> int:
         """How many tasks would begin before one that waits, if nothing else came; 0 for one that does not wait."""
@@ -216,17 +288,24 @@ class Scheduler:
     def _give_turns(self) -> None:
         self._order = None
         while self._waiting and self._running < self._workers.capacity:
-            caller, line = self._ring.popitem(last=False)
-            place = line.popleft()
-            if line:
-                self._ring[caller] = line
-            self._waiting -= 1
-            self._running += 1
-            place._begun_s = self._clock()
-            place._turn.set_result(None)
+            self._begin(next(iter(self._ring)))
+        while (name := next(filter(self._is_reserved_for, self._ring), None)) is not None:
+            self._begin(name)
         if self._waiting and self._look is None:
             # Workers of a cluster come and go without telling.
             self._look = asyncio.get_running_loop().call_later(_LOOK_S, self._look_again)
+
+    def _begin(self, name: str) -> None:
+        """Give the next task of a line its turn; others in it wait for theirs at the end of the ring."""
+        line = self._ring.pop(name)
+        place = line.popleft()
+        if line:
+            self._ring[name] = line
+        self._waiting -= 1
+        self._running += 1
+        self._running_of[name] += 1
+        place._begun_s = self._clock()
+        place._turn.set_result(None)
 
     def _look_again(self) -> None:
         self._look = None

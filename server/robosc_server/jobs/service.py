@@ -1,6 +1,7 @@
 """The RPCs of jobs: conversion at the border; what is refused is raised, and told by what stands around every call."""
 
-from collections.abc import Awaitable, Callable
+import asyncio
+from collections.abc import AsyncIterable, Awaitable, Callable
 from typing import Any
 
 import grpc
@@ -12,9 +13,12 @@ from robosc_server.jobs import convert
 from robosc_server.jobs.callers import Caller, caller_of
 from robosc_server.jobs.manager import JobManager
 from robosc_server.store import JobRecord
+from robosc_server.tasks.requests import RequestLimits
 from robosc_server.tasks.task import Reason, Task, TaskKind
 
 _ID_CHARACTERS = 64
+_JOBS_AT_ONCE = 20
+_LIMITS = RequestLimits()
 
 type Context = grpc.aio.ServicerContext[Any, Any]
 
@@ -23,8 +27,9 @@ def _anybody(caller: str) -> None:
     """Let each caller ask for as much as it likes."""
 
 
-async def _write(context: Context, message: bytes) -> None:
-    await context.write(message)
+async def _write(context: Context, messages: AsyncIterable[bytes]) -> None:
+    async for message in messages:
+        await context.write(message)
 
 
 class JobService(convert.JobServiceServicer):
@@ -35,7 +40,8 @@ class JobService(convert.JobServiceServicer):
         accept: Looks at a request and makes a task of it, or raises RefusedError.
         identify: Who calls.
         admit: Counts a job that somebody asks for, or raises RefusedError; is given the caller's name.
-        send: Sends a message of a result, serialized.
+        send: Sends the messages of a result, serialized.
+        limits: What a request may have.
     """
 
     def __init__(
@@ -44,26 +50,38 @@ class JobService(convert.JobServiceServicer):
         accept: Callable[[TaskKind, bytes], Task],
         identify: Callable[[Context], Caller] = caller_of,
         admit: Callable[[str], None] = _anybody,
-        send: Callable[[Context, bytes], Awaitable[None]] = _write,
+        send: Callable[[Context, AsyncIterable[bytes]], Awaitable[None]] = _write,
+        limits: RequestLimits = _LIMITS,
     ) -> None:
-        self._manager, self._accept, self._identify, self._admit, self._send = manager, accept, identify, admit, send
+        self._manager, self._accept, self._limits = manager, accept, limits
+        self._identify, self._admit, self._send = identify, admit, send
 
     async def SubmitJob(  # noqa: N802  # named by the .proto file
-        self, request: pb.SubmitJobRequest, context: Context
+        self, content: bytes, context: Context
     ) -> pb.SubmitJobResponse:
-        """Accept a task."""
+        """Accept a task; the request comes as bytes, to be looked at before it is parsed."""
+        request = convert.submission(content, self._limits)
         idempotency_key = convert.checked_idempotency_key(request.idempotency_key)
         label, retention_s = convert.checked_label(request.label), convert.retention_s_of(request)
-        task = self._accept(*convert.kind_and_request(request.task))
         caller = self._identify(context)
-        # Whoever asks again because the answer was lost asks for nothing new, and is refused nothing.
-        if idempotency_key and (there := await self._manager.submitted(task, caller, idempotency_key)):
-            return pb.SubmitJobResponse(job=self._job(there), existed=True)
-        self._admit(caller.name)
+        if not idempotency_key:
+            # First: it takes less time than a look at the request.
+            self._count(caller)
+        task = self._accept(*convert.kind_and_request(request.task))
+        if idempotency_key:
+            # Whoever asks again because the answer was lost asks for nothing new, and is refused nothing.
+            if there := await self._manager.submitted(task, caller, idempotency_key):
+                return pb.SubmitJobResponse(job=self._job(there), existed=True)
+            self._count(caller)
         record, existed = await self._manager.submit(
             task, caller, idempotency_key=idempotency_key, label=label, retention_s=retention_s
         )
         return pb.SubmitJobResponse(job=self._job(record), existed=existed)
+
+    def _count(self, caller: Caller) -> None:
+        """Count a job that somebody asks for, unless there is no room for it."""
+        self._manager.require_room(caller)
+        self._admit(caller.name)
 
     async def GetJob(  # noqa: N802
         self, request: pb.GetJobRequest, context: Context
@@ -99,22 +117,26 @@ class JobService(convert.JobServiceServicer):
         # One more than asked for tells whether there are more.
         found = await self._manager.list_jobs(chosen, convert.place_of(request.page_token, chosen), size + 1)
         token = convert.page_token(found[size - 1], chosen) if len(found) > size else ""
-        return pb.ListJobsResponse(jobs=map(self._job, found[:size]), next_page_token=token)
+        answer = pb.ListJobsResponse(next_page_token=token)
+        for place in range(0, min(size, len(found)), _JOBS_AT_ONCE):
+            answer.jobs.extend(map(self._job, found[place : min(place + _JOBS_AT_ONCE, size)]))
+            # A long list takes a while: other calls have their turn in between.
+            await asyncio.sleep(0)
+        return answer
 
     async def GetJobResult(  # noqa: N802
         self, request: pb.GetJobResultRequest, context: Context
     ) -> None:
         """Send the result of a job."""
         record, messages = await self._manager.result(_checked_id(request.id), self._identify(context))
-        async for message in messages:
-            await self._send(context, convert.result_response(record.kind, message))
+        await self._send(context, (convert.result_response(record.kind, message) async for message in messages))
 
     def _job(self, record: JobRecord) -> pb.Job:
         return convert.job_of(record, self._manager.waiting_before(record))
 
 
 def add_job_service(service: JobService, server: grpc.aio.Server) -> None:
-    """Have a server offer it; results go out as the bytes that they are kept as."""
+    """Have a server offer it; results go out as the bytes that they are kept as, and submissions come in as bytes."""
     convert.add_servicer(service, _BytesToo(server))  # type: ignore[no-untyped-call]  # generated
 
 
@@ -134,6 +156,7 @@ class _BytesToo:
     def add_registered_method_handlers(self, service: str, handlers: dict[str, Any]) -> None:
         """Register the handlers of a service."""
         changed = {name: handler._replace(response_serializer=convert.serialized) for name, handler in handlers.items()}
+        changed["SubmitJob"] = changed["SubmitJob"]._replace(request_deserializer=None)
         self._server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(service, changed),))
 
 

@@ -4,27 +4,45 @@ Nothing is made or changed. What another process holds now, such as the server t
 warning.
 """
 
+import asyncio
 import contextlib
 import datetime
 import errno
 import importlib.util
+import json
 import os
 import socket
-import sqlite3
+import subprocess
+import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from robosc_api.security import Scope, SecurityError, TokenFile, check_files, check_listening, is_loopback_host
+from sqlalchemy import make_url
+from sqlalchemy.exc import ArgumentError, NoSuchModuleError
+
+from robosc_api.security import (
+    Scope,
+    SecurityError,
+    TokenFile,
+    check_files,
+    check_listening,
+    is_loopback_host,
+    nobody_let_in,
+)
 from robosc_api.security.addresses import split
 from robosc_api.security.listening import read
 from robosc_server.operations.metrics import check_metrics_address
-from robosc_server.operations.settings import Settings, shown
+from robosc_server.operations.settings import Confinement, Settings, shown
 from robosc_server.signing import SigningError, read_signing_key
-from robosc_server.store.opening import DATABASE_FILE
+from robosc_server.store.errors import StoreError
+from robosc_server.store.looking import look_at_postgresql, look_at_sqlite
+from robosc_server.store.opening import DATABASE_FILE, is_in_use
 
 _CONNECT_S = 5.0
+_TRY_S = 20.0
 _SOON_DAYS = 14
 
 
@@ -60,6 +78,7 @@ def check_settings(settings: Settings) -> tuple[Finding, ...]:
         "signing": _signing,
         "database": _database,
         "workers": _workers,
+        "confinement": _confinement,
         "metrics": _metrics,
         "tracing": _tracing,
     }
@@ -141,11 +160,12 @@ def _tokens(settings: Settings) -> Iterator[tuple[Grade, str]]:
     except SecurityError as error:
         yield Grade.ERROR, str(error)
         return
-    useful = [entry for entry in entries if Scope.SYNTHESIZE in entry.scopes]
-    if not useful:
-        yield Grade.WARNING, f"{settings.tokens}: no token has the scope '{Scope.SYNTHESIZE}', so nobody is let in"
+    problem = nobody_let_in(entries, Scope.SYNTHESIZE)
+    useful = sum(Scope.SYNTHESIZE in entry.scopes for entry in entries)
+    if problem is not None:
+        yield Grade.WARNING, f"{settings.tokens}: {problem}"
     else:
-        yield Grade.OK, f"{settings.tokens}: {len(useful)} with the scope '{Scope.SYNTHESIZE}'"
+        yield Grade.OK, f"{settings.tokens}: {useful} with the scope '{Scope.SYNTHESIZE}'"
 
 
 def _signing(settings: Settings) -> Iterator[tuple[Grade, str]]:
@@ -171,44 +191,53 @@ def _database(settings: Settings) -> Iterator[tuple[Grade, str]]:
 
 
 def _postgresql(text: str) -> tuple[Grade, str]:
-    from sqlalchemy import create_engine, make_url
-    from sqlalchemy import text as statement
-    from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
-
     try:
-        url = make_url(text).set(drivername="postgresql+psycopg")
-        engine = create_engine(url, connect_args={"connect_timeout": round(_CONNECT_S)}, hide_parameters=True)
+        url = make_url(text)
+        name = url.render_as_string(hide_password=True)
+        version = look_at_postgresql(url, _CONNECT_S)
     except (ArgumentError, ValueError):
         return Grade.ERROR, "database_url: postgresql://USER:PASSWORD@HOST:PORT/NAME is needed"
     except (ImportError, NoSuchModuleError):
         return Grade.ERROR, "PostgreSQL needs the extra `postgresql`: pip install 'robosc[postgresql]'"
-    name = url.render_as_string(hide_password=True)
-    try:
-        with engine.connect() as connection:
-            version = connection.scalar(statement("SHOW server_version"))
-    except DBAPIError as error:
-        return Grade.ERROR, f"{name}: {' '.join(str(error.orig).split())}"
-    finally:
-        engine.dispose()
+    except StoreError as error:
+        return Grade.ERROR, f"{name}: {error}"
     return Grade.OK, f"{name}: PostgreSQL {version}"
 
 
 def _sqlite(file: Path) -> tuple[Grade, str]:
     """Whether the file can be used, or made."""
     folder = file.parent
-    there = next(place for place in (folder, *folder.parents) if place.exists())
-    if not there.is_dir():
-        return Grade.ERROR, f"{there} is no folder"
-    if not os.access(there, os.W_OK | os.X_OK):
-        return Grade.ERROR, f"{there} cannot be written"
-    if not file.exists():
-        return Grade.OK, f"{file} will be made"
     try:
-        with contextlib.closing(sqlite3.connect(f"{file.as_uri()}?mode=ro", uri=True, timeout=1.0)) as connection:
-            connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
-    except sqlite3.Error as error:
-        return Grade.ERROR, f"{file}: {error}"
-    return Grade.OK, f"SQLite in {file}"
+        there = next(place for place in (folder, *folder.parents) if place.exists())
+        if not there.is_dir():
+            return Grade.ERROR, f"{there} is no folder"
+        problem = _unwritable(there)
+        if problem is not None:
+            return Grade.ERROR, f"{there} cannot be written: {problem}"
+        is_there = file.exists()
+        if is_there:
+            look_at_sqlite(file)
+        if is_in_use(file):
+            return Grade.WARNING, f"{file} is in use now by another robosc-server"
+    except (OSError, StoreError) as error:
+        return Grade.ERROR, f"{file}: {getattr(error, 'strerror', None) or error}"
+    return Grade.OK, f"SQLite in {file}" if is_there else f"{file} will be made"
+
+
+def _unwritable(folder: Path) -> str | None:
+    """Why nothing can be made in a folder; None: something can. Rights alone do not tell: root has them all."""
+    try:
+        try:
+            # A file without a name, which nobody sees and which is gone when it is closed.
+            os.close(os.open(folder, os.O_TMPFILE | os.O_RDWR | os.O_CLOEXEC, 0o600))
+        except OSError as error:
+            if error.errno not in (errno.EOPNOTSUPP, errno.EISDIR, errno.ENOENT):
+                raise
+            # Not every file system has them.
+            Path(tempfile.mkdtemp(prefix=".robosc-", dir=folder)).rmdir()
+    except OSError as error:
+        return error.strerror or str(error)
+    return None
 
 
 def _workers(settings: Settings) -> Iterator[tuple[Grade, str]]:
@@ -227,11 +256,41 @@ def _workers(settings: Settings) -> Iterator[tuple[Grade, str]]:
         yield Grade.OK, f"{settings.worker_processes} local processes"
 
 
+def _confinement(settings: Settings) -> Iterator[tuple[Grade, str]]:
+    """What the kernel keeps workers from, tried in a process of its own: there is no way back."""
+    if settings.workers != "local":
+        yield Grade.OK, "each machine of the cluster sees to it"
+        return
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    try:
+        told = subprocess.run(
+            [sys.executable, "-P", "-m", "robosc_server.workers.sandbox"],
+            env=environment,
+            capture_output=True,
+            timeout=_TRY_S,
+            check=True,
+        )
+        missing = json.loads(told.stdout)
+    except (OSError, subprocess.SubprocessError, ValueError):
+        missing = ["it cannot be tried out"]
+    grade = Grade.ERROR if settings.confinement is Confinement.REQUIRED else Grade.WARNING
+    for part in missing:
+        yield grade, part
+    if not missing:
+        yield Grade.OK, "workers reach no files but programs, no network and no other process"
+
+
 def _cluster(spec: str) -> tuple[Grade, str]:
     if importlib.util.find_spec("distributed") is None:
         return Grade.ERROR, "a Dask cluster needs the extra `dask`: pip install 'robosc[dask]'"
-    address = spec.partition("://")[2]
+    protocol, _, rest = spec.partition("://")
+    address = rest.rstrip("/")
     error = _unreachable(address)
+    if error is None and protocol == "dask+tls":
+        from robosc_server.workers.dask_tls import tls_fault
+
+        fault = asyncio.run(tls_fault(*split(address), _CONNECT_S))
+        error = None if fault is None else f"{address}: {fault}"
     return (Grade.OK, f"{address} answers") if error is None else (Grade.ERROR, error)
 
 

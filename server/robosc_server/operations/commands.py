@@ -2,11 +2,11 @@
 
 import argparse
 import json
-import os
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from robosc.cli.running import Parser, guarded
 from robosc_api.security import Scope, SecurityError, add_token_arguments, written_token
 from robosc_server.operations.example import example_file
 from robosc_server.operations.settings import (
@@ -44,7 +44,9 @@ def run_command(words: Sequence[str]) -> int | None:
         "example-config": print_example,
     }
     command = commands.get(words[0]) if words else None
-    return None if command is None else command(words[1:])
+    if command is None:
+        return None
+    return guarded("robosc-server", lambda: command(words[1:]), as_json="--json" in words)
 
 
 def _health(argv: Sequence[str]) -> int:
@@ -55,23 +57,29 @@ def _health(argv: Sequence[str]) -> int:
 
 def new_token(argv: Sequence[str]) -> int:
     """Print a new token, and to standard error the line for the file of tokens; the exit status."""
-    parser = argparse.ArgumentParser(
-        prog="robosc-server token", description="Make a token for a caller.", allow_abbrev=False
-    )
+    parser = Parser(prog="robosc-server token", description="Make a token for a caller.", allow_abbrev=False)
     add_token_arguments(parser, (Scope.SYNTHESIZE,), has_quotas=True)
+    arguments = parser.parse_args(argv)
     try:
-        token, line = written_token(parser.parse_args(argv))
+        token, line = written_token(arguments)
     except SecurityError as error:
         sys.stderr.write(f"robosc-server: {error}\n")
         return 2
     sys.stdout.write(token)
+    # The line is for a token that somebody has got.
+    sys.stdout.flush()
+    if arguments.scope and Scope.SYNTHESIZE not in arguments.scope:
+        # A comment, for whoever appends what is written here to the file of tokens.
+        sys.stderr.write(
+            f"# warning: without the scope '{Scope.SYNTHESIZE}' nothing of this server can be called with the token\n"
+        )
     sys.stderr.write(line)
     return 0
 
 
 def print_example(argv: Sequence[str]) -> int:
     """Print a file with every setting; the exit status."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="robosc-server example-config",
         description="Print a file of settings: each with what it is and its default, as a comment.",
         allow_abbrev=False,
@@ -86,7 +94,7 @@ def check_config(argv: Sequence[str]) -> int:
     # The database's library takes longer to import than other commands take in all.
     from robosc_server.operations.check import Grade, check_settings
 
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="robosc-server check-config",
         description="Look whether a server could start with such settings: address, certificates, tokens, database, "
         "workers. Nothing is started, made or changed.",
@@ -148,5 +156,4 @@ def _plain(name: str, value: Any) -> Any:
 
 
 def _print_json(document: dict[str, Any]) -> None:
-    json.dump(document, sys.stdout, indent=2)
-    sys.stdout.write(os.linesep)
+    sys.stdout.write(json.dumps(document, indent=2) + "\n")

@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from collections.abc import Callable
 from typing import Any
 
 import structlog
@@ -11,6 +12,28 @@ from robosc_server.operations.interceptor import CallInterceptor
 
 _LOOK_S = 0.05
 
+_LAST_WORDS_S = 0.2
+"""How long answers that were handed to gRPC, and are small, have to get on the line."""
+
+
+STOP_S = 5.0
+"""How long gRPC may take to let go of its connections once all calls are cancelled."""
+
+
+async def stop(server: Any, grace_s: float | None = None) -> None:
+    """End a server's calls and connections; what gRPC does not let go of by then ends with the process.
+
+    Args:
+        server: A `grpc.aio.Server`.
+        grace_s: How long calls under way are given; None: none at all.
+    """
+    stopping = asyncio.ensure_future(server.stop(grace_s))
+    await asyncio.wait([stopping], timeout=(grace_s or 0.0) + STOP_S)
+    if stopping.done():
+        stopping.result()
+    else:
+        structlog.get_logger().warning("gRPC does not let go of its connections; they end with the process")
+
 
 async def drain(
     server: Any,
@@ -18,6 +41,7 @@ async def drain(
     calls: CallInterceptor,
     seconds: float,
     idle_methods: frozenset[str] = frozenset(),
+    unread_bytes: Callable[[], int] = lambda: 0,
 ) -> None:
     """End a server: health says no, then calls are refused, those under way are given time, and the rest is cancelled.
 
@@ -29,14 +53,15 @@ async def drain(
         calls: Stands before its services.
         seconds: How long calls under way are given.
         idle_methods: Methods that are not waited for, since their callers can ask another server at any time.
+        unread_bytes: Of large answers that were sent and are not read yet; they are waited for like calls.
     """
     log = structlog.get_logger()
     begun_s = time.monotonic()
     health.drain()
     calls.refuse_new()
     log.info("draining", calls=calls.under_way(idle_methods))
-    while calls.under_way(idle_methods) and time.monotonic() - begun_s < seconds:
+    while (calls.under_way(idle_methods) or unread_bytes()) and time.monotonic() - begun_s < seconds:
         await asyncio.sleep(_LOOK_S)
     left = calls.under_way(idle_methods)
-    await server.stop(0)
+    await stop(server, _LAST_WORDS_S)
     log.info("drained", seconds=round(time.monotonic() - begun_s, 3), cancelled=left)

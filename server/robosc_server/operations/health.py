@@ -10,12 +10,9 @@ import structlog
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 
 from robosc_api.failures import failure_metadata
-from robosc_server.failures import RefusedError, abort
-from robosc_server.tasks.task import Reason
 
 type Probe = Callable[[], Awaitable[bool]]
 
-_WATCHERS = 200
 _PROBE_LIMIT_S = 5.0
 
 _Response = health_pb2.HealthCheckResponse
@@ -34,7 +31,6 @@ class Health(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # untyped
         self._conditions = dict.fromkeys((name for needed in services.values() for name in needed), False)
         self._is_draining = False
         self._changed = asyncio.Event()
-        self._watchers = 0
 
     def conditions(self) -> dict[str, bool]:
         """What the services need, and whether it is there; and whether the server takes calls at all."""
@@ -118,20 +114,14 @@ class Health(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # untyped
 
     async def Watch(self, request: Any, context: Any) -> None:  # noqa: N802
         """How a service is, and how it becomes."""
-        if self._watchers >= _WATCHERS:
-            await abort(context, RefusedError(Reason.SERVER_BUSY, "too many watch the server's health", 10.0))
-        self._watchers += 1
-        try:
-            last = None
-            while True:
-                changed = self._changed
-                now = _status(self.is_serving(request.service))
-                if now != last:
-                    last = now
-                    await context.write(_Response(status=now))
-                await changed.wait()
-        finally:
-            self._watchers -= 1
+        last = None
+        while True:
+            changed = self._changed
+            now = _status(self.is_serving(request.service))
+            if now != last:
+                last = now
+                await context.write(_Response(status=now))
+            await changed.wait()
 
 
 def _status(is_serving: bool | None) -> Any:

@@ -5,7 +5,6 @@ One interceptor for all of it, since each costs every call some microseconds.
 
 import asyncio
 import time
-from collections.abc import Awaitable, Callable
 from typing import Any
 
 import grpc
@@ -13,8 +12,9 @@ import grpc.aio
 import structlog
 
 from robosc_api.failures import reason_of
+from robosc_api.layers import Layer, behaviour_of, with_behaviour
 from robosc_api.security import CALLER
-from robosc_api.streams import write_responses
+from robosc_api.streams import writing
 from robosc_server.failures import RefusedError, abort, code_of, fault_words
 from robosc_server.operations.logs import tell_fault
 from robosc_server.operations.metrics import MethodMetrics, Metrics
@@ -26,8 +26,8 @@ _HEALTH = "/grpc.health."
 _REFUSED_RETRY_S = 1.0
 
 
-class CallInterceptor(grpc.aio.ServerInterceptor):
-    """Stands first among the interceptors, so that it sees what others refuse.
+class CallInterceptor(Layer):
+    """The outermost layer, so that it sees what others refuse.
 
     Handlers may raise `RefusedError`, and need not care for other exceptions: the caller is told the id of a fault.
 
@@ -37,11 +37,10 @@ class CallInterceptor(grpc.aio.ServerInterceptor):
     """
 
     def __init__(self, metrics: Metrics, tracing: Tracing = NO_TRACING) -> None:
+        super().__init__()
         self._metrics = metrics
         self._tracing = tracing
         self._is_refusing = False
-        # By method: the handler that was there, and the one with everything around, made once and not for each call.
-        self._made: dict[str, tuple[Any, Any]] = {}
         self._log = structlog.get_logger().bind()
 
     def refuse_new(self) -> None:
@@ -60,33 +59,22 @@ class CallInterceptor(grpc.aio.ServerInterceptor):
             if name not in idle_methods and not name.startswith(_HEALTH)
         )
 
-    async def intercept_service(self, continuation: Callable[[Any], Awaitable[Any]], handler_call_details: Any) -> Any:
-        """The method's handler, with everything around it."""
+    def handler(self, inner: Any, details: Any) -> Any:
+        """The handler of a call, with everything around it."""
         # The handler runs in the same task, and so sees what is set here.
-        REQUEST_ID.set(request_id_of(handler_call_details.invocation_metadata))
-        handler = await continuation(handler_call_details)
-        if handler is None:
+        REQUEST_ID.set(request_id_of(details.invocation_metadata))
+        if inner is None:
             self._metrics.unknown_method()
-            return None
-        method: str = handler_call_details.method
-        made = self._made.get(method)
-        if made is None or made[0] is not handler:
-            made = self._made[method] = handler, self._around(handler, method)
-        return made[1]
+        return super().handler(inner, details)
 
-    def _around(self, handler: Any, method: str) -> Any:
-        wrap = {
-            (False, False): (grpc.unary_unary_rpc_method_handler, self._answer),
-            (False, True): (grpc.unary_stream_rpc_method_handler, self._stream),
-            (True, False): (grpc.stream_unary_rpc_method_handler, self._answer),
-            (True, True): (grpc.stream_stream_rpc_method_handler, self._stream),
-        }
-        make, around = wrap[handler.request_streaming, handler.response_streaming]
-        inner = handler.unary_unary or handler.unary_stream or handler.stream_unary or handler.stream_stream
-        observed = around(inner, method, self._metrics.method(method))
-        return make(observed, handler.request_deserializer, handler.response_serializer)
+    def around(self, inner: Any, method: str) -> Any:
+        """A handler with everything around it."""
+        answer = behaviour_of(inner)
+        if inner.response_streaming:
+            answer = writing(answer)
+        return with_behaviour(inner, self._observed(answer, method, self._metrics.method(method)))
 
-    def _answer(self, inner: Any, method: str, metrics: MethodMetrics) -> Any:
+    def _observed(self, inner: Any, method: str, metrics: MethodMetrics) -> Any:
         if self._tracing.is_on:
             inner = self._traced(inner, method)
 
@@ -122,12 +110,6 @@ class CallInterceptor(grpc.aio.ServerInterceptor):
                 self._ended(method, metrics, context, code, time.perf_counter() - begun_s)
 
         return observed
-
-    def _stream(self, inner: Any, method: str, metrics: MethodMetrics) -> Any:
-        async def answer(request: Any, context: Any) -> None:
-            await write_responses(inner(request, context), context)
-
-        return self._answer(answer, method, metrics)
 
     def _traced(self, inner: Any, method: str) -> Any:
         async def traced(request: Any, context: Any) -> Any:

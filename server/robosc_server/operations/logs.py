@@ -4,6 +4,7 @@ Nothing of a model is written above the level debug. That is why exceptions are 
 not by their message, which may quote what a caller sent.
 """
 
+import contextlib
 import json
 import logging
 import re
@@ -20,6 +21,7 @@ import structlog
 
 from robosc_server.operations.request_ids import REQUEST_ID
 from robosc_server.operations.settings import LogFormat, LogLevel
+from robosc_server.operations.worker_words import bounded, safe_words
 
 _LEVELS = {
     LogLevel.DEBUG: logging.DEBUG,
@@ -31,8 +33,6 @@ _LEVELS = {
 _TALKATIVE = ("asyncio", "distributed", "opentelemetry", "sqlalchemy")
 _FRAMES = 12
 _PLAIN = re.compile(r"[A-Za-z0-9._:/+@,%'()\[\]-]+\Z")
-_FRAME = re.compile(r'^\s*File "([^"\n]{1,400})", line (\d{1,9}), in (\S{1,100})', re.MULTILINE)
-_ERROR_KIND = re.compile(r"^([A-Za-z_][A-Za-z0-9_.]{0,100})(?::|$)", re.MULTILINE)
 
 type _Line = MutableMapping[str, Any]
 
@@ -76,29 +76,22 @@ def set_up_logs(log_format: LogFormat, log_level: LogLevel, stream: TextIO | Non
         logging.getLogger(name).setLevel(max(level, logging.WARNING))
 
 
-def tell_fault(fault: BaseException | str, reason: str = "INTERNAL_FAULT", *, is_ours: bool = False) -> str:
+def tell_fault(fault: BaseException | str, reason: str = "INTERNAL_FAULT") -> str:
     """Log a fault of ours; returns its id, which is all that a caller is told of it.
 
     Args:
         fault: It, or what another process tells of it, such as a traceback. Its words are logged at the level debug
-            alone.
+            alone; see `worker_words`.
         reason: The caller is told, as in google.rpc.ErrorInfo.
-        is_ours: Whether the words are the server's own, without anything of a model, so that they can be logged.
     """
     identity = secrets.token_hex(4)
     log = structlog.get_logger()
-    if isinstance(fault, str) and is_ours:
-        log.error("fault", fault=identity, reason=str(reason), words=fault)
-        return identity
     if isinstance(fault, str):
-        kinds = _ERROR_KIND.findall(fault)
-        kind = kinds[-1] if kinds else "unknown"
-        places = [f"{file}:{line} {name}" for file, line, name in _FRAME.findall(fault)][-_FRAMES:]
-        words = fault
+        known, words = safe_words(fault), bounded(fault)
     else:
-        kind, places = type(fault).__qualname__, _places(fault.__traceback__)
+        known = {"error": type(fault).__qualname__, "places": _places(fault.__traceback__)}
         words = "".join(traceback.format_exception(fault))
-    log.error("fault", fault=identity, reason=str(reason), error=kind, places=places)
+    log.error("fault", fault=identity, reason=str(reason), **known)
     log.debug("fault in words", fault=identity, traceback=words)
     return identity
 
@@ -161,10 +154,12 @@ _encode = msgspec.json.Encoder(enc_hook=str).encode
 
 def _json(logger: Any, name: str, line: _Line) -> str:
     first = {"time": line.pop("time"), "level": line.pop("level"), "event": line.pop("event")}
-    try:
-        return _encode(first | dict(line)).decode()
-    except (UnicodeEncodeError, TypeError):  # Half a pair of UTF-16, which a name of a file may hold; keys of a dict.
-        return json.dumps(first | dict(line), default=str, skipkeys=True)
+    with contextlib.suppress(UnicodeEncodeError, TypeError):  # Half a pair of UTF-16; keys of a dict.
+        text = _encode(first | dict(line)).decode()
+        if text.isprintable():
+            return text
+    # Escaped as well: what JSON leaves as it is, but terminals and other readers obey, such as U+2028 or U+009B.
+    return json.dumps(first | dict(line), default=str, skipkeys=True)
 
 
 def _text(logger: Any, name: str, line: _Line) -> str:

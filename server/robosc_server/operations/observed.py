@@ -7,7 +7,7 @@ from typing import Any, Self
 from robosc_server.operations.metrics import Metrics
 from robosc_server.operations.tracing import NO_TRACING, Tracing
 from robosc_server.tasks.task import Failure, Outcome, Task, TaskLimits
-from robosc_server.workers import OnReport, Workers
+from robosc_server.workers import OnReport, OnSpent, Workers, uncounted
 
 
 class ObservedWorkers:
@@ -47,14 +47,14 @@ class ObservedWorkers:
         """How many tasks they are at."""
         return self._running
 
-    async def run(self, task: Task, limits: TaskLimits, on_report: OnReport) -> Outcome:
+    async def run(self, task: Task, limits: TaskLimits, on_report: OnReport, on_spent: OnSpent = uncounted) -> Outcome:
         """The outcome of a task, as `Workers.run`."""
         outcome: Outcome | None = None
         begun_s = time.monotonic()
         self._running += 1
         try:
             with self._tracing.span("worker run", {"task.kind": task.kind.value}) as span:
-                outcome = await self._workers.run(task, limits, on_report)
+                outcome = await self._workers.run(task, limits, on_report, on_spent)
                 span.set_attribute("task.outcome", outcome.reason if isinstance(outcome, Failure) else "RESULT")
             return outcome
         finally:

@@ -79,25 +79,32 @@ class Quotas:
         if account is None:
             return
         now_s = self._clock()
-        # A task's time is known when it has ended: one may begin as long as anything is left.
-        if account.seconds is not None and (wait_s := account.seconds.seconds_until(0.0, now_s)) > 0:
-            size = account.seconds.size
-            raise _exceeded(f"the token's tasks may take {size} seconds of a processor's time in an hour", wait_s)
+        _check_seconds(account, now_s)
         if account.tasks is not None:
             if (wait_s := account.tasks.seconds_until(1.0, now_s)) > 0:
                 raise _exceeded(f"the token may ask for {account.tasks.size} tasks in a minute", wait_s)
             account.tasks.take(1.0, now_s)
 
-    def spent(self, caller: str, seconds: float) -> None:
+    def check(self, caller: str) -> None:
+        """See whether a task that was admitted may begin, now that others of the token may have taken their time.
+
+        Raises:
+            RefusedError: Nothing of a processor's time is left.
+        """
+        account = self._account(caller)
+        if account is not None:
+            _check_seconds(account, self._clock())
+
+    def spent(self, caller: str, cpu_s: float) -> None:
         """Count what a task has taken.
 
         Args:
             caller: Name of the token that it was for.
-            seconds: For how long it has had a worker, and so a processor, for itself.
+            cpu_s: Of a processor's time, in its process.
         """
         account = self._account(caller)
         if account is not None and account.seconds is not None:
-            account.seconds.take(seconds, self._clock())
+            account.seconds.take(cpu_s, self._clock())
 
     def waiting(self, caller: str) -> int | None:
         """How many tasks of a token may wait; None: as many as anybody's."""
@@ -118,6 +125,17 @@ class Quotas:
             # No more of them than lines of the file, but for tokens that were withdrawn and never come again.
             account = self._accounts[caller] = _Account(quota, self._clock())
         return account
+
+
+def _check_seconds(account: _Account, now_s: float) -> None:
+    """A task's time is known when it has ended: one may begin as long as anything is left.
+
+    Raises:
+        RefusedError: Nothing is.
+    """
+    if account.seconds is not None and (wait_s := account.seconds.seconds_until(0.0, now_s)) > 0:
+        size = account.seconds.size
+        raise _exceeded(f"the token's tasks may take {size} seconds of a processor's time in an hour", wait_s)
 
 
 def _exceeded(message: str, wait_s: float) -> RefusedError:

@@ -18,6 +18,7 @@ from pydantic_core import PydanticCustomError, PydanticUndefined
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 
 from robosc import __version__
+from robosc.cli.running import Parser
 from robosc_api.security import ServerSecurity, joined
 from robosc_api.security.addresses import split
 from robosc_server.tasks.task import TaskLimits
@@ -44,6 +45,13 @@ class LogLevel(StrEnum):
     INFO = "info"
     WARNING = "warning"
     ERROR = "error"
+
+
+class Confinement(StrEnum):
+    """Whether there are workers where a part of their confinement cannot be had."""
+
+    REQUIRED = "required"
+    BEST_EFFORT = "best-effort"
 
 
 def _bytes(value: object) -> object:
@@ -198,6 +206,14 @@ class Settings(BaseModel):
         100, "tasks of one caller that may wait, unless its token says otherwise", _QUEUE
     )
 
+    open_calls: _Count = _setting(10_000, "calls that may be open at once, those that only watch included", _QUEUE)
+    open_calls_per_caller: _Count = _setting(
+        2000, "open calls of one caller, unless its token says otherwise; without tokens, of one host", _QUEUE
+    )
+    request_seconds: _Seconds = _setting(
+        30.0, "seconds that the request of a call may take to arrive once the call has begun", _QUEUE
+    )
+
     workers: Annotated[str, AfterValidator(_workers)] = _setting(
         "local",
         "who works: `local` processes, or a Dask cluster, `dask://HOST:PORT` or `dask+tls://HOST:PORT`",
@@ -209,6 +225,13 @@ class Settings(BaseModel):
         "local tasks worked on at once, each in its own process",
         _WORKING,
         told="the number of processors",
+    )
+
+    confinement: Confinement = _setting(
+        Confinement.BEST_EFFORT,
+        "required: no task is done where the kernel cannot keep its process from files, network and other processes;"
+        " best-effort: what is missing is told, and tasks are done",
+        _WORKING,
     )
 
     state_dir: Path = _setting(
@@ -230,8 +253,13 @@ class Settings(BaseModel):
     retention_seconds: _Seconds = _setting(
         7 * 86400.0, "seconds that a job and its result are kept after its end", _KEEPING
     )
+    jobs_per_caller: _Count = _setting(
+        10_000, "jobs of one caller that are kept; beyond, those that ended first are forgotten", _KEEPING
+    )
     results_bytes: _Bytes = _setting(
-        2 * 2**30, "results kept for repeated requests, in the database; the longest unused go first", _KEEPING
+        2 * 2**30,
+        "results kept, in the database; beyond, whoever has most gives first, of what was unused longest",
+        _KEEPING,
     )
     memory_cache_bytes: Annotated[int, BeforeValidator(_bytes), BeforeValidator(_whole), Field(ge=0, le=2**50)] = (
         _setting(64 * 2**20, "results kept in memory as well; 0: none", _KEEPING)
@@ -507,7 +535,7 @@ def config_file_of(arguments: argparse.Namespace) -> Path | None:
 
 def load_settings(argv: Sequence[str] | None = None) -> Settings:
     """The settings of a command line; leaves the program with status 2 where they are wrong."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="robosc-server",
         description="Check models, synthesize supervisors and generate packages over gRPC.",
         epilog=_EPILOG,

@@ -146,6 +146,11 @@ class Database:
         """Whether what was read and what was changed last worked."""
         return not any(self._is_failing.values())
 
+    @property
+    def is_readable(self) -> bool:
+        """Whether what was read last worked, whatever became of changes."""
+        return not self._is_failing[False]
+
     async def read[T](self, work: Callable[[Connection], T]) -> T:
         """What some work finds, in a transaction.
 

@@ -4,12 +4,13 @@ Whoever changes a job says what it must be for that: in which state, and whose. 
 one comes first, and the other finds that there is nothing left to do.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from functools import cache
 from typing import Any
 
 from sqlalchemy import Connection, Row, and_, bindparam, delete, func, insert, or_, select, tuple_, update
 
+from robosc_server.store.fairness import given_back
 from robosc_server.store.records import ACTIVE, STEP, JobFilter, JobRecord, JobState
 from robosc_server.store.result_rows import insert_result
 from robosc_server.store.schema import JOBS, REPLICAS, REQUESTS, RESULTS
@@ -30,6 +31,14 @@ _FIND_BY_KEY = select(JOBS).where(_OF_KEY, _IS_KEPT)
 _FREE_KEY = delete(JOBS).where(_OF_KEY, JOBS.c.expires_us <= bindparam("now"))
 _SOME_OF_OWNER = select(JOBS.c.id).where(JOBS.c.owner == bindparam("by")).limit(bindparam("bound")).subquery()
 _COUNT = select(func.count()).select_from(_SOME_OF_OWNER)
+# One that another server is about to delete is left to it.
+_ENDED_FIRST = (
+    select(JOBS.c.id)
+    .where(JOBS.c.owner == bindparam("by"), JOBS.c.ended_us.is_not(None))
+    .order_by(JOBS.c.ended_us, JOBS.c.id)
+    .limit(1)
+    .with_for_update(skip_locked=True)
+)
 _INSERT = insert(JOBS)
 _COLUMNS_OF_NEW = (
     "id owner kind state revision key main_file label idempotency_key retention_us created_us attempts is_from_store"
@@ -81,6 +90,7 @@ def record_of(row: Row[Any]) -> JobRecord:
         is_from_store=values["is_from_store"],
         replica=values["replica"],
         result_key=values["result_key"],
+        losses=values["losses"],
     )
 
 
@@ -155,11 +165,11 @@ def accept(
         record: The job, which waits.
         request: What it is asked to do.
         result: One of the same task that is known elsewhere; None: only the database is asked.
-        bound: How many jobs of one owner are kept.
+        bound: How many jobs of one owner are kept; the one that ended first makes room for a new one.
         now_us: The time.
 
     Returns:
-        The job, and whether it was there before, by its idempotency key. None: there are too many.
+        The job, and whether it was there before, by its idempotency key. None: as many have not ended.
     """
     if record.idempotency_key is not None:
         there = find_by_key(connection, record.owner, record.idempotency_key, now_us)
@@ -169,7 +179,10 @@ def accept(
         freed = {"by": record.owner, "with": record.idempotency_key, "now": now_us}
         connection.execute(_FREE_KEY, freed)
     if connection.execute(_COUNT, {"by": record.owner, "bound": bound}).scalar_one() >= bound:
-        return None
+        first = connection.scalar(_ENDED_FIRST, {"by": record.owner})
+        if first is None:
+            return None
+        connection.execute(delete(JOBS).where(JOBS.c.id == first))
     new = {name: getattr(record, name) for name in _COLUMNS_OF_NEW}
     connection.execute(_INSERT, new)
     ended = _end_from_store(connection, record, result, now_us)
@@ -196,20 +209,24 @@ def begin(connection: Connection, job_id: str, replica: str, now_us: int) -> tup
     return begun, bytes(connection.scalar(_REQUEST, {"of": job_id}) or b"")
 
 
-def put_back(connection: Connection, ids: Collection[str], replica: str, next_replica: str | None) -> list[JobRecord]:
-    """Have running jobs wait again that were interrupted through no fault of theirs; the attempt does not count.
+def put_back(
+    connection: Connection, ids: Collection[str], replica: str, next_replica: str | None, *, is_lost: bool
+) -> list[JobRecord]:
+    """Have running jobs wait again that were interrupted; the attempt does not count.
 
     Args:
         connection: In a transaction.
         ids: Which; those that do not run, or are another server's, stay as they are.
         replica: Whose they are.
         next_replica: Whose they will be; None: whoever finds them first.
+        is_lost: Whether they lost their workers, perhaps through their own fault; that is counted.
     """
     found = []
     for job_id in sorted(ids):  # The same order in each server: none waits for one that waits for it.
         record = _locked(connection, job_id)
         if record is not None and record.replica == replica and record.state is JobState.RUNNING:
             values: dict[str, Any] = {"state": JobState.QUEUED, "attempts": record.attempts - 1}
+            values["losses"] = record.losses + is_lost
             found.append(_changed(connection, job_id, **_NO_PROGRESS, **values, replica=next_replica))
     return found
 
@@ -226,7 +243,7 @@ def succeed(connection: Connection, job_id: str, replica: str, result: Result, n
     record = _locked(connection, job_id)
     if record is None or record.replica != replica or record.state.has_ended:
         return None
-    insert_result(connection, record.key, record.kind, result, now_us)
+    insert_result(connection, record.key, record.kind, result, record.owner, now_us)
     return _end(connection, record, JobState.SUCCEEDED, now_us, result_key=record.key)
 
 
@@ -277,19 +294,22 @@ def has_orphans(connection: Connection) -> bool:
     return connection.scalar(select(JOBS.c.id).where(_is_orphan()).limit(1)) is not None
 
 
-def take_orphans(connection: Connection, ours: str, now_us: int) -> list[JobRecord]:
+def take_orphans(connection: Connection, ours: str, now_us: int, limit: int) -> list[JobRecord]:
     """Take over the jobs that have not ended, and are no server's; those that ran wait again, or have failed.
 
     Args:
         connection: In a transaction.
         ours: The server that takes them.
         now_us: The time.
+        limit: How many at most, the oldest first.
 
     Returns:
         The jobs that have changed.
     """
-    # Whoever else takes jobs at this moment takes others.
-    query = select(JOBS).where(_is_orphan()).order_by(JOBS.c.created_us, JOBS.c.id)
+    # Whoever else takes jobs at this moment takes others. Those that we have are not taken again, also where another
+    # server takes us for dead meanwhile.
+    query = select(JOBS).where(_is_orphan(), JOBS.c.replica.is_distinct_from(ours))
+    query = query.order_by(JOBS.c.created_us, JOBS.c.id).limit(limit)
     found = [record_of(row) for row in connection.execute(query.with_for_update(skip_locked=True, of=JOBS))]
     taken = []
     for record in found:
@@ -307,6 +327,46 @@ def sweep(connection: Connection, now_us: int, limit: int) -> int:
     if ids:
         connection.execute(delete(JOBS).where(JOBS.c.id.in_(ids)))
     return len(ids)
+
+
+def results_by_owner(connection: Connection) -> dict[str, int]:
+    """Bytes of the results that each owner's jobs refer to; one that several owners have counts for each of them."""
+    referred = select(JOBS.c.owner, JOBS.c.result_key).where(JOBS.c.result_key.is_not(None)).distinct().subquery()
+    query = select(referred.c.owner, func.sum(RESULTS.c.size).label("total")).group_by(referred.c.owner)
+    query = query.join_from(referred, RESULTS, RESULTS.c.key == referred.c.result_key)
+    return {row.owner: int(row.total) for row in connection.execute(query)}
+
+
+def forget(connection: Connection, held: dict[str, int], excess: int, limit: int) -> tuple[int, dict[str, int]]:
+    """Delete jobs that have results before their time: of the owner whose results take most, the one that ended first.
+
+    Args:
+        connection: In a transaction.
+        held: Bytes of the results that each owner's jobs refer to.
+        excess: How many bytes are too many.
+        limit: How many jobs at most.
+
+    Returns:
+        How many there were, and what each owner's jobs refer to then.
+    """
+
+    def oldest(owner: str) -> Iterator[tuple[str, int]]:
+        later = JOBS.alias()
+        is_referred_to = (
+            select(later.c.id)
+            .where(later.c.result_key == JOBS.c.result_key, later.c.owner == owner)
+            .where(tuple_(later.c.ended_us, later.c.id) > tuple_(JOBS.c.ended_us, JOBS.c.id))
+            .exists()
+        )
+        query = select(JOBS.c.id, RESULTS.c.size, is_referred_to.label("is_referred_to"))
+        query = query.join_from(JOBS, RESULTS, RESULTS.c.key == JOBS.c.result_key).where(JOBS.c.owner == owner)
+        for row in connection.execute(query.order_by(JOBS.c.ended_us, JOBS.c.id).limit(limit)):
+            yield row.id, 0 if row.is_referred_to else row.size
+
+    chosen, left = given_back(held, oldest, excess, limit)
+    if chosen:
+        connection.execute(delete(JOBS).where(JOBS.c.id.in_(chosen)))
+    return len(chosen), left
 
 
 def _is_orphan() -> Any:
@@ -331,7 +391,7 @@ def _end_from_store(connection: Connection, record: JobRecord, result: Result | 
     if connection.scalar(_LOCK_RESULT, {"of": record.key}) is None:
         if result is None:
             return None
-        insert_result(connection, record.key, record.kind, result, now_us)
+        insert_result(connection, record.key, record.kind, result, record.owner, now_us)
     return _end(connection, record, JobState.SUCCEEDED, now_us, result_key=record.key, is_from_store=True)
 
 

@@ -8,6 +8,7 @@ free again go back to the disk a few at a time (sqlite.org: wal.html, pragma.htm
 import fcntl
 import os
 import sqlite3
+import struct
 import threading
 import time
 from collections.abc import Callable
@@ -25,6 +26,7 @@ from robosc_server.store.store import Store
 DATABASE_FILE = "jobs.sqlite"
 _LOG_BYTES = 16 * 2**20
 _BUSY_S = 5.0
+_FLOCK = "hhqqi"
 
 _POSTGRESQL_OPTIONS = {
     "connect_timeout": 3,
@@ -166,7 +168,7 @@ def _locked(path: Path) -> tuple[Path, int]:
     with _held_lock:
         if path in _held:
             raise taken
-        descriptor = os.open(path.with_name(f"{path.name}.lock"), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        descriptor = os.open(_lock_of(path), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
         try:
             fcntl.lockf(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except (BlockingIOError, PermissionError) as error:
@@ -177,6 +179,35 @@ def _locked(path: Path) -> tuple[Path, int]:
             raise
         _held.add(path)
     return path, descriptor
+
+
+def _lock_of(path: Path) -> Path:
+    return path.with_name(f"{path.name}.lock")
+
+
+def is_in_use(given: Path) -> bool:
+    """Whether a server has a file of SQLite now; asks for the lock without taking it, and makes nothing.
+
+    Raises:
+        OSError: It cannot be told.
+    """
+    path = given.resolve()
+    with _held_lock:
+        # Not even looked at then: a process that closes a file loses its locks there (POSIX, fcntl), and is never told
+        # of its own.
+        if path in _held:
+            return True
+        try:
+            descriptor = os.open(_lock_of(path), os.O_RDONLY | os.O_CLOEXEC)
+        except FileNotFoundError:
+            return False
+        try:
+            # struct flock: what kind of lock, from where, the first byte, how many (0: all), who has it.
+            wanted = struct.pack(_FLOCK, fcntl.F_WRLCK, os.SEEK_SET, 0, 0, 0)
+            kind, *_ = struct.unpack(_FLOCK, fcntl.fcntl(descriptor, fcntl.F_GETLK, wanted))
+        finally:
+            os.close(descriptor)
+    return bool(kind != fcntl.F_UNLCK)
 
 
 def _unlock(lock: tuple[Path, int]) -> None:

@@ -58,6 +58,7 @@ class JobRecord:
         is_from_store: Whether its result is that of an earlier task.
         replica: Which server has it to do; None: none.
         result_key: Of its result; None: it has none.
+        losses: How often its worker was lost under it in a way that may be its own fault.
     """
 
     id: str
@@ -80,6 +81,7 @@ class JobRecord:
     is_from_store: bool = False
     replica: str | None = None
     result_key: str | None = None
+    losses: int = 0
 
 
 @dataclass(frozen=True, slots=True)

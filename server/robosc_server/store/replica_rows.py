@@ -9,8 +9,6 @@ from collections.abc import Mapping
 
 from sqlalchemy import Connection, delete, insert, select, update
 
-from robosc_server.store.job_rows import take_orphans
-from robosc_server.store.records import JobRecord
 from robosc_server.store.schema import REPLICAS
 
 
@@ -37,22 +35,12 @@ def beats_of_others(connection: Connection, replica: str) -> dict[str, int]:
     return {row.id: row.beats for row in rows}
 
 
-def adopt(connection: Connection, ours: str, dead: Mapping[str, int], now_us: int) -> list[JobRecord]:
-    """Take over the jobs of servers that have not counted on from the numbers given, and those of nobody.
-
-    Returns:
-        The jobs that have changed.
-    """
+def leave_dead(connection: Connection, dead: Mapping[str, int]) -> None:
+    """Tell that servers are gone that have not counted on from the numbers given; their jobs are nobody's then."""
     for name, beats in dead.items():
         connection.execute(delete(REPLICAS).where(REPLICAS.c.id == name, REPLICAS.c.beats == beats))
-    return take_orphans(connection, ours, now_us)
 
 
-def adopt_all(connection: Connection, ours: str, now_us: int) -> list[JobRecord]:
-    """Take over all jobs: there is no other server.
-
-    Returns:
-        The jobs that have changed.
-    """
+def leave_others(connection: Connection, ours: str) -> None:
+    """Tell that there is no other server; all jobs but ours are nobody's then."""
     connection.execute(delete(REPLICAS).where(REPLICAS.c.id != ours))
-    return take_orphans(connection, ours, now_us)

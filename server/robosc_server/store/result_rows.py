@@ -1,11 +1,12 @@
 """Rows of results: what one transaction does with them."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from typing import Any
 
 from sqlalchemy import Connection, bindparam, delete, func, insert, select, update
 from sqlalchemy.dialects import postgresql, sqlite
 
+from robosc_server.store.fairness import given_back
 from robosc_server.store.records import blocks_of
 from robosc_server.store.schema import BLOCKS, JOBS, RESULTS
 from robosc_server.tasks.task import Result, TaskKind
@@ -21,10 +22,10 @@ _BLOCK = select(BLOCKS.c.content).where(BLOCKS.c.key == bindparam("of"), BLOCKS.
 _ALL_BLOCKS = select(BLOCKS.c.content).where(BLOCKS.c.key == bindparam("of")).order_by(BLOCKS.c.number)
 
 
-def insert_result(connection: Connection, key: str, kind: TaskKind, result: Result, now_us: int) -> None:
-    """Keep a result, unless there is one of that key."""
+def insert_result(connection: Connection, key: str, kind: TaskKind, result: Result, owner: str, now_us: int) -> None:
+    """Keep a result that was made for an owner, unless there is one of that key."""
     size = sum(map(len, result.messages))
-    new = {"key": key, "kind": kind, "size": size, "used_us": now_us}
+    new = {"key": key, "kind": kind, "size": size, "used_us": now_us, "owner": owner}
     if connection.execute(_INSERT[connection.dialect.name], new).rowcount:
         for number, block in enumerate(blocks_of(result.messages)):
             connection.execute(_INSERT_BLOCK, {"key": key, "number": number, "content": block})
@@ -59,39 +60,36 @@ def touch(connection: Connection, keys: Collection[str], now_us: int) -> None:
         connection.execute(update(RESULTS).where(RESULTS.c.key.in_(part)).values(used_us=now_us))
 
 
-def size_of_all(connection: Connection) -> int:
-    """Bytes of all results."""
-    return int(connection.scalar(select(func.sum(RESULTS.c.size))) or 0)
+def sizes_by_owner(connection: Connection) -> dict[str, int]:
+    """Bytes of all results, by those for whom they were made first."""
+    query = select(RESULTS.c.owner, func.sum(RESULTS.c.size).label("total")).group_by(RESULTS.c.owner)
+    return {row.owner: int(row.total) for row in connection.execute(query)}
 
 
-def size_of_needed(connection: Connection) -> int:
-    """Bytes of the results that kept jobs refer to."""
-    return int(connection.scalar(select(func.sum(RESULTS.c.size)).where(_is_needed())) or 0)
-
-
-def trim(connection: Connection, excess_bytes: int, limit: int) -> int:
-    """Delete results that no job refers to, those first that were not asked for longest.
+def trim(connection: Connection, held: dict[str, int], excess: int, limit: int) -> tuple[int, dict[str, int]]:
+    """Delete results that no job refers to: of the owner who holds most, the one that was not asked for longest.
 
     Args:
         connection: In a transaction.
-        excess_bytes: How many bytes are too many.
+        held: Bytes that each owner holds.
+        excess: How many bytes are too many.
         limit: How many results at most.
 
     Returns:
-        Bytes that are no longer taken.
+        How many there were, and what each owner holds then.
     """
-    query = select(RESULTS.c.key, RESULTS.c.size).where(~_is_needed()).order_by(RESULTS.c.used_us, RESULTS.c.key)
-    # One that a job is about to refer to is left alone.
-    query = query.limit(limit).with_for_update(skip_locked=True, of=RESULTS)
-    chosen, freed = [], 0
-    for row in connection.execute(query):
-        if freed >= excess_bytes:
-            break
-        chosen.append(row.key)
-        freed += row.size
+
+    def oldest(owner: str) -> Iterator[tuple[str, int]]:
+        query = select(RESULTS.c.key, RESULTS.c.size).where(RESULTS.c.owner == owner, ~_is_needed())
+        query = query.order_by(RESULTS.c.used_us, RESULTS.c.key).limit(limit)
+        # One that a job is about to refer to is left alone.
+        for row in connection.execute(query.with_for_update(skip_locked=True, of=RESULTS)):
+            yield row.key, row.size
+
+    chosen, left = given_back(held, oldest, excess, limit)
     if chosen:
         connection.execute(delete(RESULTS).where(RESULTS.c.key.in_(chosen)))
-    return freed
+    return len(chosen), left
 
 
 def _is_needed() -> Any:

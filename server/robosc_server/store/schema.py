@@ -21,12 +21,13 @@ from sqlalchemy import (
     inspect,
     select,
     text,
+    update,
 )
 
 from robosc_server.store.errors import StoreError
 
-VERSION = 1
-"""Of the tables below; a database with another one is not touched."""
+VERSION = 2
+"""Of the tables below. Those of an earlier version are brought up to it; a database of a later one is not touched."""
 
 _LOCK = 0x726F626F7363
 """PostgreSQL's advisory lock while tables are made: replicas may start at the same time."""
@@ -50,7 +51,9 @@ RESULTS = Table(
     Column("kind", Text, nullable=False),
     Column("size", BigInteger, nullable=False),
     Column("used_us", BigInteger, nullable=False),
-    Index("results_used", "used_us"),
+    # For whom it was made first.
+    Column("owner", Text, nullable=False, server_default=""),
+    Index("results_of_owners", "owner", "used_us"),
 )
 
 # The messages of a result: as many in a block as fit, so that a large result is never read at once.
@@ -89,11 +92,14 @@ JOBS = Table(
     Column("replica", Text),
     # Set when it has succeeded. As long as it stands there, the result cannot be deleted.
     Column("result_key", Text, ForeignKey("results.key")),
+    # How often its worker was lost under it in a way that may be its own fault.
+    Column("losses", Integer, nullable=False, server_default="0"),
     UniqueConstraint("owner", "idempotency_key", name="jobs_idempotency"),
     Index("jobs_listed", "owner", "created_us", "id"),
     Index("jobs_all_listed", "created_us", "id"),
     Index("jobs_active", "state", "replica"),
     Index("jobs_expiring", "expires_us"),
+    Index("jobs_ended", "owner", "ended_us"),
     Index("jobs_results", "result_key"),
 )
 
@@ -106,25 +112,57 @@ REQUESTS = Table(
 )
 
 
+# What brings the tables of a version to the next one. Servers of the earlier version that are running go on meanwhile.
+_STEPS = {
+    1: (
+        "ALTER TABLE results ADD COLUMN owner TEXT NOT NULL DEFAULT ''",
+        "UPDATE results SET owner = COALESCE((SELECT MIN(owner) FROM jobs WHERE jobs.result_key = results.key), '')",
+        "CREATE INDEX results_of_owners ON results (owner, used_us)",
+        "DROP INDEX results_used",
+        "ALTER TABLE jobs ADD COLUMN losses INTEGER NOT NULL DEFAULT 0",
+        "CREATE INDEX jobs_ended ON jobs (owner, ended_us)",
+    ),
+}
+
+
 def prepare(connection: Connection) -> None:
-    """Make the tables, or see that they are those of this version.
+    """Make the tables, or bring them up to this version.
 
     Raises:
         StoreError: They are not.
     """
     if connection.dialect.name == "postgresql":
         connection.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": _LOCK})
+    version = version_of(connection)
+    if version is None:
+        METADATA.create_all(connection)
+        connection.execute(insert(SCHEMA).values(version=VERSION))
+        return
+    for earlier in range(version, VERSION):
+        for step in _STEPS[earlier]:
+            connection.execute(text(step))
+    if version != VERSION:
+        connection.execute(update(SCHEMA).values(version=VERSION))
+
+
+def version_of(connection: Connection) -> int | None:
+    """Of the tables that are there, which this server can use or bring up to its own; None: there are none.
+
+    Only looks.
+
+    Raises:
+        StoreError: There are others.
+    """
     names = set(inspect(connection).get_table_names())
     if SCHEMA.name not in names:
         if names & set(METADATA.tables):
             raise StoreError("the database holds tables of something else with the names of RoboSC's")
-        METADATA.create_all(connection)
-        connection.execute(insert(SCHEMA).values(version=VERSION))
-        return
+        return None
     versions = list(connection.scalars(select(SCHEMA.c.version)))
-    if versions != [VERSION]:
-        found = versions[0] if len(versions) == 1 else "unknown"
-        raise StoreError(
-            f"the database has tables of version {found}, and this server knows version {VERSION} alone; it was "
-            "written by another version of RoboSC"
-        )
+    if len(versions) == 1 and (versions[0] == VERSION or versions[0] in _STEPS):
+        return int(versions[0])
+    found = versions[0] if len(versions) == 1 else "unknown"
+    raise StoreError(
+        f"the database has tables of version {found}, and this server knows version {VERSION} and those before; it was "
+        "written by another version of RoboSC"
+    )

@@ -1,4 +1,6 @@
-"""What is kept: jobs, results, and which servers there are. Each call is one transaction.
+"""What is kept: jobs, results, and which servers there are.
+
+Each call is one transaction, or, where there may be many jobs, several, each of which leaves what makes sense.
 
 Every call raises StoreUnavailableError where the database is away, full or too slow.
 """
@@ -6,6 +8,7 @@ Every call raises StoreUnavailableError where the database is away, full or too 
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
+from itertools import batched
 
 from sqlalchemy import Connection
 
@@ -15,7 +18,8 @@ from robosc_server.store.records import JobFilter, JobRecord, JobState, messages
 from robosc_server.tasks.task import Failure, Report, Result, TaskKind
 
 _SWEPT_AT_ONCE = 200
-_TRIMMED_AT_ONCE = 50
+_TAKEN_AT_ONCE = 200
+_THINNED_AT_ONCE = 50
 _FREE_PAGES = 2000
 
 
@@ -51,6 +55,11 @@ class Store:
     def is_available(self) -> bool:
         """Whether what was asked of it last worked."""
         return self._database.is_available
+
+    @property
+    def is_readable(self) -> bool:
+        """Whether what was read last could be; a full disk is."""
+        return self._database.is_readable
 
     def now_us(self) -> int:
         """Microseconds since 1970."""
@@ -101,9 +110,19 @@ class Store:
         now_us = self.now_us()
         return await self._database.write(lambda connection: job_rows.begin(connection, job_id, replica, now_us))
 
-    async def put_back(self, ids: Collection[str], replica: str, next_replica: str | None) -> list[JobRecord]:
-        """Have running jobs wait again; see `job_rows.put_back`."""
-        return await self._database.write(lambda connection: job_rows.put_back(connection, ids, replica, next_replica))
+    async def put_back(
+        self, ids: Collection[str], replica: str, next_replica: str | None, *, is_lost: bool = False
+    ) -> list[JobRecord]:
+        """Have running jobs wait again; see `job_rows.put_back`. In small transactions."""
+        found: list[JobRecord] = []
+        for some in batched(sorted(ids), _TAKEN_AT_ONCE):
+            work = partial(job_rows.put_back, ids=some, replica=replica, next_replica=next_replica, is_lost=is_lost)
+            found += await self._database.write(work)
+        return found
+
+    async def give_up_waiting(self, replica: str) -> None:
+        """Leave the jobs of a server that wait to whoever finds them first."""
+        await self._database.write(lambda connection: job_rows.give_up_waiting(connection, replica))
 
     async def end(self, job_id: str, replica: str, outcome: Result | Failure) -> JobRecord | None:
         """End a job; None: it has ended, or is another server's."""
@@ -139,14 +158,15 @@ class Store:
 
     async def enter(self, replica: str) -> None:
         """Tell that a server is there; where no other can be, it takes over all jobs."""
-        now_us = self.now_us()
 
         def work(connection: Connection) -> None:
             replica_rows.enter(connection, replica)
             if not self.is_shared:
-                replica_rows.adopt_all(connection, replica, now_us)
+                replica_rows.leave_others(connection, replica)
 
         await self._database.write(work)
+        if not self.is_shared:
+            await self._take_orphans(replica)
 
     async def leave(self, replica: str) -> None:
         """Tell that a server is gone; its jobs that wait are left to others."""
@@ -168,19 +188,24 @@ class Store:
         )
 
     async def adopt(self, replica: str, dead: Mapping[str, int]) -> list[JobRecord]:
-        """Take over the jobs of dead servers, and those of nobody; see `replica_rows.adopt`."""
-        now_us = self.now_us()
-        return await self._database.write(lambda connection: replica_rows.adopt(connection, replica, dead, now_us))
+        """Take over the jobs of servers that have not counted on from the numbers given, and those of nobody.
 
-    async def keep_results(self, results: Sequence[tuple[str, TaskKind, Result]]) -> None:
-        """Keep results by their keys, but for those whose keys are there; all or none."""
+        Returns:
+            The jobs that have changed.
+        """
+        if dead:
+            await self._database.write(lambda connection: replica_rows.leave_dead(connection, dead))
+        return await self._take_orphans(replica)
+
+    async def keep_results(self, results: Sequence[tuple[str, TaskKind, Result, str]]) -> None:
+        """Keep results by their keys, with their owners, but for those whose keys are there; all or none."""
         now_us = self.now_us()
         # The same order in each server: none waits for one that waits for it.
         ordered = sorted(results, key=lambda item: item[0])
 
         def insert(connection: Connection) -> None:
-            for key, kind, result in ordered:
-                result_rows.insert_result(connection, key, kind, result, now_us)
+            for key, kind, result, owner in ordered:
+                result_rows.insert_result(connection, key, kind, result, owner, now_us)
 
         await self._database.write(insert)
 
@@ -206,14 +231,17 @@ class Store:
         await self._database.write(lambda connection: result_rows.touch(connection, keys, now_us))
 
     async def size_of_needed(self) -> int:
-        """Bytes of the results that kept jobs refer to."""
-        return await self._database.read(result_rows.size_of_needed)
+        """Bytes of the results that kept jobs refer to; what jobs of several owners do counts for each of them."""
+        return sum((await self._database.read(job_rows.results_by_owner)).values())
 
     async def sweep(self, results_bytes: int) -> int:
-        """Delete jobs whose time has passed, and results that are too many; in small transactions, others between.
+        """Delete jobs whose time has passed, and what is too much; in small transactions, others between.
+
+        Where there is too much, whoever has most gives first, see `fairness`: results that no job refers to; and where
+        jobs refer to as much as may stay, those that ended first, so that a tenth of it is free again.
 
         Args:
-            results_bytes: Bytes of results that may stay; those that jobs refer to do in any case.
+            results_bytes: Bytes of results that may stay.
 
         Returns:
             How many jobs were deleted.
@@ -222,13 +250,46 @@ class Store:
         total = 0
         while swept := await self._database.write(partial(job_rows.sweep, now_us=now_us, limit=_SWEPT_AT_ONCE)):
             total += swept
-        while (excess := await self._database.read(result_rows.size_of_all) - results_bytes) > 0:
-            trim = partial(result_rows.trim, excess_bytes=excess, limit=_TRIMMED_AT_ONCE)
-            if not await self._database.write(trim):
-                break
+        if await self.size_of_needed() >= results_bytes:
+            total += await self._thin(job_rows.results_by_owner, job_rows.forget, results_bytes * 9 // 10)
+        await self._thin(result_rows.sizes_by_owner, result_rows.trim, results_bytes)
         if not self.is_shared:
             await self._database.write(_give_pages_back)
         return total
+
+    async def _take_orphans(self, replica: str) -> list[JobRecord]:
+        """Take over the jobs of nobody; in small transactions, since thousands would take longer than one may."""
+        now_us = self.now_us()
+        taken: list[JobRecord] = []
+        while some := await self._database.write(
+            partial(job_rows.take_orphans, ours=replica, now_us=now_us, limit=_TAKEN_AT_ONCE)
+        ):
+            taken += some
+        return taken
+
+    async def _thin(
+        self,
+        sizes: Callable[[Connection], dict[str, int]],
+        give: Callable[[Connection, dict[str, int], int, int], tuple[int, dict[str, int]]],
+        bound: int,
+    ) -> int:
+        """Have owners give something back until all together hold no more than a bound; how many things that were."""
+        held, total = await self._database.read(sizes), 0
+        while (excess := sum(held.values()) - bound) > 0:
+            number, held = await self._database.write(partial(_given, give, held, excess))
+            if not number:
+                break
+            total += number
+        return total
+
+
+def _given(
+    give: Callable[[Connection, dict[str, int], int, int], tuple[int, dict[str, int]]],
+    held: dict[str, int],
+    excess: int,
+    connection: Connection,
+) -> tuple[int, dict[str, int]]:
+    return give(connection, held, excess, _THINNED_AT_ONCE)
 
 
 def _beat(replica: str, connection: Connection) -> bool:

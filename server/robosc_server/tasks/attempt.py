@@ -57,6 +57,7 @@ class Attempt:
             given.bundle(request.bundle),
             deployment=given.deployment(options) or Deployment.CONTROLLER,
             engine=given.engine(options, maximum_nodes),
+            verify_limit=given.verified_states(options),
             allow_livelock=allow_livelock,
             on_progress=lambda step: on_report(Report(step.stage, step.message)),
         )

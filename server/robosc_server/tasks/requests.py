@@ -6,19 +6,21 @@ are no UTF-8, and no name is ever opened. Nothing of the core's stages is import
 """
 
 import hashlib
+from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import entry_points, version
-from importlib.util import find_spec
 from typing import Any
 
 from google.protobuf.message import DecodeError
 
 from robosc._version import __version__
+from robosc.dd_modules import has_cudd
 from robosc.source import visible
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.failures import RefusedError
+from robosc_server.tasks.fields import Nested, has_few_fields, nested_of
 from robosc_server.tasks.task import Reason, Task, TaskKind
 
 NOT_A_MESSAGE = "the request is no message of this service"
@@ -29,8 +31,27 @@ _PLUGINS = ("robosc.targets", "robosc.bdd_engines")
 _FRAMING_BYTES = 64 * 1024
 """What a message may have beside its names and texts: tags and lengths of a thousand files take 20 kB."""
 
+_SUBMISSION_BYTES = 4096
+"""What a job's submission has beside its request."""
+
+_FIELDS_A_FILE = 8
+"""A file of a bundle is a field with two, and so is one of properties; a place and a property are one each."""
+
+_OTHER_FIELDS = 100
+
+QUICK_BYTES = 16 * 1024
+"""A message of no more bytes is parsed quickly, whatever they are."""
+
+_REMEMBERED_BYTES = 64 * 1024
+_ALL_REMEMBERED_BYTES = 4 * 2**20
+"""Of requests that are known again; a longer one is looked at each time."""
+
+_ENTRY_BYTES = 500
+"""What one of them takes beside its own bytes."""
+
 _DEFAULT_GRAPH_STATES = 100_000
 _DEFAULT_VERIFIED_STATES = 1_000_000
+_DEFAULT_MADE_STATES = 200_000
 _MAXIMUM_VERIFIED_STATES = 10**9
 
 
@@ -55,6 +76,41 @@ class RequestLimits:
         """Of a whole message: no longer one is parsed."""
         return self.bundle_bytes + _FRAMING_BYTES
 
+    @property
+    def submission_bytes(self) -> int:
+        """Of a whole submission of a job."""
+        return self.request_bytes + _SUBMISSION_BYTES
+
+    @property
+    def fields(self) -> int:
+        """Of a whole message, those of messages in it included."""
+        return _FIELDS_A_FILE * self.bundle_files + _OTHER_FIELDS
+
+
+def require_short(content: bytes, limit: int) -> None:
+    """Do nothing if a message has no more bytes than it may have.
+
+    Raises:
+        RefusedError: It has.
+    """
+    if len(content) > limit:
+        raise _too_large(f"the request has {len(content)} bytes, this server takes at most {limit}")
+
+
+def require_parsable(content: bytes, nested: Nested, limits: RequestLimits) -> None:
+    """Do nothing if a message that is short is parsed in a short time.
+
+    Args:
+        content: The message, serialized.
+        nested: Which of its fields are messages.
+        limits: What a request may have.
+
+    Raises:
+        RefusedError: It has too many fields.
+    """
+    if len(content) > QUICK_BYTES and not has_few_fields(content, nested, limits.fields):
+        raise _too_large(f"the request has more than {limits.fields} files, names, texts and the like")
+
 
 def accepted(kind: TaskKind, request: bytes, limits: RequestLimits) -> Task:
     """The task that a request asks for.
@@ -67,9 +123,9 @@ def accepted(kind: TaskKind, request: bytes, limits: RequestLimits) -> Task:
     Raises:
         RefusedError: It is no message, has names that cannot be, lacks something or has too much.
     """
-    if len(request) > limits.request_bytes:
-        raise _too_large(f"the request has {len(request)} bytes, this server takes at most {limits.request_bytes}")
-    parse, look_at = _KINDS[kind]
+    require_short(request, limits.request_bytes)
+    parse, look_at, nested = _KINDS[kind]
+    require_parsable(request, nested, limits)
     try:
         message = parse(request)
     except DecodeError:
@@ -82,11 +138,43 @@ def accepted(kind: TaskKind, request: bytes, limits: RequestLimits) -> Task:
     return Task(kind, request, hashlib.sha256(meaning.encode("utf-8")).hexdigest(), look.main_file)
 
 
+class RecentRequests:
+    """Accepts requests, and knows again those that came before, byte by byte: a client that asks twice is common.
+
+    Args:
+        limits: What a request may have.
+    """
+
+    def __init__(self, limits: RequestLimits) -> None:
+        self._limits = limits
+        self._tasks: OrderedDict[tuple[TaskKind, bytes], Task] = OrderedDict()
+        self._bytes = 0
+
+    def accepted(self, kind: TaskKind, request: bytes) -> Task:
+        """The task that a request asks for; see `accepted`.
+
+        Raises:
+            RefusedError: It cannot be one.
+        """
+        known = self._tasks.get((kind, request))
+        if known is not None:
+            self._tasks.move_to_end((kind, request))
+            return known
+        task = accepted(kind, request, self._limits)
+        if len(request) <= _REMEMBERED_BYTES:
+            self._tasks[kind, request] = task
+            self._bytes += len(request) + _ENTRY_BYTES
+            while self._bytes > _ALL_REMEMBERED_BYTES:
+                (_, oldest), _ = self._tasks.popitem(last=False)
+                self._bytes -= len(oldest) + _ENTRY_BYTES
+        return task
+
+
 @cache
 def _makers() -> tuple[str, ...]:
     """What makes results, by version: this distribution, the diagrams, and those whose targets and engines it uses."""
     # Without dd's extension the engine `auto` is another one.
-    diagrams = f"dd {version('dd')} {'with' if find_spec('dd.cudd') else 'without'} cudd"
+    diagrams = f"dd {version('dd')} {'with' if has_cudd() else 'without'} cudd"
     dists = [point.dist for group in _PLUGINS for point in entry_points(group=group)]
     others = {f"{dist.name} {dist.version}" for dist in dists if dist is not None and dist.name != "robosc"}
     return (__version__, diagrams, *sorted(others))
@@ -196,7 +284,10 @@ class _Look:
             raise _malformed(f"there is no deployment of number {chosen}")
         engine = self.name(message.engine, "the engine's name") or "auto"
         nodes = min(message.maximum_nodes or self._limits.nodes, self._limits.nodes)
-        return chosen, engine, message.allow_livelock, message.allow_reordering, nodes
+        states = message.verified_states if message.HasField("verified_states") else _DEFAULT_MADE_STATES
+        if states > _MAXIMUM_VERIFIED_STATES:
+            raise _malformed(f"verified_states is more than {_MAXIMUM_VERIFIED_STATES}")
+        return chosen, engine, message.allow_livelock, message.allow_reordering, nodes, states
 
 
 _DEPLOYMENTS = (pb.DEPLOYMENT_UNSPECIFIED, pb.DEPLOYMENT_CONTROLLER, pb.DEPLOYMENT_LAYER)
@@ -257,10 +348,11 @@ def _verify(message: Any, look: _Look) -> object:
     look.require_few(len(message.property_files), "files of properties")
     # A supervisor that is given may be for any deployment.
     unsaid = pb.DEPLOYMENT_UNSPECIFIED if is_given else pb.DEPLOYMENT_CONTROLLER
-    deployment, engine, _, *rest = look.options(message.options, deployment=unsaid)
+    deployment, engine, _, *rest, made_states = look.options(message.options, deployment=unsaid)
     return (
         look.bundle(message.bundle),
-        (deployment, engine, rest),
+        # Where one is given, none is made.
+        (deployment, engine, rest, None if is_given else made_states),
         look.content(message.supervisor) if is_given else None,
         [look.text(text) for text in message.properties],
         [look.file(file) for file in message.property_files],
@@ -277,13 +369,16 @@ def _format(message: Any, look: _Look) -> object:
     return found
 
 
-_KINDS: dict[TaskKind, tuple[Callable[[bytes], Any], Callable[[Any, _Look], object]]] = {
-    TaskKind.CHECK: (pb.CheckRequest.FromString, _check),
-    TaskKind.SYNTHESIZE: (pb.SynthesizeRequest.FromString, _synthesize),
-    TaskKind.GENERATE: (pb.GenerateRequest.FromString, _generate),
-    TaskKind.EXPLORE: (pb.ExploreRequest.FromString, _explore),
-    TaskKind.VERIFY: (pb.VerifyRequest.FromString, _verify),
-    TaskKind.FORMAT: (pb.FormatRequest.FromString, _format),
+_REQUESTS: dict[TaskKind, tuple[Any, Callable[[Any, _Look], object]]] = {
+    TaskKind.CHECK: (pb.CheckRequest, _check),
+    TaskKind.SYNTHESIZE: (pb.SynthesizeRequest, _synthesize),
+    TaskKind.GENERATE: (pb.GenerateRequest, _generate),
+    TaskKind.EXPLORE: (pb.ExploreRequest, _explore),
+    TaskKind.VERIFY: (pb.VerifyRequest, _verify),
+    TaskKind.FORMAT: (pb.FormatRequest, _format),
+}
+_KINDS: dict[TaskKind, tuple[Callable[[bytes], Any], Callable[[Any, _Look], object], Nested]] = {
+    kind: (message.FromString, look_at, nested_of(message)) for kind, (message, look_at) in _REQUESTS.items()
 }
 
 

@@ -7,6 +7,7 @@ wrong with a model is an answer. Everything else that can go wrong is a `Failure
 import hashlib
 import traceback
 from collections.abc import Callable, Iterable, Iterator
+from importlib import resources
 from typing import Any
 
 from robosc.automata import to_automata
@@ -76,6 +77,8 @@ def rehearse() -> None:
     file = pb.SourceFile(name="rehearsal.rscd", text=_REHEARSAL)
     request = pb.SynthesizeRequest(bundle=pb.Bundle(main=file))
     run_task(TaskKind.SYNTHESIZE, request.SerializeToString(), TaskLimits(), lambda report: None)
+    # What reads the parts of generated programs comes with the first of them that is looked for.
+    resources.files("robosc.targets").joinpath("none").is_file()
     keep_ready(resolve_engine("auto"))
 
 

@@ -3,7 +3,6 @@
 import faulthandler
 import gc
 import os
-import signal
 import socket
 import traceback
 from collections.abc import Callable
@@ -20,6 +19,7 @@ from robosc_server.workers.frames import (
     task_of,
     too_large,
 )
+from robosc_server.workers.sandbox import Sandbox, close_others
 
 type TaskFunction = Callable[[TaskKind, bytes, TaskLimits, Callable[[Report], None]], Outcome]
 
@@ -29,20 +29,27 @@ _COLLECT_EVERY = 20_000
 OUT_OF_MEMORY = "the work took more memory than a task may have"
 
 
-def work(connection: socket.socket, last_words: int, function: TaskFunction) -> None:
-    """Wait for a task, do it, send its outcome.
+def work(connection: socket.socket, last_words: int, function: TaskFunction, sandbox: Sandbox, used_bytes: int) -> None:
+    """Wait for a task, do it, send its outcome; confined before anything of a stranger's is read.
 
     Args:
         connection: To the server; where it ends before a task came, nobody needs this process.
         last_words: Descriptor to which the interpreter writes where it was when it crashed.
         function: Does the task.
+        sandbox: What it is confined by.
+        used_bytes: Of address space, that this process has.
+
+    Raises:
+        SandboxError: It cannot be confined.
     """
     faulthandler.enable(last_words)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    confinement.no_core()
-    confinement.give_up_rights()
+    confinement.go_first()
+    # What another process holds open tells nobody of its end, and gives who holds it something to reach.
+    close_others({connection.fileno(), last_words} | sandbox.descriptors)
+    sandbox.enter()
     try:
         task, limits = task_of(_receive(connection), _receive(connection))
+        confinement.confine(limits, used_bytes + len(task.request))
         _answer(connection, task.kind, task.request, limits, function)
     except (EOFError, ConnectionError):
         return
@@ -51,7 +58,6 @@ def work(connection: socket.socket, last_words: int, function: TaskFunction) -> 
 def _answer(
     connection: socket.socket, kind: TaskKind, request: bytes, limits: TaskLimits, function: TaskFunction
 ) -> None:
-    confinement.confine(limits)
     gc.enable()
     # A process that does one task and ends has little to collect, and its parts of the diagrams are not Python's.
     gc.set_threshold(_COLLECT_EVERY)

@@ -1,6 +1,5 @@
 """What a worker's process may take, held by the kernel; and that it does not outlive who started it."""
 
-import ctypes
 import math
 import os
 import resource
@@ -9,43 +8,49 @@ from contextlib import suppress
 from pathlib import Path
 
 from robosc_server.tasks.task import TaskLimits
-
-# prctl(2)
-_SET_PARENT_DEATH_SIGNAL = 1
-_SET_NO_NEW_PRIVILEGES = 38
+from robosc_server.workers import kernel
 
 _FILES_LIMIT = 64
 _LEAST_ROOM_BYTES = 64 * 2**20
 _FAREWELL_BYTES = 64 * 2**20
 _FAREWELL_S = 2
 
-_PRCTL = getattr(ctypes.CDLL(None, use_errno=True), "prctl", None)
-
 
 def die_with(parent: int) -> None:
     """Have the kernel kill this process when its parent dies; where that one is dead already, end at once."""
-    if _PRCTL is not None:
-        _PRCTL(_SET_PARENT_DEATH_SIGNAL, int(signal.SIGKILL), 0, 0, 0)
+    with suppress(OSError):
+        kernel.prctl(kernel.SET_PARENT_DEATH_SIGNAL, int(signal.SIGKILL))
     if os.getppid() != parent:
         os._exit(1)
 
 
-def give_up_rights() -> None:
-    """No program that this process starts gains rights; and it is the first to go where the machine's memory ends."""
-    if _PRCTL is not None:
-        _PRCTL(_SET_NO_NEW_PRIVILEGES, 1, 0, 0, 0)
+def go_first() -> None:
+    """Be the first to go where the machine's memory ends."""
     with suppress(OSError):
-        Path("/proc/self/oom_score_adj").write_text("900")
+        # The file is the superuser's as long as nobody may look into this process.
+        kernel.prctl(kernel.SET_DUMPABLE, 1)
+        try:
+            score = os.open("/proc/self/oom_score_adj", os.O_WRONLY | os.O_CLOEXEC)
+            try:
+                os.write(score, b"900")
+            finally:
+                os.close(score)
+        finally:
+            kernel.prctl(kernel.SET_DUMPABLE, 0)
 
 
-def confine(limits: TaskLimits) -> None:
+def confine(limits: TaskLimits, used_bytes: int) -> None:
     """Set the limits of the task that this process is about to do.
+
+    Args:
+        limits: What the task may take.
+        used_bytes: Of address space, that the process has already.
 
     The address space counts what the process has already; at least 64 MiB more are left to it, since less than that is
     too little for any task. Processor time counts from here on, in whole seconds. No byte can be
     written to a file.
     """
-    memory_bytes = max(limits.memory_bytes, _address_space_bytes() + _LEAST_ROOM_BYTES)
+    memory_bytes = max(limits.memory_bytes, used_bytes + _LEAST_ROOM_BYTES)
     _set(resource.RLIMIT_AS, memory_bytes, memory_bytes + _FAREWELL_BYTES)
     used = resource.getrusage(resource.RUSAGE_SELF)
     cpu_s = max(1, math.ceil(limits.cpu_seconds)) + round(used.ru_utime + used.ru_stime)
@@ -74,6 +79,7 @@ def _set(kind: int, soft: int, hard: int) -> None:
     resource.setrlimit(kind, (soft, hard))
 
 
-def _address_space_bytes() -> int:
+def address_space_bytes() -> int:
+    """How much address space this process has."""
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     return pages * resource.getpagesize()

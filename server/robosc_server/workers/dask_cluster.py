@@ -14,7 +14,8 @@ from typing import Any, Self
 
 from robosc import __version__
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Task, TaskLimits
-from robosc_server.workers import OnReport, WorkersError
+from robosc_server.workers import OnReport, OnSpent, WorkerLostError, WorkersError, uncounted
+from robosc_server.workers.dask_spending import Spending
 from robosc_server.workers.frames import FrameError
 from robosc_server.workers.local import TASK_FUNCTION
 
@@ -26,11 +27,18 @@ CONNECT_S = 5.0
 LOOK_S = 0.5
 """How often the cluster is asked for its workers."""
 
+_TLS = "tls://"
 _ATTEMPTS = 2
+"""How often a task may begin."""
+
+_STARTS = 3
+"""How often it is handed to the cluster: its workers may be lost before they begin it."""
+
 _GRACE_S = 30.0
 _CANCEL_S = 1.0
 _END_S = 5.0
 _END_LOOK_S = 0.01
+_SPENT_S = 10.0
 _EXAMINE_S = 3.0
 _KEPT_REPORTS = 64
 _LOST = "two workers of the cluster were lost while they did this task"
@@ -50,7 +58,7 @@ class _Watched:
         if event["is"] == "begun":
             self.begun += 1
             self.begun_at = time.monotonic()
-        else:
+        elif event["is"] == "reports":
             self._reports.extend(Report(str(stage), str(message)) for stage, message in event["reports"])
         self._news.set()
 
@@ -71,15 +79,17 @@ class DaskWorkers:
         fault: Why no task can be done now, in one sentence; empty where tasks can be done.
     """
 
-    def __init__(self, address: str, task_function: str = TASK_FUNCTION) -> None:
+    def __init__(self, address: str, task_function: str = TASK_FUNCTION, *, must_be_confined: bool = False) -> None:
         """Plan.
 
         Args:
             address: Of the scheduler, such as `tcp://HOST:PORT` or `tls://HOST:PORT`.
             task_function: What does tasks there, `package.module:name`.
+            must_be_confined: Whether no task is to be done where a part of the confinement cannot be had.
 
         Raises:
-            WorkersError: The package `distributed` is missing, or cannot be loaded here.
+            WorkersError: The package `distributed` is missing, or cannot be loaded here; or there is to be TLS, and
+                Dask's settings do not say with which certificates.
         """
         try:
             import distributed
@@ -93,11 +103,17 @@ class DaskWorkers:
             ) from error
         self._distributed = distributed
         self._address = address
+        if address.startswith(_TLS):
+            from robosc_server.workers.dask_tls import client_context
+
+            client_context()
         self._task_function = task_function
+        self._must_be_confined = must_be_confined
         self._client: Any = None
         self._threads: dict[str, int] = {}
         self._refused: dict[str, str] = {}
         self._watched: dict[str, _Watched] = {}
+        self._spending: dict[str, Spending] = {}
         self._keeper: asyncio.Task[None] | None = None
         self._has_looked = asyncio.Event()
         self._is_over = asyncio.Event()
@@ -121,29 +137,38 @@ class DaskWorkers:
             async with asyncio.timeout(_END_S):
                 while self._watched:
                     await asyncio.sleep(_END_LOOK_S)
+        for name in tuple(self._spending):
+            self._settle(name)
 
     @property
     def capacity(self) -> int:
         """Threads of all workers of the cluster that can be used; 0 while it is away."""
         return sum(self._threads.values())
 
-    async def run(self, task: Task, limits: TaskLimits, on_report: OnReport) -> Outcome:
+    async def run(self, task: Task, limits: TaskLimits, on_report: OnReport, on_spent: OnSpent = uncounted) -> Outcome:
         """The outcome of a task; see `Workers.run`.
 
         A worker of the cluster that is lost has its task done by another one, once. Reports come at most ten times a
         second, and of many at once only the last.
 
         Raises:
-            WorkersError: The cluster is away, was lost on the way, has no worker, or only such as cannot be used.
+            WorkersError: The cluster is away, was lost on the way, has no worker, only such as cannot be used, or loses
+                them before they begin.
+            WorkerLostError: What starts processes on a worker ended under it, more than once.
         """
         watched = _Watched()
-        for _ in range(_ATTEMPTS):
-            outcome = await self._run_once(task, limits, on_report, watched)
+        for _ in range(_STARTS):
+            outcome = await self._run_once(task, limits, on_report, on_spent, watched)
             if outcome is not None:
                 return outcome
-        return Failure(Reason.WORKER_DIED, _LOST)
+            if watched.begun >= _ATTEMPTS:
+                return Failure(Reason.WORKER_DIED, _LOST)
+        # It has done nothing that workers could have been lost for.
+        raise WorkersError(f"the Dask cluster at {self._address} loses its workers before they begin a task")
 
-    async def _run_once(self, task: Task, limits: TaskLimits, on_report: OnReport, watched: _Watched) -> Outcome | None:
+    async def _run_once(
+        self, task: Task, limits: TaskLimits, on_report: OnReport, on_spent: OnSpent, watched: _Watched
+    ) -> Outcome | None:
         """The outcome of a task; None: workers were lost, and it has to be begun anew."""
         from robosc_server.workers.dask_task import run_on_cluster
 
@@ -152,11 +177,13 @@ class DaskWorkers:
             raise WorkersError(self.fault or f"the Dask cluster at {self._address} has no worker")
         name = f"robosc-{task.kind}-{uuid.uuid4().hex}"
         self._watched[name] = watched
+        self._spending[name] = Spending(on_spent, time.monotonic)
         named = sorted(self._threads) if self._refused else None
         future = client.submit(
             run_on_cluster,
             __version__,
             self._task_function,
+            self._must_be_confined,
             _topic(client),
             str(task.kind),
             task.request,
@@ -177,6 +204,9 @@ class DaskWorkers:
             return next(work for work in works if work in done).result()
         finally:
             del self._watched[name]
+            self._spending[name].stop()
+            # What the last process took is told when it is gone, a moment after this.
+            asyncio.get_running_loop().call_later(_SPENT_S, self._settle, name)
             for work in works:
                 work.cancel()
             with contextlib.suppress(Exception):
@@ -189,7 +219,7 @@ class DaskWorkers:
 
     async def _answer(self, future: Any, limits: TaskLimits) -> Outcome | None:
         """What the cluster answers; None: it gave up."""
-        from robosc_server.workers.dask_task import ANSWER, NO_WORKER, outcome_of
+        from robosc_server.workers.dask_task import ANSWER, LOST, NO_WORKER, outcome_of
 
         try:
             content = await future.result()
@@ -205,8 +235,9 @@ class DaskWorkers:
                 return outcome_of(content[1:], limits)
             except FrameError as error:
                 return Failure(Reason.WORKER_DIED, "the worker process sent what is no answer", str(error))
-        if isinstance(content, bytes) and content[:1] == NO_WORKER:
-            raise WorkersError(content[1:1000].decode("utf-8", "replace"))
+        if isinstance(content, bytes) and content[:1] in (NO_WORKER, LOST):
+            kind = WorkerLostError if content[:1] == LOST else WorkersError
+            raise kind(content[1:1000].decode("utf-8", "replace"))
         raise WorkersError(f"the Dask cluster at {self._address} answered what is no answer of RoboSC")
 
     async def _guard(
@@ -252,7 +283,8 @@ class DaskWorkers:
                 client = await self._connect()
                 await self._look_after(client)
             except Exception as error:  # Of the network, of Dask, of another version of it: told, and tried again.
-                self._note_fault(f"the Dask scheduler at {self._address} cannot be reached: {_sentence(error)}")
+                why = await self._tls_fault() or _sentence(error)
+                self._note_fault(f"the Dask scheduler at {self._address} cannot be reached: {why}")
             finally:
                 self._client, self._threads, self._refused = None, {}, {}
                 self._has_looked.set()
@@ -263,10 +295,19 @@ class DaskWorkers:
             await asyncio.sleep(LOOK_S)
 
     async def _connect(self) -> Any:
-        # Certificates for tls:// are Dask's own settings.
+        # Certificates for tls:// are Dask's own settings; the files are read anew.
         return await self._distributed.Client(  # type: ignore[no-untyped-call]
             self._address, asynchronous=True, timeout=CONNECT_S, set_as_default=False, name="robosc-server"
         )
+
+    async def _tls_fault(self) -> str | None:
+        """What is wrong with certificates, theirs or ours, where Dask does not tell that."""
+        if not self._address.startswith(_TLS):
+            return None
+        from robosc_server.workers.dask_tls import tls_fault
+
+        host, _, port = self._address.removeprefix(_TLS).rpartition(":")
+        return await tls_fault(host.strip("[]"), int(port), CONNECT_S)
 
     async def _look_after(self, client: Any) -> None:
         """Know the cluster's workers, until it is lost."""
@@ -301,7 +342,9 @@ class DaskWorkers:
 
         try:
             async with asyncio.timeout(_EXAMINE_S):
-                version = await client.run(ready_version, self._task_function, workers=[address])
+                version = await client.run(
+                    ready_version, self._task_function, self._must_be_confined, workers=[address]
+                )
         except (TimeoutError, OSError):
             return address, None
         except Exception as error:  # Whatever was raised there: it has no RoboSC, or another Python.
@@ -310,7 +353,16 @@ class DaskWorkers:
             address, str(version.get(address)), __version__
         )
 
+    def _settle(self, name: str) -> None:
+        """Account for what is known of a task that has ended, and wait for no more."""
+        spending = self._spending.pop(name, None)
+        if spending is not None:
+            spending.settle()
+
     async def _hear(self, event: tuple[float, Any]) -> None:
+        spending = self._spending.get(event[1]["task"])
+        if spending is not None:
+            spending.hear(event[1])
         watched = self._watched.get(event[1]["task"])
         if watched is not None:
             watched.tell(event[1])

@@ -5,38 +5,40 @@ server with the care of `frames`.
 """
 
 import threading
+import traceback
 from collections import deque
-from collections.abc import Callable
 from typing import Any
 
 from distributed import get_worker
 
 from robosc import __version__
-from robosc_server.tasks.task import Failure, Outcome, Report, Result, Task, TaskKind, TaskLimits
-from robosc_server.workers import WorkersError
+from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, Task, TaskKind, TaskLimits
+from robosc_server.workers import WorkerLostError, WorkersError
 from robosc_server.workers.frames import HEADER, AnswerReader, FrameError, Tag, failure_frame, frame
 from robosc_server.workers.isolated import StoppedError, prepare, run_isolated
 
 ANSWER = b"A"
 NO_WORKER = b"W"
+LOST = b"L"
 
 BEGUN = "begun"
 REPORTS = "reports"
+SPENT = "spent"
 
 _TELL_EVERY_ASKS = 5  # A tenth of a second.
 _KEPT_REPORTS = 16
 _UNDER_WAY = ("executing", "long-running")
 
 
-def ready_version(task_function: str) -> str:
+def ready_version(task_function: str, must_be_confined: bool) -> str:
     """This worker's version of RoboSC; has processes stand ready for what comes."""
-    threading.Thread(target=_prepare_quietly, args=(task_function,), daemon=True).start()
+    threading.Thread(target=_prepare_quietly, args=(task_function, must_be_confined), daemon=True).start()
     return __version__
 
 
-def _prepare_quietly(task_function: str) -> None:
+def _prepare_quietly(task_function: str, must_be_confined: bool) -> None:
     try:
-        prepare(task_function)
+        prepare(task_function, must_be_confined=must_be_confined)
     except WorkersError:
         return  # The task that comes is told.
 
@@ -44,6 +46,7 @@ def _prepare_quietly(task_function: str) -> None:
 def run_on_cluster(
     version: str,
     task_function: str,
+    must_be_confined: bool,
     topic: str,
     kind: str,
     request: bytes,
@@ -55,6 +58,7 @@ def run_on_cluster(
     Args:
         version: Of the server.
         task_function: What does tasks, `package.module:name`.
+        must_be_confined: Whether there are to be no workers where a part of their confinement cannot be had.
         topic: Where reports are told.
         kind: The task's kind.
         request: Its request.
@@ -78,18 +82,29 @@ def run_on_cluster(
         state = worker.state.tasks.get(name)
         return state is None or state.state not in _UNDER_WAY
 
+    def tell_spent(cpu_s: float) -> None:
+        worker.log_event(topic, {"is": SPENT, "task": name, "worker": worker.address, "cpu_s": cpu_s})
+
     worker.log_event(topic, {"is": BEGUN, "task": name, "worker": worker.address})
     task = Task(TaskKind(kind), request, *identity)
     try:
-        return ANSWER + answer(run_isolated(task, TaskLimits(*limits), _keeper(kept), is_unwanted, task_function))
+        outcome = run_isolated(
+            task,
+            TaskLimits(*limits),
+            kept.append,
+            is_unwanted,
+            task_function,
+            tell_spent,
+            must_be_confined=must_be_confined,
+        )
+        return ANSWER + answer(outcome)
     except WorkersError as error:
-        return NO_WORKER + f"the Dask worker at {worker.address}: {error}".encode()
+        mark = LOST if isinstance(error, WorkerLostError) else NO_WORKER
+        return mark + f"the Dask worker at {worker.address}: {error}".encode()
     except StoppedError:
         return NO_WORKER + b"stopped"
-
-
-def _keeper(kept: deque[Report]) -> Callable[[Report], None]:
-    return kept.append
+    except Exception:  # The task's border: whatever it was, the server logs it, and does not try the same for ever.
+        return ANSWER + answer(Failure(Reason.INTERNAL_FAULT, "the server is at fault", traceback.format_exc()))
 
 
 def mismatch(address: str, theirs: str, ours: str) -> str:

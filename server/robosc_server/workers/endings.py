@@ -1,6 +1,10 @@
 """Why a worker's process ended without an answer, told honestly from what the kernel says of it."""
 
+import math
+import re
 import signal
+import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +15,7 @@ from robosc_server.workers.child import OUT_OF_MEMORY
 OUT_OF_PROCESSOR = "the work took more of a processor's time than a task may have"
 OUT_OF_TIME = "the work took longer than a task may take"
 
+_REMEMBERED_S = 1.0
 _NEAR_THE_LIMIT = 0.9
 _NEVER_RESIDENT_BYTES = 96 * 2**20  # Of the address space: mostly parts of libraries that nobody calls.
 
@@ -30,6 +35,21 @@ class Ending:
     peak_bytes: int
 
 
+FACTS = re.compile(
+    r"(ended with status \d{1,3} and no answer|was ended by (SIG[A-Z0-9]{2,8}|signal \d{1,3})) "
+    r"after \d{1,9}\.\d\d s of a processor's time, with at most \d{1,15} bytes resident"
+)
+"""What `facts_of` says: nobody can say anything of a model in this form."""
+
+
+def facts_of(ending: Ending) -> str:
+    """How a process ended, in one line."""
+    return (
+        f"{_told(ending.exit_code)} after {ending.cpu_s:.2f} s of a processor's time, "
+        f"with at most {ending.peak_bytes} bytes resident"
+    )
+
+
 def failure_of(ending: Ending, limits: TaskLimits, last_words: str, was_memory_short: bool) -> Failure:
     """What is told of a task whose worker ended without an answer, and was not killed by the server.
 
@@ -39,11 +59,7 @@ def failure_of(ending: Ending, limits: TaskLimits, last_words: str, was_memory_s
         last_words: What the interpreter wrote when it crashed.
         was_memory_short: Whether the kernel killed some process for want of memory meanwhile.
     """
-    facts = (
-        f"{_told(ending.exit_code)} after {ending.cpu_s:.2f} s of a processor's time, "
-        f"with at most {ending.peak_bytes} bytes resident"
-    )
-    details = f"{facts}\n{last_words}".rstrip()
+    details = f"{facts_of(ending)}\n{last_words}".rstrip()
     out_of_processor = ending.cpu_s >= limits.cpu_seconds
     if ending.exit_code == -signal.SIGXCPU or (ending.exit_code == -signal.SIGKILL and out_of_processor):
         return Failure(Reason.CPU_LIMIT, OUT_OF_PROCESSOR, details)
@@ -62,6 +78,31 @@ def kills_for_memory() -> int:
             if line.startswith("oom_kill "):
                 return int(line.split()[1])
     return 0
+
+
+class KillsBefore:
+    """How often processes were killed for want of memory before now; asked of the kernel at most once a second.
+
+    Asking takes a tenth of a millisecond, and the answer is of use only where a worker is killed: one that was killed
+    within a second after another process ran out of memory is taken for one that did so itself.
+
+    Args:
+        count: Asks the kernel.
+        clock: Seconds that never go back.
+    """
+
+    def __init__(
+        self, count: Callable[[], int] = kills_for_memory, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._count, self._clock = count, clock
+        self._known = 0
+        self._until_s = -math.inf
+
+    def __call__(self) -> int:
+        """The number."""
+        if self._clock() >= self._until_s:
+            self._known, self._until_s = self._count(), self._clock() + _REMEMBERED_S
+        return self._known
 
 
 def _told(exit_code: int) -> str:

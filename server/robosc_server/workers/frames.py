@@ -10,6 +10,8 @@ and must not run code in the server by it. A payload is read only after its leng
 
 import json
 import struct
+import time
+from collections.abc import Callable
 from enum import Enum
 from typing import Any
 
@@ -21,7 +23,13 @@ HEADER = struct.Struct(">cQ")
 MESSAGES_LIMIT = 100_000
 """Messages of one result; many small ones would take far more memory than their bytes."""
 
-_SMALL_LIMIT = 2**20
+REPORTS_BURST = 1000
+REPORTS_PER_SECOND = 50
+"""Reports of one task: as many at once, and then so many in a second. Tasks tell ten in a second (see `pace`), and one
+for each of their few stages; each costs the server time."""
+
+_REPORT_BYTES = 2**17
+_FAILURE_BYTES = 2**20
 _TEXT_LIMIT = 4_000
 _DETAILS_LIMIT = 60_000
 
@@ -107,10 +115,18 @@ def too_large(limits: TaskLimits) -> Failure:
 
 
 class AnswerReader:
-    """Puts the frames of one answer together, in two steps for each: may it be read, and what does it say."""
+    """Puts the frames of one answer together, in two steps for each: may it be read, and what does it say.
 
-    def __init__(self, limits: TaskLimits) -> None:
+    Args:
+        limits: Of the task.
+        clock: Seconds that never go back.
+    """
+
+    def __init__(self, limits: TaskLimits, clock: Callable[[], float] = time.monotonic) -> None:
         self._limits = limits
+        self._clock = clock
+        self._begun_s = clock()
+        self._reports = 0
         self._messages: list[bytes] = []
         self._bytes = 0
 
@@ -130,9 +146,15 @@ class AnswerReader:
                 self._bytes += length
                 if self._bytes > self._limits.result_bytes or len(self._messages) >= MESSAGES_LIMIT:
                     return too_large(self._limits)
-            case Tag.REPORT | Tag.FAILURE:
-                if length > _SMALL_LIMIT:
-                    raise FrameError(f"a {tag.name.lower()} of {length} bytes")
+            case Tag.REPORT:
+                self._reports += 1
+                if self._reports > REPORTS_BURST + REPORTS_PER_SECOND * (self._clock() - self._begun_s):
+                    raise FrameError(f"{self._reports} reports, which is more than a task has to tell")
+                if length > _REPORT_BYTES:
+                    raise FrameError(f"a report of {length} bytes")
+            case Tag.FAILURE:
+                if length > _FAILURE_BYTES:
+                    raise FrameError(f"a failure of {length} bytes")
             case Tag.RESULT:
                 if length:
                     raise FrameError(f"an end of the result with {length} bytes")

@@ -7,6 +7,7 @@ from concurrent.futures import Future
 from typing import Any
 
 from robosc_server.tasks.task import Outcome, Report, Task, TaskLimits
+from robosc_server.workers import OnSpent, uncounted
 from robosc_server.workers.local import TASK_FUNCTION, LocalWorkers
 
 _ASK_S = 0.02
@@ -20,11 +21,11 @@ class StoppedError(Exception):
 class _Background:
     """Workers in an event loop of their own, as long as this process lives."""
 
-    def __init__(self, task_function: str) -> None:
+    def __init__(self, task_function: str, *, must_be_confined: bool) -> None:
         self._loop = asyncio.new_event_loop()
         # No thread is waited for at the end of the process; workers end with it.
         threading.Thread(target=self._loop.run_forever, name="robosc workers", daemon=True).start()
-        self.workers = LocalWorkers(1, task_function, _SPARE)
+        self.workers = LocalWorkers(1, task_function, _SPARE, must_be_confined=must_be_confined)
         self._lock = threading.Lock()
         self._is_started = False
 
@@ -41,23 +42,28 @@ class _Background:
 
 
 _LOCK = threading.Lock()
-_BACKGROUNDS: dict[str, _Background] = {}
+_BACKGROUNDS: dict[tuple[str, bool], _Background] = {}
 
 
-def prepare(task_function: str = TASK_FUNCTION) -> None:
+def prepare(task_function: str = TASK_FUNCTION, *, must_be_confined: bool = False) -> None:
     """Have processes stand ready for tasks; they stay as long as this process.
+
+    Args:
+        task_function: What does tasks, `package.module:name`.
+        must_be_confined: Whether there are to be none where a part of their confinement cannot be had.
 
     Raises:
         WorkersError: None can be had.
     """
-    _background(task_function).prepare()
+    _background(task_function, must_be_confined).prepare()
 
 
-def _background(task_function: str) -> _Background:
+def _background(task_function: str, must_be_confined: bool) -> _Background:
+    kind = (task_function, must_be_confined)
     with _LOCK:
-        if task_function not in _BACKGROUNDS:
-            _BACKGROUNDS[task_function] = _Background(task_function)
-        return _BACKGROUNDS[task_function]
+        if kind not in _BACKGROUNDS:
+            _BACKGROUNDS[kind] = _Background(task_function, must_be_confined=must_be_confined)
+        return _BACKGROUNDS[kind]
 
 
 def run_isolated(
@@ -66,6 +72,9 @@ def run_isolated(
     on_report: Callable[[Report], None],
     should_stop: Callable[[], bool],
     task_function: str = TASK_FUNCTION,
+    on_spent: OnSpent = uncounted,
+    *,
+    must_be_confined: bool = False,
 ) -> Outcome:
     """The outcome of a task, done in a process of its own within limits.
 
@@ -75,18 +84,21 @@ def run_isolated(
         on_report: Told each report, in another thread; must not wait.
         should_stop: Asked every 20 ms, in this thread; once true, the process is killed.
         task_function: What does tasks, `package.module:name`.
+        on_spent: Told the processor's time of each process that was at it, in another thread, maybe after the outcome;
+            see `Workers.run`.
+        must_be_confined: Whether it is not to be done where a part of the confinement cannot be had.
 
     Raises:
         StoppedError: `should_stop` said so.
         WorkersError: No process can be had.
     """
-    background = _background(task_function)
+    background = _background(task_function, must_be_confined)
     background.prepare()
 
     async def tell(report: Report) -> None:
         on_report(report)
 
-    work = background.start(background.workers.run(task, limits, tell))
+    work = background.start(background.workers.run(task, limits, tell, on_spent))
     ended = threading.Event()
     work.add_done_callback(lambda _: ended.set())
     while not ended.wait(_ASK_S):

@@ -2,12 +2,13 @@
 
 import asyncio
 import contextlib
+import time
 from typing import Self
 
 from robosc_server.tasks.task import Failure, Outcome, Reason, Task, TaskLimits
-from robosc_server.workers import OnReport, WorkersError
+from robosc_server.workers import OnReport, OnSpent, WorkerLostError, uncounted
 from robosc_server.workers.endings import OUT_OF_TIME
-from robosc_server.workers.process import TemplateLostError
+from robosc_server.workers.process import TemplateLostError, WorkerProcess
 from robosc_server.workers.supply import Supply
 
 TASK_FUNCTION = "robosc_server.tasks.run:run_task"
@@ -20,16 +21,24 @@ _GONE_S = 5.0
 class LocalWorkers:
     """At most so many processes at once; an asynchronous context that starts and ends them."""
 
-    def __init__(self, size: int, task_function: str = TASK_FUNCTION, spare: int | None = None) -> None:
+    def __init__(
+        self,
+        size: int,
+        task_function: str = TASK_FUNCTION,
+        spare: int | None = None,
+        *,
+        must_be_confined: bool = False,
+    ) -> None:
         """Plan.
 
         Args:
             size: Tasks under way at once.
             task_function: What does them, `package.module:name`; imported by the processes alone.
             spare: Processes that stand ready beside those at work; None: as many as `size`.
+            must_be_confined: Whether there are to be none where a part of their confinement cannot be had.
         """
         self._size = size
-        self._supply = Supply(task_function, size if spare is None else spare)
+        self._supply = Supply(task_function, size if spare is None else spare, must_be_confined=must_be_confined)
 
     async def __aenter__(self) -> Self:
         await self._supply.__aenter__()
@@ -40,8 +49,8 @@ class LocalWorkers:
 
     @property
     def capacity(self) -> int:
-        """How many tasks can be under way."""
-        return self._size
+        """How many tasks can be under way; 0 while no process can be had."""
+        return 0 if self._supply.is_hopeless else self._size
 
     @property
     def pids(self) -> frozenset[int]:
@@ -54,23 +63,30 @@ class LocalWorkers:
         return self._supply.fault
 
     @property
+    def missing(self) -> tuple[str, ...]:
+        """Parts of the workers' confinement that this machine does not have, one sentence for each."""
+        return self._supply.missing or ()
+
+    @property
     def restarts(self) -> int:
         """How often the process that starts workers ended and was started again."""
         return self._supply.restarts
 
-    async def run(self, task: Task, limits: TaskLimits, on_report: OnReport) -> Outcome:
+    async def run(self, task: Task, limits: TaskLimits, on_report: OnReport, on_spent: OnSpent = uncounted) -> Outcome:
         """The outcome of a task; see `Workers.run`.
 
         Raises:
             WorkersError: No process can be had.
+            WorkerLostError: The template ended under it, each time.
         """
         for _ in range(_ATTEMPTS):
             with contextlib.suppress(TemplateLostError):
-                return await self._run_once(task, limits, on_report)
-        raise WorkersError("the process that starts workers ended twice under one task")
+                return await self._run_once(task, limits, on_report, on_spent)
+        raise WorkerLostError("the process that starts workers ended twice under one task")
 
-    async def _run_once(self, task: Task, limits: TaskLimits, on_report: OnReport) -> Outcome:
+    async def _run_once(self, task: Task, limits: TaskLimits, on_report: OnReport, on_spent: OnSpent) -> Outcome:
         worker = await self._supply.take()
+        begun_s = time.monotonic()
         limit = asyncio.timeout(limits.seconds)
         is_answered = False
         try:
@@ -84,5 +100,13 @@ class LocalWorkers:
             return Failure(Reason.TIME_LIMIT, OUT_OF_TIME)
         finally:
             burial = self._supply.bury(worker)
+            burial.add_done_callback(lambda _: on_spent(_cpu_s(worker, time.monotonic() - begun_s)))
             if not is_answered:  # Whoever gives a task up can count on its end.
                 await asyncio.wait([burial], timeout=_GONE_S)
+
+
+def _cpu_s(worker: WorkerProcess, clock_s: float) -> float:
+    """Seconds of a processor's time that a process took that is gone; by the clock, if the kernel's word was lost."""
+    known = worker.ending.done() and not worker.ending.cancelled()
+    ending = worker.ending.result() if known else None
+    return clock_s if ending is None else ending.cpu_s

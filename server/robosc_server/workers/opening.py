@@ -8,20 +8,24 @@ from robosc_server.workers.local import TASK_FUNCTION, LocalWorkers
 _CLUSTER = re.compile(r"dask(\+tls)?://(?P<address>(\[[0-9a-fA-F:.]+\]|[^\s/\[\]:@]+):\d{1,5})/?")
 
 
-def open_workers(spec: str, processes: int, task_function: str = TASK_FUNCTION) -> LocalWorkers | DaskWorkers:
+def open_workers(
+    spec: str, processes: int, task_function: str = TASK_FUNCTION, *, must_be_confined: bool = False
+) -> LocalWorkers | DaskWorkers:
     """Workers that are not started yet: enter them.
 
     Args:
         spec: `local`, `dask://HOST:PORT` or `dask+tls://HOST:PORT`.
         processes: Tasks that this machine does at once; a cluster has its own number.
         task_function: What does tasks, `package.module:name`.
+        must_be_confined: Whether there are to be none where a part of their confinement cannot be had.
 
     Raises:
         ValueError: The specification is none of these.
         WorkersError: A package that they need is missing.
     """
     if spec == "local":
-        return LocalWorkers(processes, task_function)
+        return LocalWorkers(processes, task_function, must_be_confined=must_be_confined)
     if found := _CLUSTER.fullmatch(spec):
-        return DaskWorkers(f"{'tls' if found[1] else 'tcp'}://{found['address']}", task_function)
+        address = f"{'tls' if found[1] else 'tcp'}://{found['address']}"
+        return DaskWorkers(address, task_function, must_be_confined=must_be_confined)
     raise ValueError(f"workers are 'local', 'dask://HOST:PORT' or 'dask+tls://HOST:PORT', and not {spec!r}")

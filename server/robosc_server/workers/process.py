@@ -9,12 +9,14 @@ import socket
 
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Task, TaskLimits
 from robosc_server.workers import OnReport
-from robosc_server.workers.endings import Ending, failure_of, kills_for_memory
+from robosc_server.workers.endings import Ending, KillsBefore, failure_of, kills_for_memory
 from robosc_server.workers.frames import HEADER, AnswerReader, FrameError, task_frames
 
 _BUFFER_BYTES = 2**16
 _ENDING_S = 5.0
 _LAST_WORDS_BYTES = 2**14
+
+_kills_before = KillsBefore()
 
 
 class TemplateLostError(Exception):
@@ -26,11 +28,13 @@ class WorkerProcess:
 
     Attributes:
         pid: Its number.
+        task: What it is at, or was.
         ending: How it ended, as soon as that is known; None: the template that could have told it is gone.
     """
 
     def __init__(self, pid: int, connection: socket.socket, descriptor: int, last_words: int) -> None:
         self.pid = pid
+        self.task: Task | None = None
         self.ending: asyncio.Future[Ending | None] = asyncio.get_running_loop().create_future()
         self._connection = connection
         self._descriptor = descriptor
@@ -74,7 +78,8 @@ class WorkerProcess:
         Raises:
             TemplateLostError: It ended with its template, which is not the task's fault.
         """
-        kills = kills_for_memory()
+        kills = _kills_before()
+        self.task = task
         try:
             self._connection.setblocking(False)
             reader, self._writer = await asyncio.open_connection(sock=self._connection, limit=_BUFFER_BYTES)

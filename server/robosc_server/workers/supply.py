@@ -12,10 +12,11 @@ from collections import deque
 from collections.abc import Coroutine
 from typing import Any, Self
 
+from robosc_server.tasks.task import Task
 from robosc_server.workers import WorkersError
 from robosc_server.workers.endings import Ending
 from robosc_server.workers.process import WorkerProcess
-from robosc_server.workers.template import PACKET_BYTES
+from robosc_server.workers.template import MUST_BE_CONFINED, PACKET_BYTES
 
 _LOG = logging.getLogger(__name__)
 
@@ -26,7 +27,10 @@ _PAUSES_S = (0.0, 0.0, 0.2, 1.0, 5.0)
 _HOPELESS = 3
 _DESCRIPTORS = 3
 _DEAD_SPARE_PAUSE_S = 0.2
-_SECRETS = "ROBOSC_SERVER_"
+_KEY_DIGITS = 16
+_HANDED_ON = frozenset({"PATH", "HOME", "LANG", "LANGUAGE", "TZ", "TMPDIR", "LD_LIBRARY_PATH"})
+_HANDED_ON_PREFIXES = ("LC_", "PYTHON")
+"""Variables of the environment that workers have, too."""
 
 
 class Supply:
@@ -35,10 +39,17 @@ class Supply:
     Attributes:
         restarts: How many templates ended without being told to.
         fault: Why no process can be had now, in one sentence; empty where there are.
+        missing: Parts of the workers' confinement that this machine does not have, one sentence for each; None: that is
+            not known yet.
     """
 
-    def __init__(self, task_function: str, spare: int) -> None:
-        """Plan for workers that do tasks with a function (`package.module:name`), `spare` of them ready."""
+    def __init__(self, task_function: str, spare: int, *, must_be_confined: bool) -> None:
+        """Plan for workers that do tasks with a function (`package.module:name`), `spare` of them ready.
+
+        Those that must be confined are not to be had where a part of the confinement is missing.
+        """
+        self.missing: tuple[str, ...] | None = None
+        self._confinement = MUST_BE_CONFINED if must_be_confined else "best-effort"
         self.restarts = 0
         self._task_function = task_function
         self._spare = spare
@@ -47,6 +58,7 @@ class Supply:
         self._line: socket.socket | None = None
         self.fault = ""
         self._failures = 0  # Templates that ended, one after the other, without a worker.
+        self._lost: list[Task] = []  # Tasks that were under way when the last template ended.
         self._is_closed = False
         self._changed = asyncio.Event()
         self._keeper: asyncio.Task[None] | None = None
@@ -78,7 +90,14 @@ class Supply:
             await asyncio.gather(self._keeper, return_exceptions=True)
         self._changed.set()
         while self._burials:
-            await asyncio.gather(*self._burials, return_exceptions=True)
+            # Not `gather`: it returns at once where all of them are done, so that those that were done this moment
+            # never get to leave the set, and the loop to nothing else.
+            await asyncio.wait(self._burials)
+
+    @property
+    def is_hopeless(self) -> bool:
+        """Whether one template after the other ended without a worker; it is tried again now and then."""
+        return self._failures >= _HOPELESS
 
     async def take(self) -> WorkerProcess:
         """A worker for one task; `bury` it afterwards.
@@ -90,7 +109,7 @@ class Supply:
         while (worker := self._living()) is None:
             if self._is_closed:
                 raise WorkersError("the server's workers have ended")
-            if self._failures >= _HOPELESS:
+            if self.is_hopeless:
                 raise WorkersError(self.fault)
             try:
                 async with asyncio.timeout(end - time.monotonic()):
@@ -154,7 +173,7 @@ class Supply:
             self.restarts += 1
             self._failures += 1
             self.fault = self.fault or f"the process that starts workers ended with status {status}"
-            _LOG.error("%s; it is started again", self.fault)
+            _LOG.error("%s; it is started again%s", self.fault, _suspects(self._lost))
             self._changed.set()
             await asyncio.sleep(_PAUSES_S[min(self._failures, len(_PAUSES_S) - 1)])
 
@@ -168,7 +187,7 @@ class Supply:
             with theirs:
                 process = await asyncio.create_subprocess_exec(
                     *(sys.executable, "-P", "-m", "robosc_server.workers.template"),
-                    *(str(theirs.fileno()), self._task_function, str(os.getpid())),
+                    *(str(theirs.fileno()), self._task_function, str(os.getpid()), self._confinement),
                     stdin=asyncio.subprocess.DEVNULL,
                     stdout=asyncio.subprocess.DEVNULL,
                     pass_fds=[theirs.fileno()],
@@ -194,6 +213,7 @@ class Supply:
             for worker in self._ready:
                 self.bury(worker)
             self._ready.clear()
+            self._lost = [worker.task for worker in self._known.values() if worker.task is not None]
             for worker in self._known.values():
                 worker.kill()
                 worker.ending.set_result(None)
@@ -234,6 +254,8 @@ class Supply:
                 self._known[worker.pid] = worker
                 self._ready.append(worker)
                 self.fault, self._failures = "", 0
+            case "confined":
+                self._note_confinement(tuple(told["missing"]))
             case "ended":
                 self._note_end(told["pid"], Ending(told["exit_code"], told["cpu_s"], told["peak_bytes"]))
             case "fault":
@@ -242,6 +264,15 @@ class Supply:
                     _LOG.error("%s", self.fault)
         self._changed.set()
         return True
+
+    def _note_confinement(self, missing: tuple[str, ...]) -> None:
+        if missing == self.missing:
+            return
+        self.missing = missing
+        for part in missing:
+            _LOG.warning("workers are not confined as they should be: %s", part)
+        if not missing:
+            _LOG.info("workers are confined")
 
     def _note_end(self, pid: int, ending: Ending) -> None:
         worker = self._known.pop(pid, None)
@@ -253,11 +284,23 @@ class Supply:
             self._replace(worker)
 
 
-def _environment() -> dict[str, str]:
-    """The server's environment, without its settings, some of which are secret; the same modules are found.
+def _suspects(tasks: list[Task]) -> str:
+    """The tasks that may have to do with the end of a template: by their keys, since names are of the model."""
+    if not tasks:
+        return ""
+    return "; tasks under way: " + ", ".join(f"{task.kind} {task.key[:_KEY_DIGITS]}" for task in tasks)
 
-    A copy: the environment itself may be changed by another thread in the middle of the start.
+
+def _environment() -> dict[str, str]:
+    """What programs of Python need of the server's environment; the same modules are found.
+
+    Nothing else: a database's password, keys of a cloud or the server's own settings are no task's business.
     """
-    environment = {name: value for name, value in os.environ.copy().items() if not name.startswith(_SECRETS)}
+    # A copy: the environment itself may be changed by another thread in the middle of the start.
+    environment = {
+        name: value
+        for name, value in os.environ.copy().items()
+        if name in _HANDED_ON or name.startswith(_HANDED_ON_PREFIXES)
+    }
     environment["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
     return environment

@@ -1,8 +1,9 @@
 """The process that workers are forked from: it imports everything once, and holds no thread and no task.
 
-Started as a program with the descriptor of its line to the server and the name of the function that does tasks. On the
-line (packets) it is told how many workers are wanted, and tells: a worker that stands ready, with its connection, its
-process descriptor and the pipe of its last words; a worker that has ended, and how; that no process can be had.
+Started as a program with the descriptor of its line to the server, the name of the function that does tasks, the
+server's number, and whether workers must be confined whole. On the line (packets) it is told how many workers are
+wanted, and tells: what cannot be kept from workers here; a worker that stands ready, with its connection, its process
+descriptor and the pipe of its last words; a worker that has ended, and how; that no process can be had.
 """
 
 import contextlib
@@ -17,12 +18,17 @@ import socket
 import sys
 import traceback
 from pathlib import Path
+from typing import NoReturn
 
-from robosc_server.workers import child, confinement
+from robosc_server.workers import child, confinement, kernel
 from robosc_server.workers.child import TaskFunction
+from robosc_server.workers.sandbox import Sandbox
 
 PACKET_BYTES = 4096
 """Of one packet on the line."""
+
+MUST_BE_CONFINED = "required"
+"""Given to it where workers are not to be without a part of their confinement."""
 
 _PRELOADED_PACKAGE = "robosc"
 # No task needs them, and what draws pictures starts threads.
@@ -33,9 +39,12 @@ _FORK_PAUSE_MS = 200
 class _Template:
     """Forks workers when it is told to, and reaps them."""
 
-    def __init__(self, line: socket.socket, function: TaskFunction) -> None:
+    def __init__(self, line: socket.socket, function: TaskFunction, sandbox: Sandbox) -> None:
         self._line = line
         self._function = function
+        self._sandbox = sandbox
+        # A fork's is the same, and need not be read in each of them.
+        self._used_bytes = confinement.address_space_bytes()
         self._poll = select.poll()
         self._poll.register(line, select.POLLIN)
         self._pids: dict[int, int] = {}  # by process descriptor
@@ -69,7 +78,7 @@ class _Template:
             template = os.getpid()
             pid = os.fork()
             if pid == 0:
-                self._become_worker(template, ours, theirs, words, last_words)
+                self._become_worker(template, theirs, last_words)
             try:
                 descriptor = os.pidfd_open(pid)
             except OSError:
@@ -80,19 +89,11 @@ class _Template:
             self._poll.register(descriptor, select.POLLIN)
             self._tell({"is": "worker", "pid": pid}, [ours.fileno(), descriptor, words])
 
-    def _become_worker(
-        self, template: int, ours: socket.socket, theirs: socket.socket, words: int, last_words: int
-    ) -> None:
+    def _become_worker(self, template: int, connection: socket.socket, last_words: int) -> None:
         """Do one task in the child, and end whatever happens."""
         try:
             confinement.die_with(template)
-            # What another process holds open tells nobody of its end.
-            self._line.close()
-            ours.close()
-            os.close(words)
-            for descriptor in self._pids:
-                os.close(descriptor)
-            child.work(theirs, last_words, self._function)
+            child.work(connection, last_words, self._function, self._sandbox, self._used_bytes)
         except BaseException:
             with contextlib.suppress(BaseException):
                 os.write(last_words, traceback.format_exc().encode())
@@ -143,6 +144,10 @@ def main() -> None:
     line = socket.socket(fileno=int(sys.argv[1]))
     line.set_inheritable(False)
     confinement.die_with(int(sys.argv[3]))
+    # What it forks has these from it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    confinement.no_core()
+    kernel.keep_memory_private()
     sys.dont_write_bytecode = True
     try:
         function = _load(sys.argv[2])
@@ -150,9 +155,11 @@ def main() -> None:
         if threads > 1:
             raise RuntimeError(f"there are {threads} threads where workers are forked from")
     except Exception as error:  # Whatever it was: the server tells it in one sentence.
-        message = f"cannot load {sys.argv[2]}: {type(error).__name__}: {error}"
-        line.send(json.dumps({"is": "fault", "message": message[:1000]}).encode())
-        sys.exit(1)
+        _give_up(line, f"cannot load {sys.argv[2]}: {type(error).__name__}: {error}")
+    sandbox = Sandbox()
+    if sandbox.missing and sys.argv[4] == MUST_BE_CONFINED:
+        _give_up(line, f"workers cannot be confined as they must be here: {'; '.join(sandbox.missing)}")
+    line.send(json.dumps({"is": "confined", "missing": sandbox.missing}).encode())
     # Workers copy each page that they write to; a collection would write to all of them.
     gc.collect()
     gc.freeze()
@@ -161,7 +168,13 @@ def main() -> None:
     sys.stderr.flush()
     child.silence()
     with contextlib.suppress(ConnectionError):
-        _Template(line, function).run()
+        _Template(line, function, sandbox).run()
+
+
+def _give_up(line: socket.socket, message: str) -> NoReturn:
+    """Have the server tell why there are no workers."""
+    line.send(json.dumps({"is": "fault", "message": message[:1000]}).encode())
+    sys.exit(1)
 
 
 if __name__ == "__main__":

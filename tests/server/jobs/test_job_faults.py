@@ -2,17 +2,14 @@
 
 import asyncio
 import hashlib
-import os
-import shutil
 import subprocess
 from collections import Counter
-from collections.abc import AsyncIterator, Iterator
-from contextlib import ExitStack, asynccontextmanager, contextmanager
+from collections.abc import AsyncIterator
+from contextlib import ExitStack, asynccontextmanager
 from pathlib import Path
 from typing import Any
 
 import grpc.aio
-import pytest
 
 from robosc_api.v1 import jobs_pb2 as pb
 from robosc_api.v1 import jobs_pb2_grpc
@@ -22,6 +19,7 @@ from robosc_server.tasks.task import Reason, TaskKind
 from support.job_parts import ME, PATIENCE_S, Choices, ended, in_loop, is_in, parts, until
 from support.job_server import job_server
 from support.job_workers import messages_for, task_message, task_of
+from support.small_disks import fill, small_disk
 
 _JOBS = 50
 
@@ -265,34 +263,6 @@ def test_of_two_servers_one_is_killed_and_the_other_carries_its_jobs_on(tmp_path
         process, dying = stack.enter_context(job_server(tmp_path / "a", database_url))
         _, living = stack.enter_context(job_server(tmp_path / "b", database_url))
         asyncio.run(test(process, dying, living))
-
-
-@contextmanager
-def small_disk(folder: Path, size: str) -> Iterator[Path]:
-    """A file system of that size."""
-    if os.getuid() != 0 or shutil.which("mount") is None:
-        pytest.skip("a small disk needs root")
-    folder.mkdir()
-    mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", folder], check=False, capture_output=True, text=True
-    )
-    if mounted.returncode:
-        pytest.skip(f"no disk can be mounted here: {mounted.stderr.strip()}")
-    try:
-        yield folder
-    finally:
-        subprocess.run(["umount", "--lazy", folder], check=True)
-
-
-def fill(path: Path) -> None:
-    """Take all that is left of a disk."""
-    with path.open("wb", buffering=0) as file:
-        for size in (65536, 4096, 512):
-            try:
-                while True:
-                    file.write(bytes(size))
-            except OSError:
-                continue
 
 
 def test_a_full_disk_refuses_jobs_and_the_server_lives_on(tmp_path: Path) -> None:

@@ -1,17 +1,18 @@
 """Jobs from their acceptance to their end, on SQLite."""
 
 import asyncio
+import math
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from robosc_server.failures import RefusedError
-from robosc_server.jobs import Caller, JobLimits, QueueLimits
+from robosc_server.jobs import Caller, JobLimits, QueueLimits, carrying
 from robosc_server.store import JobFilter, JobRecord, JobState, StoreUnavailableError
 from robosc_server.store.records import STEP
-from robosc_server.tasks.task import Reason, TaskKind
-from support.job_parts import ME, Choices, Parts, ended, in_loop, is_in, messages_of_job, parts, until
+from robosc_server.tasks.task import Failure, Reason, Report, Result, TaskKind
+from support.job_parts import ME, Choices, Parts, ended, in_loop, is_in, messages_of_job, parts, sweep_by_hand, until
 from support.job_workers import messages_for, task_of
 
 _NEVER = "until /nowhere/never"
@@ -263,26 +264,11 @@ def test_jobs_are_forgotten_when_their_time_has_passed_and_no_sooner(tmp_path: P
     in_loop(test)
 
 
-def test_bounds_of_kept_jobs_hold(tmp_path: Path) -> None:
-    async def test() -> None:
-        limits = JobLimits(jobs_per_owner=2, results_bytes=100_000, sweep_s=3600.0)
-        async with parts(tmp_path, Choices(limits=limits)) as made:
-            for number in range(2):
-                job, _ = await made.manager.submit(task_of(str(number)), ME)
-                await ended(made.manager, job.id)
-            assert await refusal_of(made.manager.submit(task_of("2"), ME)) is Reason.QUOTA_EXCEEDED
-            assert made.scheduler.running == 0
-            you = Caller("you")
-            job, _ = await made.manager.submit(task_of("big 100000", TaskKind.SYNTHESIZE), you)
-            await ended(made.manager, job.id, you)
-            assert await refusal_of(made.manager.submit(task_of("3"), you)) is Reason.SERVER_BUSY
-            await made.manager.sweep()
-            assert await made.manager.get(job.id, you)
+def test_results_that_no_job_needs_go_first_those_that_were_not_asked_for_longest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sweep_by_hand(monkeypatch)
 
-    in_loop(test)
-
-
-def test_results_that_no_job_needs_go_first_those_that_were_not_asked_for_longest(tmp_path: Path) -> None:
     async def test() -> None:
         choices = Choices(limits=JobLimits(results_bytes=250_000, sweep_s=3600.0), memory_bytes=0)
         async with parts(tmp_path, choices) as made:
@@ -292,7 +278,7 @@ def test_results_that_no_job_needs_go_first_those_that_were_not_asked_for_longes
             for task in tasks[1:]:
                 choices.times.wall_s += 1.0
                 outcome = await made.workers.run(task, None, None)  # type: ignore[arg-type]
-                await made.store.keep_results([(task.key, task.kind, outcome)])  # type: ignore[list-item]
+                await made.store.keep_results([(task.key, task.kind, outcome, "me")])  # type: ignore[list-item]
             choices.times.wall_s += 1.0
             await made.store.touch([tasks[1].key])
             await made.manager.sweep()
@@ -356,7 +342,7 @@ def test_draining_lets_jobs_end_that_run(tmp_path: Path) -> None:
 
 
 def test_workers_that_are_away_cost_a_job_no_attempt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robosc_server.jobs.manager._RETRY_S", 0.01)
+    monkeypatch.setattr("robosc_server.jobs.carrying._RETRY_S", 0.01)
 
     async def test() -> None:
         gate = tmp_path / "gate"
@@ -371,6 +357,132 @@ def test_workers_that_are_away_cost_a_job_no_attempt(tmp_path: Path, monkeypatch
             assert (done.state, done.attempts) == (JobState.SUCCEEDED, 1)
             assert done.revision > 3 * STEP
             assert made.scheduler.running == 0
+
+    in_loop(test)
+
+
+class Allowance:
+    """Lets callers begin who have not spent more than they may."""
+
+    def __init__(self) -> None:
+        self.may_spend_s: dict[str, float] = {}
+        self.spent_s: dict[str, float] = {}
+
+    def waiting(self, caller: str) -> int | None:
+        return None
+
+    def check(self, caller: str) -> None:
+        if self.spent_s.get(caller, 0.0) > self.may_spend_s.get(caller, math.inf):
+            raise RefusedError(Reason.QUOTA_EXCEEDED, "nothing is left", retry_after_s=3600.0)
+
+    def spent(self, caller: str, cpu_s: float) -> None:
+        self.spent_s[caller] = self.spent_s.get(caller, 0.0) + cpu_s
+
+
+def test_jobs_wait_beside_the_line_while_their_owner_has_spent_too_much(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("robosc_server.jobs.carrying._QUOTA_S", 0.01)
+
+    async def test() -> None:
+        accounts = Allowance()
+        accounts.may_spend_s["me"] = 5.0
+        choices = Choices(capacity=1, queue=QueueLimits(2, 2), accounts=accounts)
+        async with parts(tmp_path, choices) as made:
+            gate = tmp_path / "gate"
+            texts = [f"until {gate}\nspend 3\nfail CPU_LIMIT", "spend 3\nfault", "spend 3"]
+            jobs = [(await made.manager.submit(task_of(text), ME))[0] for text in texts]
+            gate.touch()
+            ends = [(await ended(made.manager, job.id)).state for job in jobs[:2]]
+            assert ends == [JobState.FAILED] * 2
+            # Failed or not, they have taken six seconds.
+            watch = made.manager.watch(jobs[2].id, ME, 0)
+            record = await anext(watch)
+            while record.progress is None:
+                record = await anext(watch)
+            assert record.state is JobState.QUEUED
+            assert record.progress == Report("waiting", "nothing is left")
+            assert record.attempts == 0
+            # Whoever else comes finds the line empty.
+            you = Caller("you")
+            others = [(await made.manager.submit(task_of(f"{gate}\n{n}"), you))[0] for n in range(3)]
+            for job in others:
+                assert (await ended(made.manager, job.id, you)).state is JobState.SUCCEEDED
+            assert await is_in(made.manager, jobs[2].id, JobState.QUEUED)
+            accounts.may_spend_s["me"] = 6.0
+            done = await ended(made.manager, jobs[2].id)
+            assert (done.state, done.attempts) == (JobState.SUCCEEDED, 1)
+            assert accounts.spent_s == {"me": 9.0, "you": 0.0}
+
+            # One that waits so can be cancelled, and is left to others at the end.
+            waiting = [(await made.manager.submit(task_of(f"late {n}"), ME))[0] for n in range(2)]
+            assert (await made.manager.cancel(waiting[0].id, ME)).state is JobState.CANCELLED
+            await made.manager.drain(60.0)
+            assert await is_in(made.manager, waiting[1].id, JobState.QUEUED)
+
+    in_loop(test)
+
+
+def test_cancelled_work_counts_for_its_owner(tmp_path: Path) -> None:
+    async def test() -> None:
+        accounts = Allowance()
+        async with parts(tmp_path, Choices(accounts=accounts)) as made:
+            job, _ = await made.manager.submit(task_of(f"spend 3\n{_NEVER}"), ME)
+            await until(lambda: is_in(made.manager, job.id, JobState.RUNNING))
+            await made.manager.cancel(job.id, ME)
+
+            async def is_counted() -> bool:
+                return accounts.spent_s == {"me": 3.0}
+
+            await until(is_counted)
+
+    in_loop(test)
+
+
+def test_a_job_that_loses_its_worker_again_and_again_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robosc_server.jobs.carrying._RETRY_S", 0.01)
+
+    async def test() -> None:
+        async with parts(tmp_path, Choices(capacity=1)) as made:
+            gate = tmp_path / "gate"
+            job, _ = await made.manager.submit(task_of(f"log {tmp_path / 'begun'}\nuntil {gate}\nlose"), ME)
+            await until(lambda: is_in(made.manager, job.id, JobState.RUNNING))
+            # That the workers are away, or the server ends, is no loss.
+            made.workers.is_away = True
+            await until(lambda: is_in(made.manager, job.id, JobState.QUEUED))
+            made.workers.is_away = False
+            await until(lambda: is_in(made.manager, job.id, JobState.RUNNING))
+        async with parts(tmp_path, Choices(capacity=1)) as made:
+            gate.touch()
+            begun = len((tmp_path / "begun").read_text().splitlines())
+            done = await ended(made.manager, job.id)
+            assert done.failure is not None
+            assert (done.state, done.failure.reason) == (JobState.FAILED, Reason.WORKER_DIED)
+            assert done.failure.message == "the job's worker was lost 3 times while it did the task"
+            assert 2 <= len((tmp_path / "begun").read_text().splitlines()) - begun <= 3
+            assert (made.scheduler.running, made.scheduler.waiting) == (0, 0)
+
+    in_loop(test)
+
+
+def test_losses_count_also_when_servers_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robosc_server.jobs.carrying._RETRY_S", 0.01)
+
+    async def has_lost_once(made: Parts, job_id: str) -> bool:
+        return (await made.manager.get(job_id, ME)).losses == 1
+
+    async def test() -> None:
+        gate = tmp_path / "gate"
+        text = f"until {gate}\nlose"
+        async with parts(tmp_path) as made:
+            job, _ = await made.manager.submit(task_of(text), ME)
+            await until(lambda: is_in(made.manager, job.id, JobState.RUNNING))
+            made.workers.capacity = 0
+            gate.touch()
+            await until(lambda: has_lost_once(made, job.id))
+        async with parts(tmp_path) as made:
+            assert (await ended(made.manager, job.id)).state is JobState.FAILED
+            assert made.workers.begun == [text] * 2
 
     in_loop(test)
 
@@ -414,7 +526,7 @@ def test_an_acceptance_whose_answer_was_lost_is_found_and_done(tmp_path: Path, m
 def test_a_beginning_that_may_have_been_kept_is_tried_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, has_happened: bool
 ) -> None:
-    monkeypatch.setattr("robosc_server.jobs.manager._RETRY_S", 0.01)
+    monkeypatch.setattr("robosc_server.jobs.carrying._RETRY_S", 0.01)
 
     async def test() -> None:
         async with parts(tmp_path) as made:
@@ -465,3 +577,59 @@ def test_a_thousand_watchers_wait_without_a_question_to_the_database(tmp_path: P
 async def _idle(made: Parts, number: int) -> bool:
     watches = [watch for some in made.manager._watchers._by_job.values() for watch in some]
     return len(watches) == number and all(watch.revision for watch in watches)
+
+
+def test_a_job_whose_result_cannot_be_kept_ends_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def test() -> None:
+        async with parts(tmp_path) as made:
+            end = made.store.end
+
+            async def without_results(job_id: str, replica: str, outcome: Result | Failure) -> JobRecord | None:
+                if isinstance(outcome, Result):
+                    raise ValueError("no such result")
+                return await end(job_id, replica, outcome)
+
+            monkeypatch.setattr(made.store, "end", without_results)
+            job, _ = await made.manager.submit(task_of("a"), ME)
+            record = await ended(made.manager, job.id)
+            assert record.state is JobState.FAILED
+            assert record.failure is not None
+            assert record.failure.reason is Reason.INTERNAL_FAULT
+            assert record.failure.message.startswith("the result cannot be kept; internal error ")
+            assert (made.scheduler.running, made.scheduler.waiting) == (0, 0)
+
+    in_loop(test)
+
+
+def test_jobs_that_wait_for_workers_count_like_those_in_the_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(carrying, "_LONGEST_RETRY_S", 1.0)
+
+    async def test() -> None:
+        queue = QueueLimits(waiting=6, waiting_per_caller=4)
+        async with parts(tmp_path, Choices(queue=queue, capacity=2)) as made:
+            made.workers.is_away = True
+            jobs: list[JobRecord] = []
+
+            async def is_refused() -> bool:
+                # Each tries a worker, and waits beside the line then.
+                try:
+                    job, _ = await made.manager.submit(task_of(f"again {len(jobs)}"), ME)
+                except RefusedError as error:
+                    assert error.reason is Reason.SERVER_BUSY
+                    return made.scheduler.running == made.scheduler.waiting == 0
+                jobs.append(job)
+                return False
+
+            await until(is_refused)
+            assert 4 <= len(jobs) <= 6
+            theirs, _ = await made.manager.submit(task_of("of somebody else"), Caller("you"))
+            made.workers.is_away = False
+            for job in jobs:
+                done = await ended(made.manager, job.id)
+                assert (done.state, done.attempts) == (JobState.SUCCEEDED, 1)
+            assert (await ended(made.manager, theirs.id, Caller("you"))).state is JobState.SUCCEEDED
+            made.scheduler.require_room(ME.name)
+
+    in_loop(test)

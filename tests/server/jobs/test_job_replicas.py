@@ -3,12 +3,14 @@
 import asyncio
 from contextlib import AsyncExitStack
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from robosc_server.failures import RefusedError
 from robosc_server.jobs import Caller, JobLimits
-from robosc_server.store import JobFilter, JobState
+from robosc_server.store import JobFilter, JobState, job_rows, store
+from robosc_server.store.job_rows import take_orphans
 from robosc_server.tasks.task import Reason, TaskKind
 from support.job_parts import (
     ME,
@@ -36,7 +38,7 @@ async def replicas(stack: AsyncExitStack, url: str, times: Times, number: int = 
 
 def fall_silent(made: Parts) -> None:
     """Have a server do nothing any more, as if it had been stopped."""
-    for task in (*made.manager._keepers, *made.manager._tasks):
+    for task in (*made.manager._keepers, *made.manager._carrying._tasks):
         task.cancel()
     made.manager._keepers = []
     made.manager._has_left = True
@@ -139,7 +141,7 @@ def test_jobs_of_a_server_that_falls_silent_are_adopted_after_its_lease_and_run_
             gate.touch()
 
             async def has_looked() -> bool:
-                return bool(living.manager._seen)
+                return bool(living.manager._lookout.seen)
 
             await until(has_looked)
             # Not before its lease has passed.
@@ -152,6 +154,27 @@ def test_jobs_of_a_server_that_falls_silent_are_adopted_after_its_lease_and_run_
             assert [record.state for record in done] == [JobState.SUCCEEDED] * 4
             assert [record.attempts for record in done] == [2, 1, 1, 1]
             assert (await watching).revision > seen.revision
+
+    in_loop(test)
+
+
+def test_servers_that_go_on_are_not_taken_for_dead_however_long_it_takes(database_url: str) -> None:
+    async def test() -> None:
+        times = Times()
+        by_hand = JobLimits(look_s=3600.0, lease_s=15.0, sweep_s=3600.0)
+        choices = Choices(database_url, by_hand, times=times)
+        async with parts(Path("unused"), choices) as ours, parts(Path("unused"), choices) as theirs:
+            jobs = [(await made.manager.submit(task_of(f"{_NEVER}\n{made}"), ME))[0] for made in (ours, theirs)]
+            await until(lambda: is_in(ours.manager, jobs[0].id, JobState.RUNNING))
+            await until(lambda: is_in(ours.manager, jobs[1].id, JobState.RUNNING))
+            for _ in range(10):
+                for made in (ours, theirs):
+                    await made.manager.look()
+                times.monotonic_s += 7.0
+            for job, made in zip(jobs, (ours, theirs), strict=True):
+                record = await made.manager.get(job.id, ME)
+                assert (record.state, record.attempts, record.replica) == (JobState.RUNNING, 1, job.replica)
+                assert (len(made.workers.begun), made.workers.killed) == (1, 0)
 
     in_loop(test)
 
@@ -205,7 +228,7 @@ def test_a_server_that_was_taken_for_dead_stops_its_work_and_takes_part_again(
             times.monotonic_s += 16.0
             await until(lambda: _is_second_attempt(living, job.id))
             # It wakes up, with a worker at a job that is another's now.
-            stalled.manager._keepers = [asyncio.create_task(stalled.manager._look_often()), sweeping]
+            stalled.manager._keepers = [asyncio.create_task(stalled.manager._lookout.look_often()), sweeping]
 
             async def has_stopped() -> bool:
                 return stalled.workers.killed == 1 and stalled.manager.carried == 0
@@ -225,15 +248,74 @@ def test_jobs_that_a_server_leaves_at_its_end_are_taken_at_once(database_url: st
     async def test() -> None:
         async with AsyncExitStack() as stack:
             ending, living = await replicas(stack, database_url, Times())
+            # All jobs are equally old: the one that never ends may be the first there, and keeps its worker.
+            living.workers.capacity = 2
             jobs = [(await ending.manager.submit(task_of(f"report {n}"), ME))[0] for n in range(3)]
             running, _ = await ending.manager.submit(task_of(_NEVER), ME)
             await ending.manager.drain(0.0)
             done = [await ended(living.manager, job.id) for job in jobs]
             assert {record.state for record in done} == {JobState.SUCCEEDED}
-            assert {record.attempts for record in done} == {1}
+            # One that had begun there runs again.
+            assert {record.attempts for record in done} <= {1, 2}
             await until(lambda: is_in(living.manager, running.id, JobState.RUNNING))
 
     in_loop(test)
+
+
+def test_what_waits_at_a_server_that_ends_is_done_by_others_while_its_own_work_goes_on(
+    database_url: str, tmp_path: Path
+) -> None:
+    async def test() -> None:
+        async with AsyncExitStack() as stack:
+            ending, living = await replicas(stack, database_url, Times())
+            gate = tmp_path / "gate"
+            running, _ = await ending.manager.submit(task_of(f"until {gate}"), ME)
+            await until(lambda: is_in(ending.manager, running.id, JobState.RUNNING))
+            waiting = [(await ending.manager.submit(task_of(f"report {n}"), ME))[0] for n in range(3)]
+            watching = asyncio.create_task(ended(ending.manager, waiting[0].id))
+            draining = asyncio.create_task(ending.manager.drain(60.0))
+            for job in waiting:
+                assert (await ended(living.manager, job.id)).state is JobState.SUCCEEDED
+            assert (await watching).state is JobState.SUCCEEDED
+            assert not draining.done()
+            assert ending.manager.carried == 1
+            gate.touch()
+            await draining
+            done = await ended(living.manager, running.id)
+            assert (done.state, done.attempts) == (JobState.SUCCEEDED, 1)
+            assert (len(ending.workers.begun), ending.workers.killed) == (1, 0)
+
+    in_loop(test)
+
+
+def test_many_jobs_are_adopted_a_few_at_a_time(database_url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store, "_TAKEN_AT_ONCE", 2)
+    taken: list[int] = []
+
+    def counted(*args: Any, **kwargs: Any) -> Any:
+        found = take_orphans(*args, **kwargs)
+        taken.append(len(found))
+        return found
+
+    monkeypatch.setattr(job_rows, "take_orphans", counted)
+
+    async def test() -> None:
+        async with AsyncExitStack() as stack:
+            dying, living = await replicas(stack, database_url, Times())
+            living.workers.capacity = 0
+            jobs = [(await dying.manager.submit(task_of(f"{_NEVER}\n{n}"), ME))[0] for n in range(5)]
+            await dying.manager.drain(0.0)
+
+            async def has_all() -> bool:
+                return living.manager.carried == len(jobs)
+
+            await until(has_all)
+            living.workers.capacity = 1
+            for job in jobs:
+                await living.manager.cancel(job.id, ME)
+
+    in_loop(test)
+    assert max(taken) == 2 and sum(taken) == 5
 
 
 def test_the_same_key_at_two_servers_at_once_is_one_job(database_url: str) -> None:

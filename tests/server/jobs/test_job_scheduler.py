@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 
 import hypothesis.strategies as st
 import pytest
@@ -9,7 +10,7 @@ from hypothesis import given, settings
 
 from robosc_server.failures import RefusedError
 from robosc_server.jobs.scheduler import Place, QueueLimits, Scheduler
-from robosc_server.tasks.task import Reason, Report, Result, TaskLimits
+from robosc_server.tasks.task import Failure, Reason, Report, Result, TaskLimits
 from support.job_workers import ScriptedWorkers, task_of
 
 
@@ -35,16 +36,44 @@ class Clock:
 def test_a_task_is_done_and_its_place_is_free_again() -> None:
     async def test() -> None:
         scheduler = Scheduler(ScriptedWorkers(1), QueueLimits())
-        begun: list[int] = []
-
-        async def on_begin() -> None:
-            begun.append(scheduler.running)
-
         for _ in range(3):
-            outcome = await scheduler.run(task_of("a"), "me", TaskLimits(), drop, on_begin)
+            outcome = await scheduler.run(task_of("a"), "me", TaskLimits(), drop)
             assert isinstance(outcome, Result)
-        assert begun == [1, 1, 1]
         assert (scheduler.waiting, scheduler.running) == (0, 0)
+
+    run(test)
+
+
+def test_what_is_known_when_the_turn_comes_is_not_done() -> None:
+    async def test() -> None:
+        workers = ScriptedWorkers(1)
+        scheduler = Scheduler(workers, QueueLimits())
+        known = Result((b"known",))
+        assert await scheduler.run(task_of("a"), "me", TaskLimits(), drop, lambda: known) is known
+        assert workers.begun == []
+        assert (scheduler.waiting, scheduler.running) == (0, 0)
+
+    run(test)
+
+
+def test_who_has_no_task_running_need_not_wait_for_who_has_all_workers() -> None:
+    async def test() -> None:
+        scheduler = Scheduler(ScriptedWorkers(2), QueueLimits(waiting=3, reserved=1))
+        greedy = [scheduler.enter("greedy") for _ in range(5)]
+        assert [place.has_turn for place in greedy] == [True, True, False, False, False]
+        # The line is full, too.
+        first, second = scheduler.enter("modest"), None
+        assert first.has_turn
+        with pytest.raises(RefusedError):
+            second = scheduler.enter("modest")
+        assert (scheduler.running, second) == (3, None)
+        # One of three has ended: as many go on as there are workers.
+        scheduler.leave(greedy[0])
+        assert not greedy[2].has_turn
+        scheduler.leave(greedy[1])
+        assert greedy[2].has_turn
+        scheduler.leave(first)
+        assert (greedy[3].has_turn, greedy[4].has_turn) == (True, False)
 
     run(test)
 
@@ -103,6 +132,23 @@ def test_bounds_hold_and_tell_when_to_come_back() -> None:
     run(test)
 
 
+def test_all_addresses_of_one_network_stand_in_one_line() -> None:
+    async def test() -> None:
+        scheduler = Scheduler(ScriptedWorkers(1), QueueLimits(100, 2))
+        taken = scheduler.enter("2001:db8::1")
+        waiting = [scheduler.enter(f"2001:db8::{number}") for number in (2, 3)]
+        with pytest.raises(RefusedError, match="of yours"):
+            scheduler.enter("2001:db8::4")
+        others = [scheduler.enter(name) for name in ("2001:db8:0:1::1", "192.0.2.1", "192.0.2.2", "robot")]
+        # One after the other: whoever has had a turn goes to the end.
+        assert [scheduler.before(place) for place in (waiting[0], *others, waiting[1])] == list(range(6))
+        for place in (taken, *waiting, *others):
+            scheduler.leave(place)
+        assert (scheduler.running, scheduler.waiting) == (0, 0)
+
+    run(test)
+
+
 def test_more_workers_are_noticed_while_tasks_wait(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("robosc_server.jobs.scheduler._LOOK_S", 0.01)
 
@@ -135,6 +181,17 @@ def test_workers_that_are_away_are_told_as_such() -> None:
     run(test)
 
 
+def test_a_call_that_loses_its_worker_is_not_told_to_come_again() -> None:
+    async def test() -> None:
+        scheduler = Scheduler(ScriptedWorkers(1), QueueLimits())
+        outcome = await scheduler.run(task_of("lose"), "me", TaskLimits(), drop)
+        assert isinstance(outcome, Failure)
+        assert outcome.reason is Reason.WORKER_DIED
+        assert scheduler.running == 0
+
+    run(test)
+
+
 def test_a_closed_line_takes_nothing_more() -> None:
     async def test() -> None:
         scheduler = Scheduler(ScriptedWorkers(1), QueueLimits())
@@ -155,13 +212,14 @@ class Twin:
     def __init__(self, capacity: int, limits: QueueLimits) -> None:
         self.capacity, self.limits = capacity, limits
         self.waiting: list[tuple[int, str]] = []
-        self.running: set[int] = set()
+        self.running: dict[int, str] = {}
         self.turns: list[str] = []
 
     def enter(self, number: int, caller: str) -> bool:
         own = sum(1 for _, name in self.waiting if name == caller)
         is_full = own >= self.limits.waiting_per_caller or len(self.waiting) >= self.limits.waiting
-        if (self.waiting or len(self.running) >= self.capacity) and is_full:
+        is_free = not self.waiting and len(self.running) < self.capacity
+        if is_full and not is_free and not self.is_reserved(caller):
             return False
         if own == 0:
             self.turns.append(caller)
@@ -171,7 +229,7 @@ class Twin:
 
     def leave(self, number: int) -> None:
         if number in self.running:
-            self.running.discard(number)
+            del self.running[number]
         for place, (waiting, caller) in enumerate(self.waiting):
             if waiting == number:
                 del self.waiting[place]
@@ -182,16 +240,27 @@ class Twin:
 
     def serve(self) -> None:
         while self.waiting and len(self.running) < self.capacity:
-            caller = self.turns.pop(0)
-            place = next(place for place, (_, name) in enumerate(self.waiting) if name == caller)
-            number, _ = self.waiting.pop(place)
-            self.running.add(number)
-            if any(name == caller for _, name in self.waiting):
-                self.turns.append(caller)
+            self.begin(self.turns[0])
+        for caller in list(self.turns):
+            if self.is_reserved(caller):
+                self.begin(caller)
+
+    def begin(self, caller: str) -> None:
+        self.turns.remove(caller)
+        place = next(place for place, (_, name) in enumerate(self.waiting) if name == caller)
+        number, _ = self.waiting.pop(place)
+        self.running[number] = caller
+        if any(name == caller for _, name in self.waiting):
+            self.turns.append(caller)
+
+    def is_reserved(self, caller: str) -> bool:
+        """Whether a task may begin though no worker is free."""
+        count, most = len(self.running), self.capacity + self.limits.reserved
+        return self.capacity > 0 and self.capacity <= count < most and caller not in self.running.values()
 
     def before(self) -> dict[int, int]:
         """Served one after the other, as if each left at once."""
-        copy = Twin(1, self.limits)
+        copy = Twin(1, replace(self.limits, reserved=0))
         copy.waiting, copy.turns = list(self.waiting), list(self.turns)
         order: dict[int, int] = {}
         while copy.waiting:
@@ -210,12 +279,12 @@ _STEP = st.one_of(
 
 
 @settings(max_examples=100)
-@given(st.lists(_STEP, max_size=60), st.integers(1, 3), st.integers(1, 8), st.integers(1, 4))
+@given(st.lists(_STEP, max_size=60), st.integers(1, 3), st.integers(1, 8), st.integers(1, 4), st.integers(0, 2))
 def test_whatever_happens_it_does_as_the_twin(
-    steps: list[tuple[str, str | int]], capacity: int, waiting: int, per_caller: int
+    steps: list[tuple[str, str | int]], capacity: int, waiting: int, per_caller: int, reserved: int
 ) -> None:
     async def test() -> None:
-        limits = QueueLimits(waiting, per_caller)
+        limits = QueueLimits(waiting, per_caller, reserved)
         workers, twin = ScriptedWorkers(capacity), Twin(capacity, limits)
         scheduler = Scheduler(workers, limits)
         places: list[Place | None] = []
@@ -238,7 +307,7 @@ def test_whatever_happens_it_does_as_the_twin(
                 twin.serve()
             assert scheduler.waiting == len(twin.waiting)
             assert scheduler.running == len(twin.running)
-            assert {number for number, place in enumerate(places) if place and place.has_turn} == twin.running
+            assert {number for number, place in enumerate(places) if place and place.has_turn} == twin.running.keys()
             order = twin.before()
             for number, place in enumerate(places):
                 if place is not None:

@@ -5,7 +5,7 @@ import base64
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import grpc
 import pytest
@@ -19,7 +19,8 @@ from robosc_api.v1 import jobs_pb2 as pb
 from robosc_server.failures import RefusedError
 from robosc_server.jobs import Caller, JobLimits, QueueLimits, caller_of
 from robosc_server.jobs.convert import page_token, place_of, result_response
-from robosc_server.jobs.service import Context
+from robosc_server.jobs.manager import JobManager
+from robosc_server.jobs.service import Context, JobService
 from robosc_server.store import JobFilter, JobRecord, JobState, StoreUnavailableError
 from robosc_server.tasks.task import Reason, TaskKind
 from support.job_parts import Choices, Parts, in_loop, offered, parts
@@ -196,6 +197,47 @@ def test_pages_hold_all_jobs_once_and_tokens_hold_for_one_list(tmp_path: Path) -
 _ALL = JobFilter("me", frozenset({JobState.FAILED}), None)
 
 
+class Kept:
+    """Stands for a manager that has many jobs."""
+
+    async def list_jobs(self, chosen: JobFilter, after: tuple[int, str] | None, limit: int) -> list[JobRecord]:
+        return [
+            JobRecord(f"{number:032x}", "me", TaskKind.CHECK, JobState.FAILED, 1, "k", "f", "", None, 0, number)
+            for number in range(limit)
+        ]
+
+    def waiting_before(self, record: JobRecord) -> int:
+        return 0
+
+    def require_room(self, caller: Caller) -> None:
+        """There is."""
+
+
+@pytest.mark.parametrize("size", [1, 20, 21, 1000])
+def test_others_have_their_turn_while_a_long_list_is_made(size: int) -> None:
+    def nothing(*_: Any) -> Any:
+        raise AssertionError("not asked for")
+
+    async def test() -> None:
+        service = JobService(cast(JobManager, Kept()), nothing, lambda _: Caller("me"))
+        turns = 0
+
+        async def other() -> None:
+            nonlocal turns
+            while True:
+                turns += 1
+                await asyncio.sleep(0)
+
+        task = asyncio.create_task(other())
+        answer = await service.ListJobs(pb.ListJobsRequest(page_size=size), cast(Any, None))
+        assert [int(job.id, 16) for job in answer.jobs] == list(range(size))
+        assert answer.next_page_token
+        assert turns >= size // 20
+        task.cancel()
+
+    asyncio.run(test())
+
+
 @settings(max_examples=60)
 @given(st.one_of(st.text(max_size=60), st.binary(max_size=40).map(lambda raw: base64.urlsafe_b64encode(raw).decode())))
 def test_no_page_token_is_taken_that_was_not_given(token: str) -> None:
@@ -203,6 +245,28 @@ def test_no_page_token_is_taken_that_was_not_given(token: str) -> None:
         with pytest.raises(RefusedError) as refused:
             place_of(token, _ALL)
         assert refused.value.reason is Reason.MALFORMED_REQUEST
+
+
+def test_a_submission_beyond_the_quota_is_not_looked_at() -> None:
+    """One that asks again with its key is, since it may ask for nothing new."""
+    looked: list[bytes] = []
+
+    def accept(kind: TaskKind, request: bytes) -> Any:
+        looked.append(request)
+        raise RefusedError(Reason.MALFORMED_REQUEST, "looked at")
+
+    def admit(caller: str) -> None:
+        raise RefusedError(Reason.QUOTA_EXCEEDED, "too much", 1.0)
+
+    async def test() -> None:
+        service = JobService(cast(JobManager, Kept()), accept, lambda _: Caller("me"), admit)
+        for key, reason in (("", Reason.QUOTA_EXCEEDED), ("key", Reason.MALFORMED_REQUEST)):
+            with pytest.raises(RefusedError) as refused:
+                await service.SubmitJob(submission("a", idempotency_key=key).SerializeToString(), cast(Any, None))
+            assert refused.value.reason is reason
+        assert len(looked) == 1
+
+    asyncio.run(test())
 
 
 def test_a_page_token_leads_back_to_its_place() -> None:

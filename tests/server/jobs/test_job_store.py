@@ -69,9 +69,9 @@ def test_a_newer_or_foreign_database_is_not_touched(tmp_path: Path) -> None:
     open_store(tmp_path).close()
     path = tmp_path / "jobs.sqlite"
     with sqlite3.connect(path) as connection:
-        connection.execute("UPDATE robosc_schema SET version = 2")
+        connection.execute("UPDATE robosc_schema SET version = 3")
     connection.close()
-    with pytest.raises(StoreError, match="version 2, and this server knows version 1"):
+    with pytest.raises(StoreError, match="version 3, and this server knows version 2"):
         open_store(tmp_path)
     with sqlite3.connect(path) as connection:
         connection.execute("DROP TABLE robosc_schema")

@@ -1,6 +1,8 @@
 """`robosc-server check-config`, `example-config` and `token`."""
 
+import contextlib
 import datetime
+import errno
 import json
 import os
 import re
@@ -11,14 +13,19 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from sqlalchemy import create_engine, text
 
 from robosc_api.security import Quota, Scope, make_token
 from robosc_api.security.tokens import parse_tokens
 from robosc_server.operations.commands import run_command
 from robosc_server.operations.example import example_file
 from robosc_server.operations.settings import Settings, settings_from, variable_of
+from robosc_server.store import StoreError, open_store
 from robosc_server.store.opening import DATABASE_FILE
+from robosc_server.store.schema import VERSION
 from support.certificates import Authority
+from support.postgresql import postgresql
+from support.service import eventually, logged_server_process, server_process
 
 
 @pytest.fixture(autouse=True)
@@ -49,7 +56,7 @@ def test_a_server_without_any_settings_could_start(capsys: pytest.CaptureFixture
     assert checked.status == 0
     assert checked.document["ok"] is True
     assert {found["part"] for found in checked.document["findings"]} == {
-        "listening", "certificates", "tokens", "signing", "database", "workers", "metrics", "tracing",
+        "listening", "certificates", "tokens", "signing", "database", "workers", "confinement", "metrics", "tracing",
     }  # fmt: skip
     assert not (tmp_path / "robosc-server").exists(), "nothing is made"
     assert run_command(["check-config", "--port", "0"]) == 0
@@ -155,6 +162,121 @@ def test_the_state_folder(capsys: pytest.CaptureFixture[str], tmp_path: Path) ->
         assert Checked(capsys, "--state-dir", str(state)).status == 1
 
 
+def folder_state(folder: Path) -> dict[str, bytes]:
+    """Everything in a folder; of what is shared by those who have a database open, the name alone."""
+    return {path.name: b"" if path.name.endswith("-shm") else path.read_bytes() for path in folder.iterdir()}
+
+
+def test_tables_of_another_version_are_told_and_nothing_is_left_behind(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    state = tmp_path / "a state"
+
+    def found() -> list[tuple[str, str]]:
+        before = folder_state(state)
+        told = Checked(capsys, "--state-dir", str(state)).of("database")
+        assert folder_state(state) == before
+        return told
+
+    store = open_store(state)
+    open_now = found()
+    store.close()
+    assert open_now == [("warning", f"{state / DATABASE_FILE} is in use now by another robosc-server")]
+    assert found() == [("ok", f"SQLite in {state / DATABASE_FILE}")]
+    newer = "UPDATE robosc_schema SET version = version + 1"
+    # In the log of changes, which a server that was killed leaves, and later in the file itself.
+    with contextlib.closing(sqlite3.connect(state / DATABASE_FILE)) as connection:
+        connection.execute(newer)
+        connection.commit()
+        assert (state / f"{DATABASE_FILE}-wal").stat().st_size
+        in_log = found()
+    in_file = found()
+    assert in_log == in_file
+    (grade, message), *others = in_file
+    assert (grade, others) == ("error", [])
+    with pytest.raises(StoreError) as refused:
+        open_store(state)
+    assert message.removeprefix(f"{state / DATABASE_FILE}: ") in str(refused.value)
+    assert f"version {VERSION + 1}, and this server knows version {VERSION} and those before" in message
+
+
+def test_a_database_that_a_running_server_has(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    state = tmp_path / "state"
+    link = tmp_path / "link"
+    link.symlink_to(state)
+    in_use = f"{DATABASE_FILE} is in use now by another robosc-server"
+    with server_process("--port", "0", "--state-dir", str(state)):
+        before = {path.name for path in state.iterdir()}
+        for place in (state, link):
+            checked = Checked(capsys, "--state-dir", str(place))
+            assert (checked.status, checked.of("database")) == (0, [("warning", f"{place}/{in_use}")])
+        checked = Checked(capsys, "--database-url", f"sqlite:///{state / DATABASE_FILE}")
+        assert checked.grade("database") == "warning"
+        assert {path.name for path in state.iterdir()} == before
+        # It has kept its lock, and lost it to nobody.
+        with pytest.raises(StoreError, match="in use by another robosc-server"):
+            open_store(state)
+    before = {path.name for path in state.iterdir()}
+    assert Checked(capsys, "--state-dir", str(state)).grade("database") == "ok"
+    assert {path.name for path in state.iterdir()} == before
+
+
+def test_a_look_at_a_database_of_this_process_leaves_it_the_lock(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    store = open_store(tmp_path)
+    assert Checked(capsys, "--state-dir", str(tmp_path)).grade("database") == "warning"
+    try:
+        with pytest.raises(AssertionError), server_process("--port", "0", "--state-dir", str(tmp_path)):
+            pass
+    finally:
+        store.close()
+
+
+@pytest.mark.parametrize("place", ["/proc/nothing", "/proc", "/sys/nothing/below"])
+def test_a_folder_that_not_even_root_can_make(place: str, capsys: pytest.CaptureFixture[str]) -> None:
+    checked = Checked(capsys, "--state-dir", place)
+    assert (checked.status, checked.grade("database")) == (1, "error")
+    assert "cannot be written" in checked.of("database")[0][1]
+
+
+def test_that_a_folder_can_be_written_is_found_without_a_trace(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also on file systems that have no files without a name."""
+    before = tmp_path.stat().st_mtime_ns
+    assert Checked(capsys, "--state-dir", str(tmp_path / "a" / "b")).grade("database") == "ok"
+    assert tmp_path.stat().st_mtime_ns == before
+
+    def without(path: Any, flags: int, *more: Any, **named: Any) -> int:
+        if flags & os.O_TMPFILE == os.O_TMPFILE:
+            raise OSError(errno.EOPNOTSUPP, os.strerror(errno.EOPNOTSUPP))
+        return opened(path, flags, *more, **named)
+
+    opened = os.open
+    monkeypatch.setattr(os, "open", without)
+    assert Checked(capsys, "--state-dir", str(tmp_path / "a" / "b")).grade("database") == "ok"
+    assert list(tmp_path.iterdir()) == []
+    assert Checked(capsys, "--state-dir", "/proc/nothing").grade("database") == "error"
+
+
+def test_tables_of_another_version_in_postgresql(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    with postgresql() as server:
+        url = server.new_database()
+        assert Checked(capsys, "--database-url", url).of("database")[0][0] == "ok"
+        open_store(tmp_path, url).close()
+        ((grade, message),) = Checked(capsys, "--database-url", url).of("database")
+        assert (grade, "PostgreSQL" in message) == ("ok", True)
+        engine = create_engine(url.replace("postgresql://", "postgresql+psycopg://"))
+        with engine.begin() as connection:
+            connection.execute(text("UPDATE robosc_schema SET version = version + 1"))
+        engine.dispose()
+        ((grade, message),) = Checked(capsys, "--database-url", url).of("database")
+        assert grade == "error"
+        assert f"version {VERSION + 1}, and this server knows version {VERSION} and those before" in message
+        assert Checked(capsys, "--database-url", url.replace("test0", "nowhere")).grade("database") == "error"
+
+
 def test_a_signing_key(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     file = tmp_path / "key"
     assert Checked(capsys, "--signing-key", str(file)).status == 1
@@ -183,6 +305,46 @@ def test_a_token_with_quotas(capsys: pytest.CaptureFixture[str]) -> None:
     assert captured.out.startswith("robosc_")
     assert (entry.scopes, entry.quota) == (frozenset({Scope.SYNTHESIZE, Scope.ADMIN}), Quota(per_minute=60))
     assert run_command(["token", "not a name"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("scopes", "is_told"),
+    [
+        ([], False),
+        (["synthesize"], False),
+        (["admin", "synthesize"], False),
+        (["admin"], True),
+        (["watch"], True),
+        (["watch", "operate"], True),
+    ],
+)
+def test_a_token_with_which_nothing_can_be_called(
+    scopes: list[str], is_told: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run_command(["token", "laptop", *(word for scope in scopes for word in ("--scope", scope))]) == 0
+    captured = capsys.readouterr()
+    assert captured.out.startswith("robosc_")
+    assert captured.out.count("\n") == 1
+    assert ("without the scope 'synthesize' nothing of this server can be called" in captured.err) is is_told
+    assert parse_tokens(captured.err.splitlines()[-1], "line")
+
+
+def test_the_help_says_what_each_scope_is_for(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        run_command(["token", "--help"])
+    told = " ".join(capsys.readouterr().out.split())
+    for scope in Scope:
+        assert re.search(rf"{scope}(, besides synthesize)?: [a-z]", told), scope
+
+
+def test_a_server_that_lets_nobody_in_says_so(tmp_path: Path) -> None:
+    file = tmp_path / "tokens"
+    file.write_text(make_token("watcher", (Scope.WATCH, Scope.ADMIN))[1])
+    file.chmod(0o600)
+    words = f"{file}: no token has the scope 'synthesize', so nobody is let in"
+    with logged_server_process("--tokens", str(file)) as (_, _, log):
+        assert eventually(lambda: any(words in line for line in log))
+    assert sum(words in line for line in log) == 1
 
 
 def test_what_is_no_command_means_to_serve() -> None:

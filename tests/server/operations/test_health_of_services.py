@@ -7,10 +7,12 @@ import grpc
 import pytest
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 
+from robosc_server.operations import drain as draining
 from robosc_server.operations.drain import drain
 from robosc_server.operations.health import Health
 from robosc_server.operations.interceptor import CallInterceptor
 from robosc_server.operations.metrics import Metrics
+from robosc_server.outgoing import Outgoing
 from support.small_server import PATIENCE_S, SERVICE, call, logged, small_server
 
 SERVING, NOT_SERVING = health_pb2.HealthCheckResponse.SERVING, health_pb2.HealthCheckResponse.NOT_SERVING
@@ -71,6 +73,22 @@ def test_a_watcher_is_told_each_change_once() -> None:
     limited(run())
 
 
+def test_many_who_watch_keep_nobody_from_watching() -> None:
+    async def run() -> None:
+        health = Health(SERVICES)
+        async with small_server(setup=with_health(health)) as (channel, _):
+            stub = health_pb2_grpc.HealthStub(channel)
+            watches = [stub.Watch(health_pb2.HealthCheckRequest(service="robosc.Works")) for _ in range(300)]
+            assert [(await watch.read()).status for watch in watches] == [NOT_SERVING] * len(watches)
+            health.set_condition("workers", True)
+            assert [(await watch.read()).status for watch in watches] == [SERVING] * len(watches)
+            assert await status(channel, "robosc.Works") == SERVING
+            for watch in watches:
+                watch.cancel()
+
+    limited(run())
+
+
 def test_conditions_are_asked_for_again_and_again_and_who_raises_says_no() -> None:
     is_there: dict[str, bool | Exception] = {"store": True, "workers": True}
 
@@ -126,6 +144,55 @@ def test_draining_says_no_first_then_refuses_and_lets_calls_end() -> None:
             await ending
 
     limited(run())
+
+
+def test_a_large_answer_that_was_sent_is_waited_for() -> None:
+    size = 3_000_000
+
+    async def run() -> None:
+        outgoing, calls, health = Outgoing(size, size), CallInterceptor(Metrics("1")), Health({})
+
+        async def large(request: bytes, context: Any) -> bytes:
+            answer = bytes(size)
+            outgoing.hold(context, (answer,))
+            return answer
+
+        ports: list[int] = []
+
+        def listen(server: grpc.aio.Server) -> None:
+            ports.append(server.add_insecure_port("127.0.0.1:0"))
+
+        async with small_server(interceptors=[calls], unary=large, setup=listen) as (_, server):
+            # More than is taken over the line before somebody reads: the handler is long done by then.
+            options = [("grpc.http2.lookahead_bytes", 65535), ("grpc.http2.bdp_probe", 0)]
+            async with grpc.aio.insecure_channel(f"127.0.0.1:{ports[0]}", options) as slow:
+                method: Any = slow.unary_stream(f"/{SERVICE}/Unary")
+                reader = method(b"")
+                while not outgoing.unread_bytes or calls.under_way():
+                    await asyncio.sleep(0.001)
+                ending = asyncio.create_task(
+                    drain(server, health, calls, PATIENCE_S, unread_bytes=lambda: outgoing.unread_bytes)
+                )
+                # Longer than small answers are given.
+                assert await asyncio.wait([ending], timeout=0.5) == (set(), {ending})
+                assert [len(message) async for message in reader] == [size]
+                await ending
+
+    limited(run())
+
+
+def test_connections_that_grpc_does_not_let_go_of_keep_nobody_from_ending(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(draining, "STOP_S", 0.0)
+
+    class Stuck:
+        """A server whose last connection never ends."""
+
+        async def stop(self, grace: float | None) -> None:
+            await asyncio.Event().wait()
+
+    with logged() as log:
+        limited(drain(Stuck(), Health({}), CallInterceptor(Metrics("1")), 0.0))
+    assert len(log.lines("gRPC does not let go of its connections; they end with the process")) == 1
 
 
 def test_what_does_not_end_is_cancelled_and_what_is_idle_is_not_waited_for() -> None:

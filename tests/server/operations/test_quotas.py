@@ -11,8 +11,8 @@ from robosc_api.security import Quota, Scope, TokenFile, make_token
 from robosc_server.failures import RefusedError
 from robosc_server.jobs.scheduler import QueueLimits, Scheduler
 from robosc_server.operations.quotas import Bucket, Quotas
-from robosc_server.tasks.task import Reason
-from support.job_workers import ScriptedWorkers
+from robosc_server.tasks.task import Reason, Report, TaskLimits
+from support.job_workers import ScriptedWorkers, task_of
 
 
 class Clock:
@@ -27,6 +27,10 @@ def quotas_for(folder: Path, clock: Clock, **quotas: Quota) -> Quotas:
     file.write_text("".join(f"{make_token(name, (Scope.SYNTHESIZE,), quota)[1]}\n" for name, quota in quotas.items()))
     file.chmod(0o600)
     return Quotas(TokenFile(file, clock), clock)
+
+
+async def drop(report: Report) -> None:
+    pass
 
 
 def refused(quotas: Quotas, caller: str) -> RefusedError:
@@ -129,16 +133,29 @@ def test_the_line_before_the_workers_keeps_to_a_tokens_own_bound_and_notes_what_
     quotas = quotas_for(tmp_path, clock, little=Quota(waiting=1), timed=Quota(cpu_seconds_per_hour=60))
 
     async def run() -> None:
-        scheduler = Scheduler(ScriptedWorkers(1), QueueLimits(waiting_per_caller=3), clock, quotas)
+        workers = ScriptedWorkers(1)
+        scheduler = Scheduler(workers, QueueLimits(waiting_per_caller=3), clock, quotas)
         at_work = scheduler.enter("timed")
-        scheduler.enter("little")
+        overtaken = asyncio.create_task(scheduler.run(task_of("a"), "timed", TaskLimits(), drop))
+        little = scheduler.enter("little")
         with pytest.raises(RefusedError, match="too many requests of yours"):
             scheduler.enter("little")
         for _ in range(3):
-            scheduler.enter("anybody")
+            scheduler.leave(scheduler.enter("anybody"))
         quotas.admit("timed")
-        clock.now_s += 90.0
-        scheduler.leave(at_work)
+        # By the clock, nothing passes.
+        await scheduler.work(at_work, task_of("spend 90"), TaskLimits(), drop)
         assert refused(quotas, "timed").retry_after_s == pytest.approx(30 * 60)
+        for place in (little, at_work):
+            scheduler.leave(place)
+        # What was admitted before, and has its turn now, comes too late.
+        with pytest.raises(RefusedError) as caught:
+            await overtaken
+        assert caught.value.reason is Reason.QUOTA_EXCEEDED
+        assert caught.value.retry_after_s == pytest.approx(30 * 60)
+        assert (scheduler.running, scheduler.waiting, workers.begun) == (0, 0, ["spend 90"])
+        clock.now_s += 30 * 60
+        await scheduler.run(task_of("fail CPU_LIMIT\nspend 3"), "timed", TaskLimits(), drop)
+        assert refused(quotas, "timed").retry_after_s == pytest.approx(3 * 60)
 
     asyncio.run(run())

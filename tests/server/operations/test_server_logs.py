@@ -2,6 +2,7 @@
 
 import json
 import logging
+import time
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,16 @@ from robosc_server.failures import for_callers
 from robosc_server.operations.logs import tell_fault
 from robosc_server.operations.request_ids import REQUEST_ID
 from robosc_server.operations.settings import LogFormat, LogLevel
+from robosc_server.operations.worker_words import safe_words
 from robosc_server.tasks.task import Failure, Reason
+from robosc_server.workers.endings import Ending, facts_of
 from support.small_server import logged
 
 MARKER = "a_word_of_the_model"
+_TRACEBACK = (
+    f'Traceback (most recent call last):\n  File "/some/where/robosc_server/tasks/run.py", line 3, in part\n'
+    f"    code({MARKER})\nSyntaxError: {MARKER}\n"
+)
 
 
 def raised() -> ValueError:
@@ -82,14 +89,14 @@ def test_an_exception_is_told_without_its_words_above_debug(form: LogFormat) -> 
             logging.getLogger("others").error("failed", exc_info=raised())
             structlog.get_logger().error("failed", exc_info=raised())
             tell_fault(raised())
-            tell_fault(f'Traceback:\n  File "x.py", line 3, in part\n    code({MARKER})\npart.OddError: {MARKER}\n')
+            tell_fault(_TRACEBACK)
         return log.text
 
     quiet = told(LogLevel.INFO)
     assert MARKER not in quiet
     assert quiet.count("ValueError") == 3
-    assert "part.OddError" in quiet
-    assert "x.py:3 part" in quiet
+    assert "SyntaxError" in quiet
+    assert "robosc_server/tasks/run.py:3" in quiet
     assert MARKER in told(LogLevel.DEBUG)
 
 
@@ -104,13 +111,60 @@ def test_what_the_system_says_is_told() -> None:
 
 def test_how_a_worker_died_is_logged_and_an_exception_in_it_is_not() -> None:
     with logged(LogLevel.INFO) as log:
-        died = for_callers(Failure(Reason.WORKER_DIED, "it died", "ended by signal 11"))
+        facts = facts_of(Ending(-11, 1.5, 2**20))
+        died = for_callers(Failure(Reason.WORKER_DIED, "it died", f"{facts}\nFatal Python error\n{MARKER}"))
         fault = for_callers(Failure(Reason.INTERNAL_FAULT, "a fault", f"Traceback\nKeyError: {MARKER}"))
-    assert "ended by signal 11" in log.text
+    ending = "was ended by SIGSEGV after 1.50 s of a processor's time, with at most 1048576 bytes resident"
+    assert log.lines("fault")[0]["ending"] == ending
     assert MARKER not in log.text
     assert [line["reason"] for line in log.lines("fault")] == ["WORKER_DIED", "INTERNAL_FAULT"]
     for line, error in zip(log.lines("fault"), (died, fault), strict=True):
         assert line["fault"] in error.message
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        f"was ended by SIGSEGV after 1.50 s of a processor's time, with at most 1 bytes resident{MARKER}",
+        f"{MARKER}\nwas ended by SIGSEGV after 1.50 s of a processor's time, with at most 1 bytes resident",
+        f'  File "/x/robosc_server/{MARKER}.py", line 3, in run\n',
+        f'  File "/x/{MARKER}/x.py", line 3, in {MARKER}\n',
+        f'  File "/x/robosc_server/tasks/run.py", line 3, in {MARKER}\n',
+        f'  File "/{MARKER}/robosc_server/tasks/run.py", line 3, in x\n',
+        f"{MARKER}: {MARKER}",
+        f"robosc_server.failures.{MARKER}: no",
+        f"builtins.{MARKER}",
+        MARKER,
+    ],
+)
+@pytest.mark.parametrize("reason", [Reason.WORKER_DIED, Reason.INTERNAL_FAULT])
+def test_workers_can_say_what_they_like_and_nothing_of_it_is_told_above_debug(words: str, reason: Reason) -> None:
+    with logged(LogLevel.INFO) as log:
+        for_callers(Failure(reason, MARKER, words))
+    (line,) = log.lines()
+    assert MARKER not in json.dumps(line)
+    assert line["reason"] == reason
+
+
+@pytest.mark.parametrize("form", list(LogFormat))
+def test_what_workers_say_at_debug_is_one_short_line_without_control(form: LogFormat) -> None:
+    lying = f"KeyError: x\n2026-01-01T00:00:00.000Z error   forged\r\x1b[2J\x85\u2028\x9b2J\u202e{MARKER}"
+    with logged(LogLevel.DEBUG, form) as log:
+        for_callers(Failure(Reason.WORKER_DIED, "it died", lying))
+        for_callers(Failure(Reason.WORKER_DIED, "it died", "\n" * 60_000 + " " * 60_000 + "x" * 60_000 + MARKER))
+    assert len(log.text.splitlines()) == 4
+    assert all(line.isprintable() for line in log.text.splitlines())
+    assert log.text.count(MARKER) == 2
+    assert len(log.text) < 30_000
+
+
+@pytest.mark.parametrize(
+    "words", ["\n" * 60_000, " " * 60_000, '  File "' * 8_000, "a." * 30_000, '  File "/robosc/' * 4_000]
+)
+def test_a_workers_words_are_looked_through_in_no_time(words: str) -> None:
+    begun_s = time.process_time()
+    safe_words(words)
+    assert time.process_time() - begun_s < 1.0
 
 
 def test_set_up_twice_each_line_is_written_once() -> None:

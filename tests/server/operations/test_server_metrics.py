@@ -150,7 +150,7 @@ def test_tasks_are_counted_by_how_they_ended() -> None:
     class Scripted:
         capacity = 1
 
-        async def run(self, task: Task, limits: TaskLimits, on_report: object) -> Outcome:
+        async def run(self, task: Task, limits: TaskLimits, on_report: object, on_spent: object = None) -> Outcome:
             assert observed.running == 1
             match task.request:
                 case b"result":

@@ -1,6 +1,7 @@
 """Workers of a real Dask cluster: a scheduler and workers as processes, which are lost and come back."""
 
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -9,14 +10,17 @@ from concurrent.futures import CancelledError, Future
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import hypothesis.strategies as st
 import pytest
 from hypothesis import given
 
+from robosc import __version__
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, TaskKind, TaskLimits
-from robosc_server.workers import WorkersError
+from robosc_server.workers import WorkersError, dask_task
 from robosc_server.workers.dask_cluster import DaskWorkers
+from robosc_server.workers.dask_spending import Spending
 from robosc_server.workers.dask_task import answer, outcome_of
 from robosc_server.workers.frames import FrameError
 from robosc_server.workers.local import LocalWorkers
@@ -36,6 +40,7 @@ class Running:
     def __init__(self, loop: BackgroundLoop, workers: DaskWorkers) -> None:
         self.workers = workers
         self._loop = loop
+        self.spent: list[float] = []
 
     def start(self, text: str, limits: TaskLimits = LIMITS, kind: TaskKind = TaskKind.CHECK) -> Future[Outcome]:
         self.reports: list[Report] = []
@@ -44,7 +49,7 @@ class Running:
         async def note(report: Report) -> None:
             reports.append(report)
 
-        return self._loop.start(self.workers.run(fake_task(text, kind), limits, note))
+        return self._loop.start(self.workers.run(fake_task(text, kind), limits, note, self.spent.append))
 
     def run(self, text: str, limits: TaskLimits = LIMITS) -> Outcome:
         return self.start(text, limits).result(60)
@@ -58,6 +63,32 @@ class Running:
         """A task under way, and the number of its process."""
         future = self.start(f"pid\n{text}")
         return future, self.next_pid(1)
+
+    def holder(self, cluster: Cluster) -> "subprocess.Popen[bytes]":
+        """The Dask worker that a task was handed to; it need not have begun it."""
+        found: list[subprocess.Popen[bytes]] = []
+
+        def is_handed() -> bool:
+            client = self.workers._client
+            if client is not None:
+                handed = self._ask(client.processing)
+                holders = {self.pids[address] for address, tasks in handed.items() if tasks}
+                # For a moment the scheduler still counts on one that was killed.
+                found[:] = [worker for worker in cluster.workers if worker.pid in holders]
+            return bool(found)
+
+        assert eventually(is_handed)
+        return found[0]
+
+    def note_pids(self) -> None:
+        """Learn which process each Dask worker is."""
+        self.pids: dict[str, int] = dict(self._ask(self.workers._client.run, os.getpid))
+
+    def _ask(self, question: Callable[..., Any], *words: Any) -> Any:
+        async def answer() -> Any:
+            return await question(*words)
+
+        return self._loop.run(answer())
 
     def next_pid(self, count: int) -> int:
         """The number of the process that is at the task the so-manieth time."""
@@ -103,10 +134,10 @@ class TestTasks:
         assert running.reports == [Report("synthesis", f"step {number}") for number in range(3)]
 
     def test_the_last_of_very_many_reports_are_told(self, running: Running) -> None:
-        future = running.start("reports 5000\nsleep 0.3\necho done")
+        future = running.start("reports 900\nsleep 0.3\necho done")
         assert said(future.result(60)) == "done"
-        assert running.reports[-1] == Report("synthesis", "step 4999")
-        assert len(running.reports) < 1000
+        assert running.reports[-1] == Report("synthesis", "step 899")
+        assert len(running.reports) < 500
 
     @pytest.mark.parametrize("kind", [TaskKind.SYNTHESIZE, TaskKind.FORMAT])
     def test_kinds_reach_the_function(self, running: Running, kind: TaskKind) -> None:
@@ -120,6 +151,19 @@ class TestTasks:
         assert running.failure("spin", replace(LIMITS, cpu_seconds=0.1)).reason is Reason.CPU_LIMIT
         assert running.failure("stop", replace(LIMITS, seconds=0.2)).reason is Reason.TIME_LIMIT
         assert running.failure("size 1000000").reason is Reason.RESULT_TOO_LARGE
+
+    def test_what_tasks_take_of_processors_is_told_however_they_end(self, running: Running) -> None:
+        for text in ("work 0.4", "work 0.4\ndie 9", "work 0.4\npid\nsleep 600"):
+            running.spent = []
+            future = running.start(text)
+            if "sleep" in text:
+                running.next_pid(1)
+                future.cancel()
+            else:
+                future.result(60)
+            assert eventually(lambda: bool(running.spent))
+            assert 0.4 <= running.spent[0] < 5.0
+            assert len(running.spent) == 1
 
     def test_deaths_and_faults_are_told_there_as_well(self, running: Running) -> None:
         failure = running.failure("die 11")
@@ -228,6 +272,46 @@ def test_losses(tmp_path: Path) -> None:
         assert running.workers.fault == ""
 
 
+def test_workers_that_are_lost_before_they_begin_are_not_the_tasks_fault(tmp_path: Path) -> None:
+    # The scheduler itself does not try again.
+    patience = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0"}
+    with (
+        dask_cluster(tmp_path, workers=3, environment=patience) as cluster,
+        running_on(cluster.address, 3) as running,
+    ):
+
+        def stop_all() -> None:
+            """They take tasks, and do not begin them."""
+            running.note_pids()
+            for worker in cluster.workers:
+                worker.send_signal(signal.SIGSTOP)
+
+        def lose_holder() -> None:
+            worker = running.holder(cluster)
+            kill(worker)
+            cluster.workers.remove(worker)
+
+        stop_all()
+        future = running.start("echo at last")
+        for _ in range(2):
+            lose_holder()
+        (last,) = cluster.workers
+        assert running.holder(cluster) is last
+        last.send_signal(signal.SIGCONT)
+        assert said(future.result(60)) == "at last"
+
+        for _ in range(2):
+            cluster.start_worker()
+        assert eventually(lambda: running.workers.capacity == 3)
+        stop_all()
+        future = running.start("echo never")
+        for _ in range(3):
+            lose_holder()
+        with pytest.raises(WorkersError, match="loses its workers before they begin a task"):
+            future.result(60)
+        assert running.reports == []
+
+
 def test_a_cluster_that_is_away_is_waited_for(tmp_path: Path) -> None:
     cluster = Cluster(tmp_path)
     told = f"the Dask scheduler at {cluster.address} cannot be reached"
@@ -262,11 +346,46 @@ def test_nobody_loads_dask_who_does_not_ask_for_it() -> None:
 def test_workers_are_opened_by_what_the_operator_writes() -> None:
     assert isinstance(open_workers("local", 3), LocalWorkers)
     assert open_workers("local", 3).capacity == 3
-    for spec in ("dask://cluster.example:8786", "dask://[::1]:8786", "dask+tls://10.0.0.1:1/"):
+    for spec in ("dask://cluster.example:8786", "dask://[::1]:8786"):
         assert isinstance(open_workers(spec, 1), DaskWorkers)
+    with pytest.raises(WorkersError, match="workers on dask\\+tls:// need Dask's settings"):
+        open_workers("dask+tls://10.0.0.1:1/", 1)
     for spec in ("", "Local", "dask://", "dask://host", "tcp://host:1", "dask://host:1/x", "dask://user@host:1"):
         with pytest.raises(ValueError, match="workers are 'local'"):
             open_workers(spec, 1)
+
+
+def test_what_lost_workers_took_counts_by_the_clock() -> None:
+    def begun(worker: str) -> dict[str, object]:
+        return {"is": "begun", "task": "t", "worker": worker}
+
+    def told(worker: str, cpu_s: object) -> dict[str, object]:
+        return {"is": "spent", "task": "t", "worker": worker, "cpu_s": cpu_s}
+
+    spent: list[float] = []
+    now_s = 10.0
+    spending = Spending(spent.append, lambda: now_s)
+    spending.hear({"is": "reports", "task": "t", "reports": []})
+    spending.hear(begun("a"))
+    # Another one begins: the first one was lost, and is not believed any more.
+    now_s = 13.0
+    spending.hear(begun("b"))
+    spending.hear(told("a", 1.0))
+    assert spent == [3.0]
+    for nonsense in (-1.0, float("nan"), float("inf"), "7", None):
+        spending.hear(told("b", nonsense))
+    spending.hear(told("b", 0.25))
+    spending.hear(told("b", 0.25))
+    assert spent == [3.0, 0.25]
+    # It is given up, and what the last worker has to tell never comes.
+    now_s = 20.0
+    spending.hear(begun("c"))
+    now_s = 21.5
+    spending.stop()
+    now_s = 30.0
+    spending.settle()
+    spending.settle()
+    assert spent == [3.0, 0.25, 1.5]
 
 
 @given(st.lists(st.binary(max_size=50), min_size=1, max_size=5) | st.text())
@@ -283,3 +402,29 @@ def test_answers_travel_as_bytes(said: list[bytes] | str) -> None:
 def test_bytes_that_are_no_answer_are_one_kind_of_error(content: bytes) -> None:
     with pytest.raises(FrameError):
         outcome_of(content, LIMITS)
+
+
+def test_a_fault_of_ours_on_the_cluster_is_an_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Worker:
+        address = "tcp://192.0.2.1:1"
+
+        def get_current_task(self) -> str:
+            return "name"
+
+        def log_event(self, topic: str, event: object) -> None:
+            """Nobody listens."""
+
+    def broken(*arguments: object, **options: object) -> None:
+        raise ValueError("on purpose")
+
+    monkeypatch.setattr(dask_task, "get_worker", Worker)
+    monkeypatch.setattr(dask_task, "run_isolated", broken)
+    values = (1.0, 1.0, 2**30, 1000, 1000)
+    content = dask_task.run_on_cluster(
+        __version__, TASK_FUNCTION, False, "topic", "check", b"", ("0" * 64, "main"), values
+    )
+    assert content.startswith(dask_task.ANSWER)
+    outcome = dask_task.outcome_of(content.removeprefix(dask_task.ANSWER), TaskLimits())
+    assert isinstance(outcome, Failure)
+    assert outcome.reason is Reason.INTERNAL_FAULT
+    assert "ValueError: on purpose" in outcome.details

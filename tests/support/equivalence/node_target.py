@@ -59,8 +59,8 @@ class Surroundings(Protocol):
 class TickingSurroundings(Surroundings, Protocol):
     """Those of a node that decides by its own timer."""
 
-    def wait_for_ticks(self, count: int) -> None:
-        """Wait until the timer has ticked so often."""
+    def wait_for_tick(self) -> None:
+        """Wait until the timer has ticked after this call: what had ticked before may still be told."""
 
 
 def timed_log(surroundings: TickingSurroundings, scenario: Scenario, folder: Path, model: Model) -> list[Entry]:
@@ -83,8 +83,7 @@ def timed_log(surroundings: TickingSurroundings, scenario: Scenario, folder: Pat
                 surroundings.spin()
                 target._look()
                 log = target._log
-            # The first of them may have been on its way already.
-            surroundings.wait_for_ticks(2)
+            surroundings.wait_for_tick()
         log = list(target.close().log)
     finally:
         surroundings.close()

@@ -4,6 +4,7 @@ import re
 import signal
 import time
 import xmlrpc.client
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -55,6 +56,8 @@ class Ros1Surroundings:
         self._caller: Ros1Caller | None = None
         # How much of what the peer was sent is taken, by kind and name.
         self._taken: dict[tuple[str, str], int] = {}
+        # How many goals have ended, by the name of the action on ROS.
+        self._ended: Counter[str] = Counter()
 
     def start(self, scenario: Scenario, folder: Path) -> None:
         """Start node and surroundings."""
@@ -111,11 +114,23 @@ class Ros1Surroundings:
 
     def _connections(self) -> set[str]:
         """The topics on which the node has somebody to send to, as it says itself."""
+        # Of each: number, the other end, direction, transport, topic.
+        return {item[4] for item in _answer(self._ask_node("getBusInfo")) if item[2] == "o"}
+
+    def _has_heard_ends(self) -> bool:
+        """Whether the node has received the results of all goals that have ended, as it says itself."""
+        found = self._ask_node("getBusStats")
+        # What it sent and what it received; roscpp says so without a code and words. Of each topic its connections,
+        # and of each of these: number, bytes, messages, what was dropped.
+        received = (found if isinstance(found[0], list) else _answer(found))[1]
+        heard = {topic: sum(connection[2] for connection in connections) for topic, connections in received}
+        return all(heard.get(f"{name}/result", 0) >= count for name, count in self._ended.items())
+
+    def _ask_node(self, method: str) -> Any:
         with xmlrpc.client.ServerProxy(self._master.variables["ROS_MASTER_URI"]) as master:
             uri: Any = _answer(master.lookupNode("/test", f"/{self._name}"))
         with xmlrpc.client.ServerProxy(uri) as node:
-            # Of each: number, the other end, direction, transport, topic.
-            return {item[4] for item in _answer(node.getBusInfo("/test")) if item[2] == "o"}
+            return getattr(node, method)("/test")
 
     def send(self, topic: str, data: Any) -> None:
         """Publish."""
@@ -125,6 +140,8 @@ class Ros1Surroundings:
     def answer(self, action: Action) -> None:
         """Let a server do it."""
         name = self._servers[action.subject]
+        if action.do == "end":
+            self._ended[name] += 1
         match action.do:
             case "reply":
                 self._peer.do("answer", name=name, message=_fields(action.data))
@@ -167,7 +184,11 @@ class Ros1Surroundings:
         return values[before:]
 
     def settle(self) -> None:
-        """Nothing: what does not show is the acceptance of a goal, and actionlib takes what follows without it, too."""
+        """Wait for the end of a cancelled goal: the next one may come only then, and other messages do not wait for it.
+
+        The acceptance of a goal does not show, either, and actionlib takes what follows without it, too.
+        """
+        until(self._has_heard_ends, "the ends of goals", self._node)
 
     def spin(self) -> None:
         """For a moment: the peer is a process of its own."""

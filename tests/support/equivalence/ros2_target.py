@@ -2,6 +2,7 @@
 
 import json
 import signal
+import time
 from array import array
 from contextlib import ExitStack
 from pathlib import Path
@@ -43,9 +44,9 @@ class Ros2Surroundings:
         self._actions: dict[str, HeldAction] = {}
         self._seen: dict[str, int] = {}
         self._cancelled: dict[str, int] = {}
-        self._settled: Any = None
         self._is_layer = supervisor.deployment is Deployment.LAYER
         self._caller: Ros2Caller | None = None
+        self._ticked_ns = 0
 
     def start(self, scenario: Scenario, folder: Path) -> None:
         """Start node and surroundings."""
@@ -60,7 +61,7 @@ class Ros2Surroundings:
         from diagnostic_msgs.msg import DiagnosticArray
         from std_msgs.msg import String
 
-        self._states = self._peer.receive(String, "/state")
+        self._peer.node.create_subscription(String, "/state", self._note_tick, _DEPTH)
         reports = self._peer.receive(DiagnosticArray, "/diagnostics")
         parameters = folder.parent / "parameters.yaml"
         parameters.write_text(json.dumps({"/**": {"ros__parameters": _parameters(scenario, folder, self._is_layer)}}))
@@ -122,10 +123,13 @@ class Ros2Surroundings:
         _fill(message, data)
         self._peer.publish(message, topic)
 
-    def wait_for_ticks(self, count: int) -> None:
-        """Wait until the node's own timer has ticked: it tells its state each time."""
-        seen = len(self._states)
-        self._peer.spin_until(lambda: len(self._states) >= seen + count, LIMIT_S, "ticks of the node", self._node)
+    def _note_tick(self, _: Any, information: Any) -> None:
+        self._ticked_ns = information["source_timestamp"]
+
+    def wait_for_tick(self) -> None:
+        """Wait until the node's own timer has ticked: it tells its state each time, and the middleware when it did."""
+        now_ns = time.time_ns()
+        self._peer.spin_until(lambda: self._ticked_ns > now_ns, LIMIT_S, "a tick of the node", self._node)
 
     def answer(self, action: Action) -> None:
         """Let a server do it."""
@@ -174,21 +178,8 @@ class Ros2Surroundings:
         return found
 
     def settle(self) -> None:
-        """Two questions to the node, one after the other: between the answers it has looked at all that came."""
-        from rcl_interfaces.srv import GetParameters
-
-        if self._settled is None:
-            name = self._model_node()
-            self._settled = self._peer.node.create_client(GetParameters, f"{name}/get_parameters")
-            self._peer.spin_until(self._settled.service_is_ready, LIMIT_S, "the node's parameters", self._node)
-        for _ in range(2):
-            future = self._settled.call_async(GetParameters.Request(names=["period"]))
-            self._peer.spin_until(future.done, LIMIT_S, "an answer of the node", self._node)
-
-    def _model_node(self) -> str:
-        own = {"test_peer", "test_servers"}
-        (name,) = [name for name in self._peer.node.get_node_names() if name not in own]
-        return f"/{name}"
+        """See `Peer.settle`."""
+        self._peer.settle(self._node, LIMIT_S)
 
     def spin(self) -> None:
         """For a moment."""

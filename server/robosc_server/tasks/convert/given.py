@@ -6,6 +6,7 @@ from robosc.model.structure import Deployment
 from robosc.source import Bundle, SourceFile
 from robosc.synthesis import EngineOptions
 from robosc.targets import GenerateOptions, SupervisedController
+from robosc.verification import DEFAULT_STATES
 from robosc_api.v1 import synthesis_pb2 as pb
 
 
@@ -49,6 +50,11 @@ def engine(options: pb.SynthesisOptions, maximum_nodes: int) -> EngineOptions:
     """How decision diagrams are made, with no more nodes than `maximum_nodes`."""
     nodes = min(options.maximum_nodes or maximum_nodes, maximum_nodes)
     return EngineOptions(engine_name(options), options.allow_reordering, nodes)
+
+
+def verified_states(options: pb.SynthesisOptions) -> int:
+    """States up to which a supervisor that is made is verified one by one."""
+    return options.verified_states if options.HasField("verified_states") else DEFAULT_STATES
 
 
 def generation(options: pb.GenerateOptions) -> GenerateOptions:

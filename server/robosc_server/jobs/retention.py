@@ -1,0 +1,84 @@
+"""How long jobs and results are kept, and how much of them."""
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import Mapping
+
+from robosc_server.failures import RefusedError
+from robosc_server.jobs.limits import JobLimits
+from robosc_server.store import JobState, Store, StoreUnavailableError
+from robosc_server.tasks.task import Reason, Result
+
+_log = logging.getLogger(__name__)
+
+_SHORTEST_PAUSE_S = 1.0
+"""Between two sweeps, also where the second is asked for."""
+
+
+class Retention:
+    """Deletes what need not be kept any more, and knows how much there is.
+
+    Args:
+        store: The database.
+        limits: What jobs may take.
+
+    Attributes:
+        counts: How many jobs the database has in each state, as of the last sweep.
+    """
+
+    def __init__(self, store: Store, limits: JobLimits) -> None:
+        self._store, self._limits = store, limits
+        self._needed_bytes = 0
+        self._is_wanted = asyncio.Event()
+        self.counts: Mapping[JobState, int] = dict.fromkeys(JobState, 0)
+
+    def kept_us(self, asked_s: float | None) -> int:
+        """How long a job is kept after its end, in microseconds.
+
+        Args:
+            asked_s: Seconds that were asked for; None, or too long: as long as jobs are kept.
+        """
+        longest_s = self._limits.retention_s
+        return round((longest_s if asked_s is None else min(asked_s, longest_s)) * 1e6)
+
+    def admit(self) -> None:
+        """See whether there is room for the result of one more job.
+
+        Raises:
+            RefusedError: There is none.
+        """
+        if self._needed_bytes >= self._limits.results_bytes:
+            # At once: whoever fills what was freed has others refused for a moment, not until the next round.
+            self._is_wanted.set()
+            message = "the server keeps as many results of jobs as it may; try again when it has made room"
+            raise RefusedError(Reason.SERVER_BUSY, message, retry_after_s=2 * _SHORTEST_PAUSE_S)
+
+    def too_many(self) -> RefusedError:
+        """What is told to a caller who has as many jobs as it may, none of which has ended."""
+        message = f"{self._limits.jobs_per_owner} jobs of yours have not ended; try again when some have"
+        return RefusedError(Reason.QUOTA_EXCEEDED, message, retry_after_s=self._limits.sweep_s)
+
+    def note(self, result: Result) -> None:
+        """A job has a result more."""
+        self._needed_bytes += sum(map(len, result.messages))
+
+    async def sweep_often(self) -> None:
+        """Sweep now and then, and when there is no room, for ever."""
+        while True:
+            self._is_wanted.clear()
+            try:
+                await self.sweep()
+            except StoreUnavailableError:
+                pass  # It is tried again.
+            except Exception:
+                _log.exception("what has expired cannot be deleted")
+            await asyncio.sleep(min(_SHORTEST_PAUSE_S, self._limits.sweep_s))
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._is_wanted.wait(), max(0.0, self._limits.sweep_s - _SHORTEST_PAUSE_S))
+
+    async def sweep(self) -> None:
+        """Delete what need not be kept any more; called now and then."""
+        await self._store.sweep(self._limits.results_bytes)
+        self._needed_bytes = await self._store.size_of_needed()
+        self.counts = await self._store.counts_by_state()

@@ -1,0 +1,79 @@
+"""That a server which is told to end does end: once more at once, and in any case before long.
+
+Nothing is lost by an end that is forced: what was accepted is on disk, and workers go with the server.
+"""
+
+import asyncio
+import faulthandler
+import logging
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+_log = logging.getLogger(__name__)
+
+END_S = 20.0
+"""How long the end may take beside what calls under way are given: mostly for a database that does not answer."""
+
+_TOLD_BEFORE_S = 0.5
+_BY_SIGNAL = 128
+
+
+class Ending:
+    """What the signals to end mean; to be used in the main thread.
+
+    Args:
+        drain_s: How long calls under way are given.
+    """
+
+    def __init__(self, drain_s: float) -> None:
+        self._limit_s = drain_s + END_S
+        self._is_wanted = asyncio.Event()
+        self._interrupts = 0
+        # Without a standard error, nobody is told of what hangs; it ends all the same.
+        self._stderr = sys.__stderr__ or os.open(os.devnull, os.O_WRONLY)
+
+    def listen(self) -> None:
+        """Heed signals from now on, on the event loop that runs."""
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGTERM, signal.SIGINT):
+            loop.add_signal_handler(number, self._told, number)
+
+    async def wanted(self) -> None:
+        """Return when the server is to end: by itself from then on, but not for longer than its limit."""
+        await self._is_wanted.wait()
+
+    def over(self) -> None:
+        """It has ended."""
+        faulthandler.cancel_dump_traceback_later()
+
+    def _told(self, number: int) -> None:
+        if not self._is_wanted.is_set():
+            self._is_wanted.set()
+            loop = asyncio.get_running_loop()
+            loop.call_later(max(0.0, self._limit_s - _TOLD_BEFORE_S), _tell_tasks)
+            # A thread of its own that needs nothing of the interpreter: whatever hangs, it ends the process.
+            faulthandler.dump_traceback_later(self._limit_s, exit=True, file=self._stderr)
+        self._interrupts += number == signal.SIGINT
+        if self._interrupts > 1:
+            # Somebody at a terminal who does not want to wait.
+            _log.warning("ended at once, by a second interrupt")
+            os._exit(_BY_SIGNAL + number)
+
+
+def _tell_tasks() -> None:
+    """Log where everything waits that has not ended, by places in the code alone."""
+    for task in asyncio.all_tasks():
+        _log.error("the server does not end: %s waits at %s", task.get_name(), " < ".join(_places(task.get_coro())))
+
+
+def _places(waiting: Any) -> Iterator[str]:
+    """Where a coroutine stands, and each that it waits for, the outermost first."""
+    while waiting is not None:
+        frame = getattr(waiting, "cr_frame", None) or getattr(waiting, "gi_frame", None)
+        if frame is not None:
+            yield f"{Path(frame.f_code.co_filename).name}:{frame.f_lineno}"
+        waiting = getattr(waiting, "cr_await", None) or getattr(waiting, "gi_yieldfrom", None)

@@ -1,0 +1,125 @@
+"""How many calls a caller has open at once, those that only watch included, so that others find a place."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from robosc_api.layers import Layer, behaviour_of, with_behaviour
+from robosc_api.security import ENTRY, caller_of, is_loopback_peer, network_of
+from robosc_server.failures import RefusedError
+from robosc_server.tasks.task import Reason
+
+HEALTH_CALLS = 1000
+"""Health checks that are open at once, from this machine and from elsewhere: they need no token, and so have places of
+their own."""
+
+HEALTH_CALLS_PER_CALLER = 50
+"""More than probes, and channels that watch."""
+
+_HEALTH = "/grpc.health."
+_RETRY_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class CallLimits:
+    """What may be open at once.
+
+    Attributes:
+        calls: Of all callers.
+        per_caller: Of one caller, unless its token says otherwise.
+    """
+
+    calls: int
+    per_caller: int
+
+
+class OpenCalls(Layer):
+    """Counts them, and refuses those beyond. Behind the guard, which tells whose they are, and before any wait.
+
+    Never the outermost layer: what it gives is for others to call.
+
+    Args:
+        limits: Health checks aside.
+        identify: Who is behind the call of a context.
+        health: Of health checks.
+    """
+
+    def __init__(
+        self,
+        limits: CallLimits,
+        identify: Callable[[Any], str] = caller_of,
+        health: CallLimits = CallLimits(HEALTH_CALLS, HEALTH_CALLS_PER_CALLER),
+    ) -> None:
+        super().__init__()
+        self._identify = identify
+        self._places, self._health_places = _Places(limits), _Places(health)
+        # Of whoever looks after this machine, whom nobody from elsewhere can crowd out.
+        self._own_health_places = _Places(health)
+
+    @property
+    def count(self) -> int:
+        """Calls that are open, health checks aside."""
+        return self._places.taken
+
+    def around(self, inner: Any, method: str) -> Any:
+        """A handler behind a look at how many calls there are."""
+        behaviour = behaviour_of(inner)
+        identify, places = self._identify, self._places
+
+        # They give what the handler gives, and are none: one more coroutine would cost every call some time.
+        def counted(request: Any, context: Any) -> Any:
+            places.take(network_of(identify(context)), context)
+            return behaviour(request, context)
+
+        def counted_apart(request: Any, context: Any) -> Any:
+            is_own = is_loopback_peer(context.peer())
+            places = self._own_health_places if is_own else self._health_places
+            places.take(network_of(identify(context)), context)
+            return behaviour(request, context)
+
+        return with_behaviour(inner, counted_apart if method.startswith(_HEALTH) else counted)
+
+
+class _Places:
+    """For the calls of some methods.
+
+    Attributes:
+        taken: How many are taken.
+    """
+
+    def __init__(self, limits: CallLimits) -> None:
+        self._limits = limits
+        self._by_caller: dict[str, int] = {}
+        self.taken = 0
+
+    def take(self, caller: str, context: Any) -> None:
+        """Take one, until the call is over.
+
+        Args:
+            caller: Whose it is.
+            context: Of the call.
+
+        Raises:
+            RefusedError: There is none for this caller; none is taken.
+        """
+        count = self._by_caller.get(caller, 0)
+        entry = ENTRY.get()
+        limit = self._limits.per_caller if entry is None or entry.quota.calls is None else entry.quota.calls
+        if count >= limit:
+            message = f"a caller may have {limit} calls open at once, watches included"
+            raise RefusedError(Reason.QUOTA_EXCEEDED, message, _RETRY_S)
+        if self.taken >= self._limits.calls:
+            raise RefusedError(Reason.SERVER_BUSY, "as many calls are open as this server has places for", _RETRY_S)
+        self._by_caller[caller] = count + 1
+        self.taken += 1
+        # When the call is over for gRPC, too: whoever reads no answer holds it when the handler has long ended.
+        context.add_done_callback(partial(self._give_back, caller))
+
+    def _give_back(self, caller: str, context: Any) -> None:
+        self.taken -= 1
+        left = self._by_caller[caller] - 1
+        if left:
+            self._by_caller[caller] = left
+        else:
+            del self._by_caller[caller]

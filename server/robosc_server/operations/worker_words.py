@@ -1,0 +1,68 @@
+"""What may be logged of the words in which a worker tells how it failed.
+
+A worker has handled a stranger's model, and may say anything: what looks like a traceback may quote the model, or be
+made up. Above the level debug only such words are told as this server could have written itself: how a process ended,
+in a fixed form, names of exceptions that there are, and places in RoboSC's own code.
+"""
+
+import builtins
+import re
+import sys
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from robosc_server.workers.endings import FACTS
+
+_PLACES = 12
+_LINES = 500
+_LINE_CHARACTERS = 1000
+_WORDS = 20_000
+_PACKAGES = ("robosc", "robosc_api", "robosc_server")
+_PLACE = re.compile(r' {2}File "(?:[^"]*/)?((?:robosc|robosc_api|robosc_server)/[a-z0-9_/]+\.py)", line (\d{1,6}), in ')
+_KIND = re.compile(r"([A-Za-z_][A-Za-z0-9_.]{0,100})(?::.*)?")
+
+
+def safe_words(words: str) -> dict[str, object]:
+    """What of a worker's words holds nothing of a model, as fields of a line of the log.
+
+    Args:
+        words: Such as a traceback, or the facts of `workers.endings`.
+    """
+    lines = [line[:_LINE_CHARACTERS] for line in words.split("\n")]
+    told: dict[str, object] = {}
+    if FACTS.fullmatch(lines[0]):
+        told["ending"] = lines[0]
+    lines = lines[-_LINES:]
+    kinds = [match[1] for line in lines if (match := _KIND.fullmatch(line)) and _is_exception(match[1])]
+    if kinds:
+        told["error"] = kinds[-1]
+    found = [match for line in lines if (match := _PLACE.match(line))][-_PLACES:]
+    places = [f"{match[1]}:{match[2]}" for match in found if _is_ours(match[1])]
+    if places:
+        told["places"] = places
+    return told
+
+
+def bounded(words: str) -> str:
+    """The end of a worker's words, where a traceback has the fault; for the level debug."""
+    return words if len(words) <= _WORDS else f"[...]{words[-_WORDS:]}"
+
+
+def _is_exception(name: str) -> bool:
+    module, _, kind = name.rpartition(".")
+    if not module:
+        found: Any = getattr(builtins, kind, None)
+    else:
+        found = getattr(sys.modules.get(module), kind, None) if module.partition(".")[0] in _PACKAGES else None
+    return isinstance(found, type) and issubclass(found, BaseException)
+
+
+@cache
+def _folder(package: str) -> Path:
+    return Path(str(sys.modules[package].__file__)).parent
+
+
+def _is_ours(file: str) -> bool:
+    package, _, rest = file.partition("/")
+    return package in sys.modules and (_folder(package) / rest).is_file()

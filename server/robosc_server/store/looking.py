@@ -1,0 +1,67 @@
+"""Looks whether a server of this version could use a database, and makes or changes nothing there."""
+
+from pathlib import Path
+
+from sqlalchemy import URL, Engine, create_engine, text
+from sqlalchemy.exc import DBAPIError
+from sqlalchemy.pool import NullPool
+
+from robosc_server.store.errors import StoreError
+from robosc_server.store.schema import version_of
+
+_BUSY_S = 1.0
+
+
+def look_at_sqlite(file: Path) -> None:
+    """Look at a file that is there; a server may have it open.
+
+    Raises:
+        StoreError: It is no database that a server of this version can use.
+    """
+    # Whoever reads a database with a log of changes makes the files that readers and writers share, and cannot delete
+    # them again without the right to write. Where no log is, nobody is at it, and the file alone is all there is.
+    has_log = _has_content(file.with_name(f"{file.name}-wal"))
+    options = {"uri": "true", "mode": "ro"} | ({} if has_log else {"immutable": "1"})
+    url = URL.create("sqlite+pysqlite", database=file.as_uri(), query=options)
+    _look(create_engine(url, poolclass=NullPool, connect_args={"timeout": _BUSY_S}))
+
+
+def look_at_postgresql(url: URL, connect_s: float) -> str:
+    """Look at a database of a server that is asked; its version.
+
+    Args:
+        url: Of the database.
+        connect_s: How long a connection may take.
+
+    Raises:
+        StoreError: It cannot be reached, or is none that a server of this version can use.
+        ImportError: The driver is missing.
+        NoSuchModuleError: The driver is missing.
+    """
+    engine = create_engine(
+        url.set(drivername="postgresql+psycopg"),
+        poolclass=NullPool,
+        connect_args={"connect_timeout": round(connect_s)},
+        hide_parameters=True,
+    )
+    return _look(engine, "SHOW server_version")
+
+
+def _look(engine: Engine, question: str = "SELECT sqlite_version()") -> str:
+    """What a database answers to a question, if its tables are missing or ours."""
+    try:
+        with engine.connect() as connection:
+            answer = str(connection.scalar(text(question)))
+            version_of(connection)
+    except DBAPIError as error:
+        raise StoreError(" ".join(str(error.orig).split())) from error
+    finally:
+        engine.dispose()
+    return answer
+
+
+def _has_content(file: Path) -> bool:
+    try:
+        return file.stat().st_size > 0
+    except FileNotFoundError:
+        return False

@@ -1,0 +1,71 @@
+"""TLS to a Dask scheduler: what Dask's own settings say of it, and in one sentence what is wrong with it.
+
+Dask tells an expired certificate like a wrong one, and a certificate of ours that the scheduler refuses as a connection
+that took too long.
+"""
+
+import asyncio
+import contextlib
+import ssl
+from typing import Any
+
+from distributed.security import Security
+
+from robosc_server.workers import WorkersError
+
+_SETTINGS = "DASK_DISTRIBUTED__COMM__TLS__CA_FILE, …__TLS__CLIENT__CERT and …__TLS__CLIENT__KEY"
+
+
+def client_context() -> ssl.SSLContext:
+    """How this server shows who it is to a scheduler, and knows the scheduler by; read from the files each time.
+
+    Raises:
+        WorkersError: Dask's settings do not say so, or a file of theirs cannot be used.
+    """
+    settings: Any = Security()  # type: ignore[no-untyped-call]
+    try:
+        context = settings.get_connection_args("client")["ssl_context"]
+    except (OSError, ValueError) as error:  # An SSLError is an OSError.
+        files = settings.get_tls_config_for_role("client")
+        named = ", ".join(str(files[kind]) for kind in ("ca_file", "cert", "key") if files[kind])
+        raise WorkersError(f"the certificates for the Dask cluster cannot be used ({named}): {error}") from error
+    if not isinstance(context, ssl.SSLContext):
+        raise WorkersError(f"workers on dask+tls:// need Dask's settings {_SETTINGS}")
+    return context
+
+
+async def tls_fault(host: str, port: int, limit_s: float) -> str | None:
+    """Why there is no TLS with a scheduler; None: there is, or nobody is there at all.
+
+    Args:
+        host: Its host.
+        port: Its port.
+        limit_s: How long that may take.
+    """
+    try:
+        context = client_context()
+    except WorkersError as error:
+        return str(error)
+    writer = None
+    try:
+        async with asyncio.timeout(limit_s):
+            reader, writer = await asyncio.open_connection(host, port, ssl=context)
+            # A scheduler speaks first. Whether it takes our certificate is known no sooner (RFC 8446, section 2).
+            await reader.read(1)
+    except ssl.SSLCertVerificationError as error:
+        return f"its certificate is not accepted: {error.verify_message}"
+    except ssl.SSLError as error:
+        return f"TLS fails: {_words(error)}"
+    except OSError:  # A TimeoutError is one.
+        return None
+    finally:
+        if writer is not None:
+            writer.transport.abort()
+            with contextlib.suppress(OSError):
+                await writer.wait_closed()
+    return None
+
+
+def _words(error: ssl.SSLError) -> str:
+    """What OpenSSL says, such as `tlsv1 alert unknown ca`."""
+    return (error.reason or str(error)).replace("_", " ").lower()

@@ -1,0 +1,114 @@
+"""What a worker is kept from, should a model ever bring it to run somebody else's program: nearly everything.
+
+The limits of `confinement` bound what a task takes; this bounds what its process can reach. Each part is held by the
+kernel, for any user, and cannot be given up again. A kernel may lack a part, or whoever runs the server's container may
+forbid it: the others hold all the same, and what is missing is told.
+"""
+
+import contextlib
+import json
+import os
+import sys
+from collections.abc import Callable, Set
+
+from robosc_server.workers import kernel
+from robosc_server.workers.file_access import FileRules, program_places
+from robosc_server.workers.system_calls import prepare_filter, restrict_system_calls
+
+_STANDARD_ERROR = 2
+_HIGHEST_DESCRIPTOR = 2**31 - 1
+_TOLD_BYTES = 1000
+_KILLED = "who tries it is ended"
+
+
+class SandboxError(Exception):
+    """A part that could be had when it was tried cannot be had; one sentence."""
+
+
+class Sandbox:
+    """To be made by a process with one thread, and entered by its forks."""
+
+    def __init__(self) -> None:
+        self._rules: FileRules | None = None
+        self._fault = ""
+        try:
+            self._rules = FileRules(program_places())
+        except OSError as error:
+            self._fault = error.strerror or str(error)
+        # What is made once here is there for every fork.
+        with contextlib.suppress(OSError):
+            kernel.capabilities()
+        prepare_filter()
+        # The last one keeps a process from entering the others.
+        self._parts: dict[str, Callable[[], None]] = {
+            "the superuser's rights stay": kernel.drop_capabilities,
+            "files can be read (no Landlock)": self._restrict_files,
+            "calls of the kernel are not filtered (no seccomp)": restrict_system_calls,
+        }
+        self._faults = {words: fault for words, restrict in self._parts.items() if (fault := _tried(restrict))}
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """What this machine cannot keep workers from and why, one sentence for each part."""
+        return tuple(f"{words}: {fault}" for words, fault in self._faults.items())
+
+    @property
+    def descriptors(self) -> frozenset[int]:
+        """What a fork has to have open to enter; closed by that."""
+        return frozenset() if self._rules is None else frozenset({self._rules.descriptor})
+
+    def enter(self) -> None:
+        """Confine this process, for good, by all parts that are not missing.
+
+        Raises:
+            SandboxError: Another part is missing.
+        """
+        for words, restrict in self._parts.items():
+            if words not in self._faults:
+                try:
+                    restrict()
+                except OSError as error:
+                    raise SandboxError(f"{words}: {error.strerror or error}") from error
+
+    def _restrict_files(self) -> None:
+        if self._rules is None:
+            raise OSError(0, self._fault)
+        self._rules.restrict()
+
+
+def _tried(restrict: Callable[[], None]) -> str:
+    """Why a process cannot be confined by something, found out by a fork that ends at once; empty if it can."""
+    told, telling = os.pipe2(os.O_CLOEXEC)
+    pid = os.fork()
+    if pid == 0:
+        try:
+            restrict()
+            answer = "done"
+        except BaseException as error:  # A fork must not go on as if it were the process that it was forked from.
+            answer = getattr(error, "strerror", None) or str(error)
+        with contextlib.suppress(BaseException):
+            os.write(telling, answer.encode()[:_TOLD_BYTES])
+        os._exit(0)
+    os.close(telling)
+    os.waitpid(pid, 0)
+    answer = os.read(told, _TOLD_BYTES).decode("utf-8", "replace")
+    os.close(told)
+    return "" if answer == "done" else answer or _KILLED
+
+
+def close_others(kept: Set[int]) -> None:
+    """Close every descriptor but those, and standard input, output and error."""
+    first = _STANDARD_ERROR + 1
+    for number in sorted(number for number in kept if number >= first):
+        os.closerange(first, number)
+        first = number + 1
+    os.closerange(first, _HIGHEST_DESCRIPTOR)
+
+
+def main() -> None:
+    """Print as a list in JSON what this machine cannot keep workers from."""
+    sys.stdout.write(json.dumps(Sandbox().missing))
+
+
+if __name__ == "__main__":
+    main()

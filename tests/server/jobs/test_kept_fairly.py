@@ -1,0 +1,295 @@
+"""Who gives something back where too much is kept: the same as an obvious twin, and nobody at another's cost."""
+
+import asyncio
+import contextlib
+from collections import defaultdict
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import hypothesis.strategies as st
+import pytest
+from hypothesis import given, settings
+
+from robosc_server.failures import RefusedError
+from robosc_server.jobs import Caller, JobLimits, retention
+from robosc_server.store import JobRecord, JobState, Store, open_store
+from robosc_server.store.fairness import given_back
+from robosc_server.tasks.task import Reason, Result, TaskKind
+from support.job_parts import ME, Choices, Times, ended, in_loop, is_in, parts, sweep_by_hand, until
+from support.job_workers import task_of
+
+_KIND = TaskKind.SYNTHESIZE
+_NEVER = "until /nowhere/never"
+_THINGS = st.dictionaries(st.sampled_from("abcd"), st.lists(st.integers(0, 5), max_size=8))
+
+
+def twin_of_given_back(
+    fixed: dict[str, int], things: dict[str, list[int]], excess: int, limit: int
+) -> list[tuple[str, int]]:
+    """Looks through everything each time: owner and number of what goes."""
+    gone: list[tuple[str, int]] = []
+    left = {owner: list(enumerate(sizes)) for owner, sizes in things.items()}
+    while excess > 0 and len(gone) < limit:
+        holders = [owner for owner in left if left[owner]]
+        if not holders:
+            break
+        held = {owner: fixed[owner] + sum(size for _, size in left[owner]) for owner in holders}
+        owner = min(holders, key=lambda name: (-held[name], name))
+        number, size = left[owner].pop(0)
+        gone.append((owner, number))
+        excess -= size
+    return gone
+
+
+@given(_THINGS, st.dictionaries(st.sampled_from("abcd"), st.integers(0, 20)), st.integers(-1, 60), st.integers(0, 20))
+def test_whoever_holds_most_gives_first(
+    things: dict[str, list[int]], more: dict[str, int], excess: int, limit: int
+) -> None:
+    fixed = {owner: more.get(owner, 0) for owner in things}
+    held = {owner: fixed[owner] + sum(sizes) for owner, sizes in things.items()}
+    gone, left = given_back(
+        held, lambda owner: ((f"{owner}{n}", size) for n, size in enumerate(things[owner])), excess, limit
+    )
+    expected = twin_of_given_back(fixed, things, excess, limit)
+    assert gone == [f"{owner}{number}" for owner, number in expected]
+    for owner, sizes in things.items():
+        assert left[owner] == fixed[owner] + sum(
+            size for number, size in enumerate(sizes) if (owner, number) not in expected
+        )
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A result, as a test makes it."""
+
+    key: str
+    owner: str
+    size: int
+    used_s: float
+
+
+@dataclass(frozen=True)
+class Done:
+    """A job that has succeeded."""
+
+    id: str
+    owner: str
+    key: str
+
+
+def twin_of_sweep(results: list[Kept], jobs: list[Done], bound: int) -> tuple[list[Kept], list[Done]]:
+    """What is left, of jobs in the order of their ends: one thing goes at a time, and everything is counted anew."""
+
+    def referred(owner: str, among: list[Done]) -> int:
+        keys = {job.key for job in among if job.owner == owner}
+        return sum(result.size for result in results if result.key in keys)
+
+    results, jobs = list(results), list(jobs)
+    owners = sorted({job.owner for job in jobs})
+    if sum(referred(owner, jobs) for owner in owners) >= bound:
+        while jobs and sum(referred(owner, jobs) for owner in owners) > bound * 9 // 10:
+            holders = [owner for owner in owners if any(job.owner == owner for job in jobs)]
+            most = min(holders, key=lambda name: (-referred(name, jobs), name))
+            jobs.remove(next(job for job in jobs if job.owner == most))
+    while sum(result.size for result in results) > bound:
+        held: dict[str, int] = defaultdict(int)
+        for result in results:
+            held[result.owner] += result.size
+        free = [result for result in results if all(job.key != result.key for job in jobs)]
+        if not free:
+            break
+        most = min({result.owner for result in free}, key=lambda name: (-held[name], name))
+        results.remove(min((one for one in free if one.owner == most), key=lambda one: (one.used_s, one.key)))
+    return results, jobs
+
+
+async def fill(store: Store, times: Times, results: list[Kept], jobs: list[Done]) -> None:
+    for result in results:
+        times.wall_s = result.used_s
+        await store.keep_results([(result.key, _KIND, Result((bytes(result.size),)), result.owner)])
+    for number, job in enumerate(jobs):
+        times.wall_s = 1000.0 + number
+        record = JobRecord(
+            id=job.id,
+            owner=job.owner,
+            kind=_KIND,
+            state=JobState.QUEUED,
+            revision=1,
+            key=job.key,
+            main_file="main",
+            label="",
+            idempotency_key=None,
+            retention_us=10**15,
+            created_us=store.now_us(),
+        )
+        answer = await store.accept(record, b"", None, 10**6)
+        assert answer is not None and answer[0].state is JobState.SUCCEEDED
+
+
+_OWNERS = st.sampled_from(["", "a", "b", "c"])
+_RESULTS = st.lists(st.tuples(_OWNERS, st.integers(1, 9), st.integers(1, 5)), min_size=1, max_size=14)
+_JOBS = st.lists(st.tuples(_OWNERS, st.integers(0, 13)), max_size=14)
+
+
+async def check_against_twin(
+    store: Store,
+    times: Times,
+    some_results: list[tuple[str, int, int]],
+    some_jobs: list[tuple[str, int]],
+    bound: int,
+) -> None:
+    results = [
+        Kept(f"{number:02}", owner, size, float(used_s)) for number, (owner, size, used_s) in enumerate(some_results)
+    ]
+    jobs = [Done(f"{number:02}", owner, results[at % len(results)].key) for number, (owner, at) in enumerate(some_jobs)]
+    await fill(store, times, results, jobs)
+    await store.sweep(bound)
+    expected_results, expected_jobs = twin_of_sweep(results, jobs, bound)
+    left = [result for result in results if await store.find_result(result.key) is not None]
+    assert left == expected_results
+    assert [job for job in jobs if await store.find(job.id) is not None] == expected_jobs
+
+
+@settings(max_examples=30, deadline=None)
+@given(_RESULTS, _JOBS, st.integers(1, 40), st.integers(1, 4))
+def test_what_is_swept_is_what_the_twin_sweeps(
+    tmp_path_factory: pytest.TempPathFactory,
+    some_results: list[tuple[str, int, int]],
+    some_jobs: list[tuple[str, int]],
+    bound: int,
+    at_once: int,
+) -> None:
+    times = Times()
+    store = open_store(tmp_path_factory.mktemp("store"), wall_clock=times.wall)
+    try:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("robosc_server.store.store._THINNED_AT_ONCE", at_once)
+            asyncio.run(check_against_twin(store, times, some_results, some_jobs, bound))
+    finally:
+        store.close()
+
+
+def test_it_is_the_same_in_postgresql(database_url: str) -> None:
+    times = Times()
+    results = [("a", 9, 1), ("a", 9, 2), ("b", 3, 1), ("b", 3, 3), ("", 1, 1), ("c", 9, 1), ("a", 5, 1)]
+    jobs = [("c", 5), ("a", 0), ("a", 0), ("c", 5), ("b", 0), ("c", 2)]
+    store = open_store(Path("/nowhere"), database_url, times.wall)
+    try:
+        asyncio.run(check_against_twin(store, times, results, jobs, 20))
+    finally:
+        store.close()
+
+
+def test_room_is_made_as_soon_as_somebody_needs_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(retention, "_SHORTEST_PAUSE_S", 0.01)
+
+    async def test() -> None:
+        choices = Choices(limits=JobLimits(results_bytes=250_000, sweep_s=3600.0))
+        async with parts(tmp_path, choices) as made:
+            for number in range(10):
+                # One caller fills what was freed, again and again.
+                for part in range(2):
+                    choices.times.wall_s += 1.0
+                    with contextlib.suppress(RefusedError):
+                        job, _ = await made.manager.submit(task_of(f"big 100000\n{number} {part}", _KIND), ME)
+                        await ended(made.manager, job.id)
+
+                async def is_accepted(number: int = number) -> bool:
+                    with contextlib.suppress(RefusedError):
+                        await made.manager.submit(task_of(f"more {number}"), Caller("you"))
+                        return True
+                    return False
+
+                await until(is_accepted)
+
+    in_loop(test)
+
+
+def test_a_greedy_caller_pushes_out_nothing_of_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sweep_by_hand(monkeypatch)
+
+    async def test() -> None:
+        limits = JobLimits(results_bytes=500_000, sweep_s=3600.0)
+        choices = Choices(limits=limits)
+        async with parts(tmp_path, choices) as made:
+            you = Caller("you")
+            theirs, _ = await made.manager.submit(task_of("big 100000", _KIND), you)
+            await ended(made.manager, theirs.id, you)
+            made.results.keep("of a call", _KIND, Result((bytes(50_000),)), "you")
+            greedy = []
+            for number in range(4):
+                choices.times.wall_s += 1.0
+                job, _ = await made.manager.submit(task_of(f"big 100000\n{number}", _KIND), ME)
+                greedy.append(await ended(made.manager, job.id))
+                made.results.keep(f"greedy {number}", _KIND, Result((bytes(100_000),)), "me")
+
+            async def is_written() -> bool:
+                return await made.store.find_result("greedy 3") is not None
+
+            await until(is_written)
+            # Jobs refer to as much as may stay: whoever comes has to wait until there is room, which is soon.
+            with pytest.raises(RefusedError, match="when it has made room") as refused:
+                await made.manager.submit(task_of("more"), you)
+            assert refused.value.reason is Reason.SERVER_BUSY
+            await made.manager.sweep()
+            await made.manager.submit(task_of("more"), you)
+            assert (await made.manager.get(theirs.id, you)).state is JobState.SUCCEEDED
+            assert await made.store.find_result("of a call") is not None
+            with pytest.raises(RefusedError, match="no job of that id"):
+                await made.manager.get(greedy[0].id, ME)
+            for job in greedy[1:]:
+                assert (await made.manager.get(job.id, ME)).state is JobState.SUCCEEDED
+            assert [await made.store.find_result(f"greedy {n}") is not None for n in range(4)] == [False] * 4
+
+    in_loop(test)
+
+
+def test_beyond_the_bound_of_jobs_those_of_a_caller_are_forgotten_that_ended_first(tmp_path: Path) -> None:
+    async def test() -> None:
+        choices = Choices(limits=JobLimits(jobs_per_owner=3, sweep_s=3600.0), capacity=4)
+        async with parts(tmp_path, choices) as made:
+            gate, you = tmp_path / "gate", Caller("you")
+            theirs, _ = await made.manager.submit(task_of("theirs"), you)
+            await ended(made.manager, theirs.id, you)
+            slow, _ = await made.manager.submit(task_of(f"until {gate}"), ME, idempotency_key="k")
+            first, _ = await made.manager.submit(task_of("first"), ME)
+            await ended(made.manager, first.id)
+            choices.times.wall_s += 1.0
+            second, _ = await made.manager.submit(task_of("fail CPU_LIMIT"), ME)
+            await ended(made.manager, second.id)
+            # Which began first, but has not ended.
+            third, _ = await made.manager.submit(task_of(_NEVER), ME)
+            with pytest.raises(RefusedError, match="no job of that id"):
+                await made.manager.get(first.id, ME)
+            assert await is_in(made.manager, second.id, JobState.FAILED)
+            fourth, _ = await made.manager.submit(task_of(f"{_NEVER}\n4"), ME)
+            with pytest.raises(RefusedError, match="no job of that id"):
+                await made.manager.get(second.id, ME)
+            # Now nothing has ended.
+            with pytest.raises(RefusedError, match="3 jobs of yours have not ended") as refused:
+                await made.manager.submit(task_of("more"), ME)
+            assert refused.value.reason is Reason.QUOTA_EXCEEDED
+            assert await made.manager.submit(task_of(f"until {gate}"), ME, idempotency_key="k")
+            for job in (slow, third, fourth):
+                assert not (await made.manager.get(job.id, ME)).state.has_ended
+            assert (await made.manager.get(theirs.id, you)).state is JobState.SUCCEEDED
+            gate.touch()
+            await ended(made.manager, slow.id)
+            more, _ = await made.manager.submit(task_of("more"), ME)
+            assert (await ended(made.manager, more.id)).state is JobState.SUCCEEDED
+
+    in_loop(test)
+
+
+def test_a_result_is_the_owners_who_asked_first(tmp_path: Path) -> None:
+    async def test() -> None:
+        store = open_store(tmp_path)
+        result = Result((bytes(10),))
+        await store.keep_results([("k", _KIND, result, "first")])
+        await store.keep_results([("k", _KIND, replace(result), "second"), ("l", _KIND, Result((b"abc",)), "second")])
+        await store.sweep(12)
+        assert await store.find_result("k") is None
+        assert await store.find_result("l") is not None
+        store.close()
+
+    in_loop(test)

@@ -1,0 +1,181 @@
+"""How many calls somebody may have open, with real calls: silent ones, watches, answers that nobody reads."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import grpc
+import pytest
+from grpc_health.v1 import health_pb2, health_pb2_grpc
+
+from robosc_api.failures import reason_of
+from robosc_api.security import Quota, Scope, make_token
+from robosc_api.v1 import jobs_pb2, jobs_pb2_grpc, synthesis_pb2_grpc
+from robosc_api.v1 import synthesis_pb2 as pb
+from robosc_server.failures import RefusedError
+from robosc_server.operations.open_calls import HEALTH_CALLS_PER_CALLER, CallLimits, OpenCalls
+from robosc_server.tasks.task import Reason
+from support.fake_tasks import TASK_FUNCTION as FAKE
+from support.service import PATIENCE_S, eventually, served
+from support.strangers import Stranger, strangers
+
+STUB: Any = synthesis_pb2_grpc.SynthesisServiceStub
+JOBS: Any = jobs_pb2_grpc.JobServiceStub
+GET_VERSION = "/robosc_api.v1.SynthesisService/GetVersion"
+HEALTH = "/grpc.health.v1.Health/Check"
+INITIAL_WINDOW = 4
+
+
+@pytest.fixture(scope="module")
+def small() -> Iterator[str]:
+    """A server with few places, that waits for requests as long as a test takes."""
+    with served(FAKE, open_calls=6, open_calls_per_caller=4, request_seconds=600.0) as address:
+        yield address
+
+
+def version(address: str, **more: Any) -> Any:
+    with grpc.insecure_channel(address) as channel:
+        stub = STUB(channel)
+        return stub.GetVersion(pb.GetVersionRequest(), timeout=PATIENCE_S, **more)
+
+
+def is_answered(address: str, **more: Any) -> bool:
+    try:
+        version(address, **more)
+    except grpc.RpcError:
+        return False
+    return True
+
+
+def refusal(address: str, **more: Any) -> tuple[str, str]:
+    """Reason and words of a call that must be refused, and may be worth another try."""
+    with pytest.raises(grpc.RpcError) as caught:
+        version(address, **more)
+    error: Any = caught.value
+    assert error.code() is grpc.StatusCode.RESOURCE_EXHAUSTED
+    assert float(dict(error.trailing_metadata())["retry-after"]) > 0
+    return reason_of(error.trailing_metadata()), error.details()
+
+
+def health(address: str) -> Any:
+    with grpc.insecure_channel(address) as channel:
+        return health_pb2_grpc.HealthStub(channel).Check(health_pb2.HealthCheckRequest(), timeout=PATIENCE_S)
+
+
+def hold(stranger: Stranger, count: int, path: str = GET_VERSION, metadata: dict[str, str] | None = None) -> None:
+    """Begin calls without a request."""
+    for number in range(count):
+        stranger.call(2 * number + 1, path, metadata)
+
+
+def test_a_caller_has_its_places_and_no_more(small: str) -> None:
+    with strangers(small, 2, source="127.0.0.2") as (first, second):
+        hold(first, 4)
+        hold(second, 3)
+        assert eventually(lambda: first.ended + second.ended == 3)
+        assert any(each.was_told(b"may have 4 calls open") for each in (first, second))
+        # Another one, by its address.
+        assert is_answered(small)
+    with strangers(small, 1) as (ours,):
+        # One more than there are places for: when it is refused, the others have theirs.
+        hold(ours, 5)
+        assert eventually(lambda: ours.ended == 1)
+        words = "a caller may have 4 calls open at once, watches included"
+        assert refusal(small) == ("QUOTA_EXCEEDED", words)
+        assert health(small)
+    assert eventually(lambda: is_answered(small))
+
+
+def test_all_places_are_bounded_and_health_is_told_all_the_same(small: str) -> None:
+    with strangers(small, 1, source="127.0.0.2") as (one,), strangers(small, 1, source="127.0.0.3") as (other,):
+        hold(one, 4)
+        hold(other, 3)
+        assert eventually(lambda: one.ended + other.ended == 1)
+        assert not is_answered(small)
+        assert refusal(small)[0] == "SERVER_BUSY"
+        assert health(small)
+    assert eventually(lambda: is_answered(small))
+
+
+def test_health_has_places_for_each_host(small: str) -> None:
+    with strangers(small, 1, source="127.0.0.2") as (stranger,):
+        hold(stranger, HEALTH_CALLS_PER_CALLER + 1, HEALTH)
+        assert eventually(lambda: stranger.ended == 1)
+        assert health(small)
+        assert is_answered(small)
+
+
+def test_nobody_from_elsewhere_takes_the_places_of_this_machines_health_checks() -> None:
+    class Call:
+        def __init__(self, host: str) -> None:
+            self._host = host
+
+        def peer(self) -> str:
+            return f"ipv6:[{self._host}]:1"
+
+        def auth_context(self) -> dict[str, object]:
+            return {}
+
+        def add_done_callback(self, callback: object) -> None:
+            """It never ends."""
+
+    calls = OpenCalls(CallLimits(1, 1), health=CallLimits(3, 1))
+    layered = calls.around(grpc.unary_unary_rpc_method_handler(lambda request, context: None), HEALTH)
+    # One machine with many addresses of its network, then others.
+    layered.unary_unary(None, Call("2001:db8::1"))
+    with pytest.raises(RefusedError) as refused:
+        layered.unary_unary(None, Call("2001:db8::2"))
+    assert refused.value.reason is Reason.QUOTA_EXCEEDED
+    for number in range(1, 3):
+        layered.unary_unary(None, Call(f"2001:db8:{number}::"))
+    with pytest.raises(RefusedError) as refused:
+        layered.unary_unary(None, Call("2001:db8:9::"))
+    assert refused.value.reason is Reason.SERVER_BUSY
+    layered.unary_unary(None, Call("::1"))
+
+
+def test_calls_that_are_over_give_their_places_back(small: str) -> None:
+    bundle = pb.Bundle(main=pb.SourceFile(name="robot.rscd", text="stuck"))
+    with grpc.insecure_channel(small) as channel:
+        stub = STUB(channel)
+        jobs = JOBS(channel)
+        for _ in range(10):
+            # Answered, refused, past its deadline, cancelled.
+            version(small)
+            with pytest.raises(grpc.RpcError, match="there is no job"):
+                next(jobs.WatchJob(jobs_pb2.WatchJobRequest(id="none"), timeout=PATIENCE_S))
+            with pytest.raises(grpc.RpcError, match="DEADLINE_EXCEEDED"):
+                stub.Check(pb.CheckRequest(bundle=bundle), timeout=0.01)
+            stub.Synthesize(pb.SynthesizeRequest(bundle=bundle), timeout=PATIENCE_S).cancel()
+        assert eventually(lambda: is_answered(small))
+
+
+def test_an_answer_that_nobody_reads_keeps_its_place(small: str) -> None:
+    with strangers(small, 1, source="127.0.0.2", settings={INITIAL_WINDOW: 0}) as (deaf,):
+        for number in range(5):
+            deaf.call(2 * number + 1, GET_VERSION)
+            deaf.message(2 * number + 1, b"")
+        assert eventually(lambda: deaf.was_told(b"may have 4 calls open"))
+
+
+def test_a_token_says_how_many(tmp_path: Path) -> None:
+    tokens, entries = [], []
+    for name, quota in (("few", Quota(calls=2)), ("usual", Quota())):
+        token, line = make_token(name, (Scope.SYNTHESIZE,), quota)
+        tokens.append({"authorization": f"Bearer {token}"})
+        entries.append(line)
+    file = tmp_path / "tokens"
+    file.write_text("\n".join(entries))
+    file.chmod(0o600)
+    with served(FAKE, open_calls_per_caller=4, request_seconds=600.0, tokens=file) as address:
+        few, usual = (tuple(token.items()) for token in tokens)
+        with strangers(address, 1) as (stranger,):
+            hold(stranger, 3, metadata=tokens[0])
+            assert eventually(lambda: stranger.ended == 1)
+            assert "have 2 calls" in refusal(address, metadata=few)[1]
+            assert is_answered(address, metadata=usual)
+        with strangers(address, 1) as (stranger,):
+            hold(stranger, 5, metadata=tokens[1])
+            assert eventually(lambda: stranger.ended == 1)
+            assert "have 4 calls" in refusal(address, metadata=usual)[1]
+            assert is_answered(address, metadata=few)

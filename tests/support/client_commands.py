@@ -1,0 +1,43 @@
+"""Commands of the client in this process, and what a server that a test has written answers them with."""
+
+from typing import Any
+
+import pytest
+
+from robosc.supervisor import encode, make_supervisor
+from robosc_api.v1 import jobs_pb2
+from robosc_api.v1 import synthesis_pb2 as pb
+from robosc_client.main import main
+from support.answers import enveloped, job, supervisor
+from support.models import EXAMPLES, example_bundle
+
+MODEL = str(EXAMPLES / "line_follower" / "line_follower.rscd")
+
+
+def encoded_supervisor(example: str) -> bytes:
+    """The file of an example's supervisor."""
+    made = make_supervisor(example_bundle(f"{example}/{example}")).supervisor
+    assert made is not None
+    return encode(made)
+
+
+MADE = supervisor(encoded_supervisor("line_follower"))
+FINDING = pb.Diagnostic(
+    severity=pb.SEVERITY_ERROR, code="x", message="bad", location=pb.Location(file="robot.rscd", line=1, column=1)
+)
+NOTHING: Any = {"status": pb.SYNTHESIS_STATUS_MODEL_ERRORS, "diagnostics": [FINDING]}
+SUCCEEDED = jobs_pb2.JOB_STATE_SUCCEEDED
+
+
+def run(capfd: pytest.CaptureFixture[str], *arguments: Any) -> Any:
+    """Exit status, output and errors of a command."""
+    status = main([*map(str, arguments)])
+    printed = capfd.readouterr()
+    assert "Traceback" not in printed.err
+    return status, printed.out, printed.err
+
+
+def job_answers(kind: str, messages: Any) -> Any:
+    """The answers about a job of a kind that has ended with these messages."""
+    found = job(9, SUCCEEDED, kind=getattr(jobs_pb2, f"TASK_KIND_{kind.upper()}"))
+    return {"GetJob": [[jobs_pb2.GetJobResponse(job=found)]], "GetJobResult": [enveloped(kind, messages)]}

@@ -1,53 +1,55 @@
 """The service as a typed Python object."""
 
+import threading
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import closing
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Concatenate, Self
 
 import grpc
 
-from robosc.errors import Diagnostic
-from robosc.source import Bundle, SourceFile
-from robosc.targets import GenerateOptions, TargetInfo
 from robosc_api.security import Credentials, SecurityError, open_channel
 from robosc_client import operations
+from robosc_client.calls import LOST, Course, Listing, Operation, Watching
 from robosc_client.connection import CHANNEL_OPTIONS
-from robosc_client.convert.failures import Failure, failure_of
+from robosc_client.convert.failures import failure_of
 from robosc_client.convert.requests import JobStub, SynthesisStub
 from robosc_client.errors import CredentialsError
-from robosc_client.jobs import Job, JobState, Submission, TaskKind
-from robosc_client.operations import Operation
-from robosc_client.results import (
-    Exploration,
-    Formatted,
-    Generation,
-    Progress,
-    ServerInfo,
-    Synthesis,
-    TaskResult,
-    Verification,
-)
-from robosc_client.retry import DEFAULT_RETRIES, Attempts, RetryPolicy
-from robosc_client.tasks import (
-    DEFAULT_GENERATION,
-    DEFAULT_OPTIONS,
-    Check,
-    Explore,
-    Format,
-    Generate,
-    SynthesisOptions,
-    Synthesize,
-    Task,
-    Verify,
-)
+from robosc_client.jobs import Job
+from robosc_client.methods import described
+from robosc_client.retry import DEFAULT_RETRIES, RetryPolicy
 
-type OnProgress = Callable[[Progress], None]
+_PARTING_S = 0.5
+"""How long an interrupted program waits for the end of its connection."""
 
 
-def ignored(progress: Progress) -> None:
-    """Nobody wants to know."""
+def _answered[**P, Result](describe: Callable[P, Operation[Result]]) -> "Callable[Concatenate[Client, P], Result]":
+    def method(self: "Client", /, *arguments: P.args, **options: P.kwargs) -> Result:
+        return self._answer(describe(*arguments, **options))
+
+    return described(method, describe, "Client")
+
+
+def _followed[**P](describe: Callable[P, Watching]) -> "Callable[Concatenate[Client, P], Iterator[Job]]":
+    def method(self: "Client", /, *arguments: P.args, **options: P.kwargs) -> Iterator[Job]:
+        return self._follow(describe(*arguments, **options))
+
+    return described(method, describe, "Client", Iterator[Job])
+
+
+def _ended[**P](describe: Callable[P, Watching]) -> "Callable[Concatenate[Client, P], Job]":
+    def method(self: "Client", /, *arguments: P.args, **options: P.kwargs) -> Job:
+        return next(job for job in self._follow(describe(*arguments, **options)) if job.state.has_ended)
+
+    return described(method, describe, "Client", Job)
+
+
+def _listed[**P](describe: Callable[P, Listing]) -> "Callable[Concatenate[Client, P], Iterator[Job]]":
+    def method(self: "Client", /, *arguments: P.args, **options: P.kwargs) -> Iterator[Job]:
+        return self._list(describe(*arguments, **options))
+
+    return described(method, describe, "Client", Iterator[Job])
 
 
 class Client:
@@ -97,197 +99,71 @@ class Client:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        if kind is None or issubclass(kind, Exception):
+            self.close()
+            return
+        # An interrupt may have come while gRPC was beginning a call, for whose end it would wait for ever; it cancels
+        # all calls before it waits.
+        ending = threading.Thread(target=self._channel.close, daemon=True)
+        ending.start()
+        ending.join(_PARTING_S)
 
     def close(self) -> None:
         """End the connection; requests under way are cancelled."""
         self._channel.close()
 
-    # Tasks that are done at once
+    check = _answered(operations.check)
+    synthesize = _answered(operations.synthesize)
+    generate = _answered(operations.generate)
+    explore = _answered(operations.explore)
+    verify = _answered(operations.verify)
+    format = _answered(operations.format_)
 
-    def check(self, bundle: Bundle, *, deadline_s: float | None = None) -> tuple[Diagnostic, ...]:
-        """Every finding about a model or library, sorted by place."""
-        return self._run(operations.check(Check(bundle)), deadline_s)
+    list_targets = _answered(operations.list_targets)
+    get_version = _answered(operations.get_version)
 
-    def synthesize(
-        self,
-        bundle: Bundle,
-        options: SynthesisOptions = DEFAULT_OPTIONS,
-        *,
-        deadline_s: float | None = None,
-        on_progress: OnProgress = ignored,
-    ) -> Synthesis:
-        """Synthesize and certify a supervisor."""
-        return self._run(operations.synthesize(Synthesize(bundle, options)), deadline_s, on_progress)
+    submit = _answered(operations.submit)
+    get_job = _answered(operations.get_job)
+    watch = _followed(operations.watch)
+    wait = _ended(operations.wait)
+    cancel_job = _answered(operations.cancel_job)
+    list_jobs = _listed(operations.list_jobs)
+    job_result = _answered(operations.job_result)
 
-    def generate(
-        self,
-        bundle: Bundle,
-        target: str,
-        generation: GenerateOptions = DEFAULT_GENERATION,
-        options: SynthesisOptions = DEFAULT_OPTIONS,
-        *,
-        deadline_s: float | None = None,
-        on_progress: OnProgress = ignored,
-    ) -> Generation:
-        """Synthesize a supervisor and generate the files of a target around it.
-
-        Args:
-            bundle: The model and its libraries.
-            target: Name of the target, or `all`.
-            generation: What is chosen about the files.
-            options: How the supervisor is made.
-            deadline_s: See the class.
-            on_progress: See the class.
-        """
-        task = Generate(bundle, target, generation, options)
-        return self._run(operations.generate(task), deadline_s, on_progress)
-
-    def explore(
-        self,
-        bundle: Bundle,
-        options: SynthesisOptions = DEFAULT_OPTIONS,
-        *,
-        maximum_states: int | None = None,
-        deadline_s: float | None = None,
-        on_progress: OnProgress = ignored,
-    ) -> Exploration:
-        """Everything that the robot may do under its supervisor; beyond so many states it is given up."""
-        task = Explore(bundle, options, maximum_states)
-        return self._run(operations.explore(task), deadline_s, on_progress)
-
-    def verify(
-        self, task: Verify, *, deadline_s: float | None = None, on_progress: OnProgress = ignored
-    ) -> Verification:
-        """Check a supervisor against its model, or verify properties of the robot under its supervisor."""
-        return self._run(operations.verify(task), deadline_s, on_progress)
-
-    def format(self, file: SourceFile, *, deadline_s: float | None = None) -> Formatted:
-        """Put a text into its canonical layout."""
-        return self._run(operations.format_(Format(file)), deadline_s)
-
-    # About the server
-
-    def list_targets(self, *, deadline_s: float | None = None) -> tuple[TargetInfo, ...]:
-        """What can be generated, sorted by name."""
-        return self._run(operations.list_targets(), deadline_s)
-
-    def get_version(self, *, deadline_s: float | None = None) -> ServerInfo:
-        """What the server is, and its limits."""
-        return self._run(operations.get_version(), deadline_s)
-
-    # Jobs
-
-    def submit(
-        self,
-        task: Task,
-        *,
-        label: str = "",
-        idempotency_key: str | None = None,
-        retention_s: float | None = None,
-        deadline_s: float | None = None,
-    ) -> Submission:
-        """Have a task done without waiting for it; once this returns, the server keeps the job.
-
-        Args:
-            task: What is to be done.
-            label: What it is called in lists.
-            idempotency_key: The same key again gives the same job; None: a new key.
-            retention_s: How long the job is kept after its end; None: as long as the server keeps jobs.
-            deadline_s: See the class; it is about the submission, not about the task.
-        """
-        return self._run(operations.submit(task, idempotency_key, label, retention_s), deadline_s)
-
-    def get_job(self, job_id: str, *, deadline_s: float | None = None) -> Job:
-        """Where a job is."""
-        return self._run(operations.get_job(job_id), deadline_s)
-
-    def watch(self, job_id: str, *, after_revision: int = 0, deadline_s: float | None = None) -> Iterator[Job]:
-        """A job as it is now, and whenever it has changed until it has ended; over lost connections, too.
-
-        Args:
-            job_id: Its id.
-            after_revision: Nothing is given before there is a greater one, or the job has ended.
-            deadline_s: See the class.
-        """
-        watching = operations.Watching(job_id, after_revision)
-        attempts = Attempts(self._retries, self._address, deadline_s, is_watch=True)
-        while not watching.is_over:
-            failure = Failure(grpc.StatusCode.UNAVAILABLE, "it ended before the job")
-            call = self._jobs.WatchJob(watching.request(), timeout=attempts.timeout_s())
-            try:
-                for message in call:
-                    attempts.succeeded()
-                    yield watching.take(message)
-                    if watching.is_over:
-                        return
-            except grpc.RpcError as error:
-                failure = failure_of(error)
-            finally:
-                call.cancel()
-            self._sleep(attempts.delay_after(failure, has_answered=False))
-
-    def wait(self, job_id: str, *, deadline_s: float | None = None) -> Job:
-        """A job, once it has ended."""
-        return next(job for job in self.watch(job_id, deadline_s=deadline_s) if job.state.has_ended)
-
-    def cancel_job(self, job_id: str, *, deadline_s: float | None = None) -> Job:
-        """End a job; one that has ended stays as it is."""
-        return self._run(operations.cancel_job(job_id), deadline_s)
-
-    def list_jobs(
-        self,
-        *,
-        states: tuple[JobState, ...] = (),
-        kind: TaskKind | None = None,
-        all_owners: bool = False,
-        page_size: int = 100,
-        deadline_s: float | None = None,
-    ) -> Iterator[Job]:
-        """Jobs, the youngest first, asked for page by page.
-
-        Args:
-            states: Only jobs in these; empty: in any.
-            kind: Only jobs of this kind; None: of any.
-            all_owners: Whether those of other callers are wanted, too; for a token with the scope `admin`.
-            page_size: Jobs that are asked for at once.
-            deadline_s: See the class; for each page.
-        """
-        listing = operations.Listing(states, kind, all_owners=all_owners, page_size=page_size)
-        while not listing.is_over:
-            yield from listing.take(self._run(listing.operation(), deadline_s))
-
-    def job_result(self, job_id: str, *, kind: TaskKind | None = None, deadline_s: float | None = None) -> TaskResult:
-        """What a job that has succeeded has found: as the method for its task would have returned it.
-
-        Args:
-            job_id: Its id.
-            kind: What its task is, as `submit` or `get_job` have told: a result of another kind is refused; None: any.
-            deadline_s: See the class.
-        """
-        return self._run(operations.job_result(job_id, kind), deadline_s)
-
-    def _run[Result](
-        self, operation: Operation[Result], deadline_s: float | None, on_progress: OnProgress = ignored
-    ) -> Result:
+    def _answer[Result](self, operation: Operation[Result]) -> Result:
         """Make a call, as often as it is worth it."""
-        attempts = Attempts(self._retries, self._address, deadline_s)
+        course = Course(operation, self._retries, self._address)
         while True:
-            timeout_s = attempts.timeout_s()
-            has_answered = False
-            assembly = operation.assembly()
             try:
                 # Closed at once whatever happens, so that a caller who gives up ends the work, too.
-                with closing(self._messages(operation, timeout_s)) as messages:
+                with closing(self._messages(operation, course.begin())) as messages:
                     for message in messages:
-                        has_answered = True
-                        progress = assembly.take(message)
-                        if progress is not None:
-                            on_progress(progress)
-                return assembly.result()
+                        course.take(message)
+                return course.result()
             except grpc.RpcError as error:
-                delay_s = attempts.delay_after(failure_of(error), has_answered=has_answered)
+                delay_s = course.failed(error)
             self._sleep(delay_s)
+
+    def _follow(self, watching: Watching) -> Iterator[Job]:
+        """A job until it has ended."""
+        attempts = watching.attempts(self._retries, self._address)
+        while not watching.is_over:
+            failure = LOST
+            try:
+                with closing(self._messages(watching.operation(), attempts.timeout_s())) as messages:
+                    for message in messages:
+                        attempts.succeeded()
+                        yield watching.take(message)
+                        if watching.is_over:
+                            return
+            except grpc.RpcError as error:
+                failure = failure_of(error)
+            self._sleep(attempts.delay_after(failure, has_answered=False))
+
+    def _list(self, listing: Listing) -> Iterator[Job]:
+        """Jobs, page by page."""
+        while not listing.is_over:
+            yield from listing.take(self._answer(listing.operation()))
 
     def _messages(self, operation: Operation[Any], timeout_s: float | None) -> Generator[Any]:
         """The messages of one attempt; the call ends with their reader."""

@@ -6,6 +6,12 @@ from enum import StrEnum
 
 from robosc_client.results import Progress
 
+MAXIMUM_LABEL = 200
+"""Characters of what a job is called."""
+
+MAXIMUM_IDEMPOTENCY_KEY = 128
+"""Characters of an idempotency key."""
+
 
 class TaskKind(StrEnum):
     """What a task is."""

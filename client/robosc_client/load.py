@@ -58,12 +58,14 @@ class Measured:
         times_s: Of each call that was answered well, sorted.
         answer_bytes: Bytes of all answers.
         errors: How many calls failed, by the reason in the server's words, or by gRPC's status.
+        is_interrupted: Whether it was cancelled: calls under way then do not count.
     """
 
     seconds: float
     times_s: tuple[float, ...]
     answer_bytes: int
     errors: dict[str, int]
+    is_interrupted: bool = False
 
     @property
     def calls_per_second(self) -> float:
@@ -91,11 +93,12 @@ class Measured:
             "answer_bytes": self.answer_bytes,
             "milliseconds": {f"p{percent:g}": milliseconds(percent) for percent in (50, 90, 99, 100)},
             "errors": dict(sorted(self.errors.items())),
+            "interrupted": self.is_interrupted,
         }
 
 
 async def measure(address: str, credentials: Credentials, load: Load) -> Measured:
-    """Ask a server, and measure it.
+    """Ask a server, and measure it; cancelled after its first answer, it gives what was measured until then.
 
     Raises:
         SecurityError: A certificate, key or token cannot be used.
@@ -143,10 +146,16 @@ async def _measured(channels: list[grpc.aio.Channel], load: Load) -> Measured:
             else:
                 times_s.append(time.perf_counter() - before_s)
 
-    async with asyncio.TaskGroup() as callers:
-        for place in range(load.concurrency):
-            callers.create_task(caller(place))
-    return Measured(time.perf_counter() - begun_s, tuple(sorted(times_s)), size, dict(errors))
+    is_interrupted = False
+    try:
+        async with asyncio.TaskGroup() as callers:
+            for place in range(load.concurrency):
+                callers.create_task(caller(place))
+    except asyncio.CancelledError:
+        if not (times_s or errors):
+            raise
+        is_interrupted = True
+    return Measured(time.perf_counter() - begun_s, tuple(sorted(times_s)), size, dict(errors), is_interrupted)
 
 
 def _numbers(load: Load, begun_s: float) -> Iterator[int]:

@@ -11,9 +11,9 @@ os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 from robosc import __version__
 from robosc.cli.arguments import Parser
 from robosc.cli.main import guarded, parse
-from robosc.cli.output import CommandError, ExitCode
-from robosc_client import ClientError
-from robosc_client.commands import about, bench, jobs, profiles, tasks
+from robosc.cli.output import CommandError, ExitCode, UsageError
+from robosc_client import ClientError, CredentialsError
+from robosc_client.commands import about, bench, health, jobs, profiles, tasks
 from robosc_client.commands.connection import EPILOG, connect
 
 
@@ -27,7 +27,7 @@ def make_parser() -> Parser:
     )
     parser.add_argument("--version", action="version", version=f"robosc-client {__version__}")
     commands = parser.add_subparsers(title="commands", dest="command", required=True, metavar="COMMAND")
-    for module in (tasks, about, jobs, profiles, bench):
+    for module in (tasks, about, health, jobs, profiles, bench):
         module.add_parsers(commands)
     return parser
 
@@ -42,6 +42,8 @@ def main(argv: Sequence[str] | None = None) -> int:
                 return int(arguments.run_alone(arguments))
             with connect(arguments) as client:
                 return int(arguments.run(arguments, client))
+        except CredentialsError as error:
+            raise UsageError(str(error)) from error
         except ClientError as error:
             raise CommandError(str(error), ExitCode.SERVICE) from error
 

@@ -1,18 +1,19 @@
-"""What each method of the client calls, and how its answer is put together: the same for both clients.
+"""What each method of a client is: its arguments, what it calls, and how its answer is put together.
 
-No input or output is done here. A client makes the call of an operation, as often as `robosc_client.retry` says, and
-gives every message that it receives to the assembly.
+These functions are the one description of the methods of both clients, which take their names, arguments and
+documentation over: `robosc_client.client` has them done for threads, `robosc_client.aio` for asyncio.
 """
 
 import secrets
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from robosc.errors import Diagnostic
-from robosc.targets import TargetInfo
+from robosc.source import Bundle, SourceFile
+from robosc.targets import GenerateOptions, TargetInfo
 from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
+from robosc_client.calls import Listing, OnProgress, Operation, Watching, about, ignored
 from robosc_client.convert import answers, jobs
 from robosc_client.convert.assembly import (
     Assembly,
@@ -25,8 +26,7 @@ from robosc_client.convert.assembly import (
     check_assembly,
     format_assembly,
 )
-from robosc_client.convert.requests import list_request, request_of, submit_request
-from robosc_client.errors import malformed
+from robosc_client.convert.requests import request_of, submit_request
 from robosc_client.jobs import Job, JobState, Submission, TaskKind
 from robosc_client.results import (
     Exploration,
@@ -37,179 +37,203 @@ from robosc_client.results import (
     TaskResult,
     Verification,
 )
-from robosc_client.tasks import Check, Explore, Format, Generate, Synthesize, Task, Verify
+from robosc_client.tasks import (
+    DEFAULT_GENERATION,
+    DEFAULT_OPTIONS,
+    Check,
+    Explore,
+    Format,
+    Generate,
+    SynthesisOptions,
+    Synthesize,
+    Task,
+    Verify,
+)
 
-MAXIMUM_PAGE = 1000
-"""Jobs that one answer lists."""
-
-_EMPTY_PAGES = 100
+# Tasks that are done at once
 
 
-@dataclass(frozen=True, slots=True)
-class Operation[Result]:
-    """One call.
+def check(bundle: Bundle, *, deadline_s: float | None = None) -> Operation[tuple[Diagnostic, ...]]:
+    """Every finding about a model or library, sorted by place."""
+    return Operation("Check", request_of(Check(bundle)), check_assembly, deadline_s=deadline_s)
 
-    Attributes:
-        method: Name of the method.
-        request: The request message.
-        assembly: Makes what puts an answer together; each attempt needs another.
-        is_stream: Whether the answer is a stream of messages.
-        is_about_jobs: Whether the method is of the service for jobs.
+
+def synthesize(
+    bundle: Bundle,
+    options: SynthesisOptions = DEFAULT_OPTIONS,
+    *,
+    deadline_s: float | None = None,
+    on_progress: OnProgress = ignored,
+) -> Operation[Synthesis]:
+    """Synthesize and certify a supervisor."""
+    return _work("Synthesize", Synthesize(bundle, options), SynthesisAssembly, deadline_s, on_progress)
+
+
+def generate(
+    bundle: Bundle,
+    target: str,
+    generation: GenerateOptions = DEFAULT_GENERATION,
+    options: SynthesisOptions = DEFAULT_OPTIONS,
+    *,
+    deadline_s: float | None = None,
+    on_progress: OnProgress = ignored,
+) -> Operation[Generation]:
+    """Synthesize a supervisor and generate the files of a target around it.
+
+    Args:
+        bundle: The model and its libraries.
+        target: Name of the target, or `all`.
+        generation: What is chosen about the files.
+        options: How the supervisor is made.
+        deadline_s: See the class.
+        on_progress: See the class.
     """
-
-    method: str
-    request: Any
-    assembly: Callable[[], Assembly[Result]]
-    is_stream: bool = False
-    is_about_jobs: bool = False
+    task = Generate(bundle, target, generation, options)
+    return _work("Generate", task, GenerationAssembly, deadline_s, on_progress)
 
 
-def check(task: Check) -> Operation[tuple[Diagnostic, ...]]:
-    """Every finding about a model or library."""
-    return Operation("Check", request_of(task), check_assembly)
+def explore(
+    bundle: Bundle,
+    options: SynthesisOptions = DEFAULT_OPTIONS,
+    *,
+    maximum_states: int | None = None,
+    deadline_s: float | None = None,
+    on_progress: OnProgress = ignored,
+) -> Operation[Exploration]:
+    """Everything that the robot may do under its supervisor; beyond so many states it is given up."""
+    return _work("Explore", Explore(bundle, options, maximum_states), ExplorationAssembly, deadline_s, on_progress)
 
 
-def synthesize(task: Synthesize) -> Operation[Synthesis]:
-    """A supervisor."""
-    return Operation("Synthesize", request_of(task), SynthesisAssembly, is_stream=True)
+def verify(
+    task: Verify, *, deadline_s: float | None = None, on_progress: OnProgress = ignored
+) -> Operation[Verification]:
+    """Check a supervisor against its model, or verify properties of the robot under its supervisor."""
+    return _work("Verify", task, VerificationAssembly, deadline_s, on_progress)
 
 
-def generate(task: Generate) -> Operation[Generation]:
-    """Generated files."""
-    return Operation("Generate", request_of(task), GenerationAssembly, is_stream=True)
+def format_(file: SourceFile, *, deadline_s: float | None = None) -> Operation[Formatted]:
+    """Put a text into its canonical layout."""
+    request = request_of(Format(file))
+    return Operation("Format", request, lambda: format_assembly(file.text), deadline_s=deadline_s)
 
 
-def explore(task: Explore) -> Operation[Exploration]:
-    """The graph of a robot under its supervisor."""
-    return Operation("Explore", request_of(task), ExplorationAssembly, is_stream=True)
+def _work[Result](
+    method: str,
+    task: Task,
+    assembly: Callable[[], Assembly[Result]],
+    deadline_s: float | None,
+    on_progress: OnProgress,
+) -> Operation[Result]:
+    return Operation(method, request_of(task), assembly, is_stream=True, deadline_s=deadline_s, on_progress=on_progress)
 
 
-def verify(task: Verify) -> Operation[Verification]:
-    """Whether a supervisor is right, or properties hold."""
-    return Operation("Verify", request_of(task), VerificationAssembly, is_stream=True)
+# About the server
 
 
-def format_(task: Format) -> Operation[Formatted]:
-    """A text in its canonical layout."""
-    return Operation("Format", request_of(task), lambda: format_assembly(task.file.text))
+def list_targets(*, deadline_s: float | None = None) -> Operation[tuple[TargetInfo, ...]]:
+    """What can be generated, sorted by name."""
+    request = pb.ListTargetsRequest()
+    return Operation("ListTargets", request, lambda: Whole(answers.targets_of), deadline_s=deadline_s)
 
 
-def list_targets() -> Operation[tuple[TargetInfo, ...]]:
-    """What can be generated."""
-    return Operation("ListTargets", pb.ListTargetsRequest(), lambda: Whole(answers.targets_of))
+def get_version(*, deadline_s: float | None = None) -> Operation[ServerInfo]:
+    """What the server is, and its limits."""
+    request = pb.GetVersionRequest()
+    return Operation("GetVersion", request, lambda: Whole(answers.server_info_of), deadline_s=deadline_s)
 
 
-def get_version() -> Operation[ServerInfo]:
-    """What the server is."""
-    return Operation("GetVersion", pb.GetVersionRequest(), lambda: Whole(answers.server_info_of))
+# Jobs
 
 
-def submit(task: Task, idempotency_key: str | None, label: str, retention_s: float | None) -> Operation[Submission]:
-    """A job; without a key of the caller's, one is made, so that the call may be made again."""
+def submit(
+    task: Task,
+    *,
+    label: str = "",
+    idempotency_key: str | None = None,
+    retention_s: float | None = None,
+    deadline_s: float | None = None,
+) -> Operation[Submission]:
+    """Have a task done without waiting for it; once this returns, the server keeps the job.
+
+    Args:
+        task: What is to be done.
+        label: What it is called in lists.
+        idempotency_key: The same key again gives the same job; None: a new key.
+        retention_s: How long the job is kept after its end; None: as long as the server keeps jobs.
+        deadline_s: See the class; it is about the submission, not about the task.
+    """
+    # With a key, the call may be made again.
     key = secrets.token_hex(16) if idempotency_key is None else idempotency_key
     request = submit_request(task, key, label, retention_s)
-    return _about_jobs("SubmitJob", request, jobs.submission_of)
+    return _about_jobs("SubmitJob", request, jobs.submission_of, deadline_s)
 
 
-def get_job(job_id: str) -> Operation[Job]:
+def get_job(job_id: str, *, deadline_s: float | None = None) -> Operation[Job]:
     """Where a job is."""
-    return _about_jobs("GetJob", jobs_pb2.GetJobRequest(id=job_id), _same(job_id))
+    return _about_jobs("GetJob", jobs_pb2.GetJobRequest(id=job_id), about(job_id), deadline_s)
 
 
-def cancel_job(job_id: str) -> Operation[Job]:
-    """The end of a job."""
-    return _about_jobs("CancelJob", jobs_pb2.CancelJobRequest(id=job_id), _same(job_id))
+def watch(job_id: str, *, after_revision: int = 0, deadline_s: float | None = None) -> Watching:
+    """A job as it is now, and whenever it has changed until it has ended; over lost connections, too.
+
+    Args:
+        job_id: Its id.
+        after_revision: Nothing is given before there is a greater one, or the job has ended.
+        deadline_s: See the class.
+    """
+    return Watching(job_id, after_revision, deadline_s)
 
 
-def job_result(job_id: str, kind: TaskKind | None) -> Operation[TaskResult]:
-    """What a job has found; of this kind, if it is known."""
+def wait(job_id: str, *, deadline_s: float | None = None) -> Watching:
+    """A job, once it has ended."""
+    return Watching(job_id, deadline_s=deadline_s)
+
+
+def cancel_job(job_id: str, *, deadline_s: float | None = None) -> Operation[Job]:
+    """End a job; one that has ended stays as it is."""
+    return _about_jobs("CancelJob", jobs_pb2.CancelJobRequest(id=job_id), about(job_id), deadline_s)
+
+
+def list_jobs(
+    *,
+    states: tuple[JobState, ...] = (),
+    kind: TaskKind | None = None,
+    all_owners: bool = False,
+    page_size: int = 100,
+    deadline_s: float | None = None,
+) -> Listing:
+    """Jobs, the youngest first, asked for page by page.
+
+    Args:
+        states: Only jobs in these; empty: in any.
+        kind: Only jobs of this kind; None: of any.
+        all_owners: Whether those of other callers are wanted, too; for a token with the scope `admin`.
+        page_size: Jobs that are asked for at once.
+        deadline_s: See the class; for each page.
+    """
+    return Listing(states, kind, all_owners=all_owners, page_size=page_size, deadline_s=deadline_s)
+
+
+def job_result(job_id: str, *, kind: TaskKind | None = None, deadline_s: float | None = None) -> Operation[TaskResult]:
+    """What a job that has succeeded has found: as the method for its task would have returned it.
+
+    Args:
+        job_id: Its id.
+        kind: What its task is, as `submit` or `get_job` have told: a result of another kind is refused; None: any.
+        deadline_s: See the class.
+    """
     request = jobs_pb2.GetJobResultRequest(id=job_id)
-    return Operation("GetJobResult", request, lambda: JobResultAssembly(kind), is_stream=True, is_about_jobs=True)
+    return Operation(
+        "GetJobResult",
+        request,
+        lambda: JobResultAssembly(kind),
+        is_stream=True,
+        is_about_jobs=True,
+        deadline_s=deadline_s,
+    )
 
 
-def _about_jobs[Message, Result](method: str, request: Any, convert: Callable[[Message], Result]) -> Operation[Result]:
-    return Operation(method, request, lambda: Whole(convert), is_about_jobs=True)
-
-
-def _same(job_id: str) -> Callable[[Any], Job]:
-    def convert(message: Any) -> Job:
-        job = jobs.job_in(message)
-        if job.id != job_id:
-            raise malformed("it tells of another job")
-        return job
-
-    return convert
-
-
-class Listing:
-    """Pages of jobs, as they are asked for."""
-
-    def __init__(
-        self, states: tuple[JobState, ...], kind: TaskKind | None, *, all_owners: bool, page_size: int
-    ) -> None:
-        """Begin with the first page.
-
-        Raises:
-            ValueError: The size of a page is none.
-        """
-        if not 0 < page_size <= MAXIMUM_PAGE:
-            raise ValueError(f"a page has from 1 to {MAXIMUM_PAGE} jobs")
-        self._chosen = (states, kind)
-        self._all_owners = all_owners
-        self._page_size = page_size
-        self._token = ""
-        self._empty = 0
-        self.is_over = False
-
-    def operation(self) -> Operation[tuple[tuple[Job, ...], str]]:
-        """Asks for the next page."""
-        states, kind = self._chosen
-        request = list_request(
-            states, kind, all_owners=self._all_owners, page_size=self._page_size, page_token=self._token
-        )
-
-        def convert(message: jobs_pb2.ListJobsResponse) -> tuple[tuple[Job, ...], str]:
-            return jobs.page_of(message, self._page_size)
-
-        return _about_jobs("ListJobs", request, convert)
-
-    def take(self, page: tuple[tuple[Job, ...], str]) -> tuple[Job, ...]:
-        """The jobs of a page.
-
-        Raises:
-            ServiceError: Pages do not get on.
-        """
-        found, token = page
-        self._empty = 0 if found else self._empty + 1
-        if (token and token == self._token) or self._empty > _EMPTY_PAGES:
-            raise malformed("a list of jobs has no end")
-        self._token = token
-        self.is_over = not token
-        return found
-
-
-class Watching:
-    """One job's changes, over as many connections as it takes."""
-
-    def __init__(self, job_id: str, after_revision: int = 0) -> None:
-        self._job_id = job_id
-        self._revision = after_revision
-        self.is_over = False
-
-    def request(self) -> jobs_pb2.WatchJobRequest:
-        """Asks for what comes after all that was seen."""
-        return jobs_pb2.WatchJobRequest(id=self._job_id, after_revision=self._revision)
-
-    def take(self, message: jobs_pb2.WatchJobResponse) -> Job:
-        """The job as it is now.
-
-        Raises:
-            ServiceError: It is another job, or nothing has changed.
-        """
-        job = _same(self._job_id)(message)
-        # A job that has ended is told of even if nothing has changed.
-        if job.revision < self._revision or (job.revision == self._revision and not job.state.has_ended):
-            raise malformed("a job's changes are not in their order")
-        self._revision = job.revision
-        self.is_over = job.state.has_ended
-        return job
+def _about_jobs[Message, Result](
+    method: str, request: Any, convert: Callable[[Message], Result], deadline_s: float | None
+) -> Operation[Result]:
+    return Operation(method, request, lambda: Whole(convert), is_about_jobs=True, deadline_s=deadline_s)

@@ -160,7 +160,8 @@ class Attempts:
         if code is grpc.StatusCode.UNAVAILABLE:
             if reason:
                 return ServerUnavailableError(f"the server at {self._address} cannot do it now: {message}", reason)
-            return ServerUnavailableError(f"no server answers at {self._address}")
+            why = f": {message}" if message else ""
+            return ServerUnavailableError(f"no server answers at {self._address}{why}")
         if code is grpc.StatusCode.DEADLINE_EXCEEDED:
             left_s = self._left_s()
             if left_s is not None and left_s <= _CLOCK_TOLERANCE_S:

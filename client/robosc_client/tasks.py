@@ -17,6 +17,7 @@ class SynthesisOptions:
         allow_livelock: Whether a supervisor is made even if silent steps of its controller never end.
         allow_reordering: Whether the engine may change the order of its variables while it works.
         maximum_nodes: Nodes of decision diagrams beyond which the work is given up; None: the server's limit.
+        verified_states: States up to which the supervisor is verified one by one; None: 200,000.
     """
 
     deployment: Deployment = Deployment.CONTROLLER
@@ -24,6 +25,7 @@ class SynthesisOptions:
     allow_livelock: bool = False
     allow_reordering: bool = False
     maximum_nodes: int | None = None
+    verified_states: int | None = None
 
 
 DEFAULT_OPTIONS = SynthesisOptions()

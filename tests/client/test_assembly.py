@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client import ServiceError, SynthesisStatus, VerificationStatus
+from robosc_client.calls import Listing
 from robosc_client.convert import assembly
 from robosc_client.convert.answers import server_info_of, targets_of
 from robosc_client.convert.assembly import (
@@ -24,7 +25,6 @@ from robosc_client.convert.assembly import (
     check_assembly,
     format_assembly,
 )
-from robosc_client.operations import Listing
 from support.answers import (
     FILES,
     GRAPH,

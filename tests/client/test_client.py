@@ -1,8 +1,10 @@
 """Both clients against a server that answers what a test has written, over real gRPC."""
 
 import asyncio
+import inspect
 import threading
 import time
+from collections.abc import AsyncGenerator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from datetime import UTC, datetime
@@ -31,6 +33,7 @@ from robosc_client import (
     Explore,
     Format,
     Generate,
+    Job,
     JobError,
     JobState,
     RequestRefusedError,
@@ -107,6 +110,25 @@ def test_servers_behind_one_name_take_turns(connect: Any) -> None:
 def test_both_clients_have_the_same_methods() -> None:
     names = [{name for name in vars(kind) if not name.startswith("_")} for kind in (Client, AsyncClient)]
     assert names[0] == names[1]
+
+
+def test_methods_say_what_they_take_and_give() -> None:
+    """As a shell or an editor shows them, although they are described elsewhere."""
+    for kind in (Client, AsyncClient):
+        for name in (name for name in vars(kind) if not name.startswith("_") and name != "close"):
+            method = getattr(kind, name)
+            assert (method.__name__, method.__qualname__) == (name, f"{kind.__name__}.{name}")
+            assert method.__doc__[0].isupper()
+            signature = inspect.signature(method)
+            assert next(iter(signature.parameters)) == "self"
+            assert "deadline_s" in signature.parameters
+            assert signature.return_annotation is not inspect.Signature.empty
+    assert str(inspect.signature(Client.get_job)) == (
+        "(self, /, job_id: str, *, deadline_s: float | None = None) -> robosc_client.jobs.Job"
+    )
+    assert inspect.signature(Client.wait) == inspect.signature(AsyncClient.wait)
+    assert inspect.iscoroutinefunction(AsyncClient.get_job)
+    assert inspect.signature(AsyncClient.watch).return_annotation == AsyncGenerator[Job]
 
 
 TASKS: dict[str, Any] = {
@@ -312,8 +334,15 @@ class TestErrors:
             for bundle in (bundle_of("\udcff"), Bundle(SourceFile("robot\udcff.rscd", ""))):
                 with pytest.raises(RequestRefusedError, match="Unicode"):
                     client.check(bundle)
+            for states in (-1, 0):
+                with pytest.raises(RequestRefusedError, match=r"maximum_states is .* at least 1"):
+                    client.explore(BUNDLE, maximum_states=states)
+                with pytest.raises(RequestRefusedError, match=r"maximum_states is .* at least 1"):
+                    client.verify(Verify(bundle=BUNDLE, supervisor=b"x", maximum_states=states))
+                with pytest.raises(RequestRefusedError, match=r"maximum_nodes is .* at least 1"):
+                    client.synthesize(BUNDLE, SynthesisOptions(maximum_nodes=states))
             with pytest.raises(RequestRefusedError):
-                client.explore(BUNDLE, maximum_states=-1)
+                client.synthesize(BUNDLE, SynthesisOptions(verified_states=-1))
             with pytest.raises(RequestRefusedError):
                 client.submit(Check(BUNDLE), retention_s=1e300)
 
@@ -641,7 +670,12 @@ class TestConversion:
             (SourceFile("std_msgs/msg/Bool.msg", "bool data"),),
         )
         options = SynthesisOptions(
-            deployment=Deployment.LAYER, engine="autoref", allow_livelock=True, allow_reordering=True, maximum_nodes=5
+            deployment=Deployment.LAYER,
+            engine="autoref",
+            allow_livelock=True,
+            allow_reordering=True,
+            maximum_nodes=5,
+            verified_states=0,
         )
         sent_options = pb.SynthesisOptions(
             deployment=pb.DEPLOYMENT_LAYER,
@@ -649,7 +683,9 @@ class TestConversion:
             allow_livelock=True,
             allow_reordering=True,
             maximum_nodes=5,
+            verified_states=0,
         )
+        assert sent_options.HasField("verified_states")
         sent = pb.Bundle(
             main=pb.SourceFile(name="robot.rscd", text="robot \u00e9"),
             libraries=[pb.SourceFile(name="../shared/a.rscd")],

@@ -5,6 +5,9 @@ import sys
 
 import pytest
 
+from support.answers import job, watched
+from support.scripted_service import scripted
+
 CODE = """
 import os, signal, sys
 class Interrupt:
@@ -26,6 +29,31 @@ def test_ctrl_c_while_modules_are_loaded(moment: str) -> None:
     )
     assert result.returncode == 130
     assert result.stderr == "robosc-client: interrupted\n"
+
+
+BEGINNING = """
+import sys
+import grpc._channel
+def interrupted(*arguments):
+    raise KeyboardInterrupt
+grpc._channel._run_channel_spin_thread = interrupted
+sys.argv = ['robosc-client', 'watch', 'job-1', '--server', {address!r}]
+from robosc_client.command import entry
+entry()
+"""
+
+
+def test_ctrl_c_while_a_call_begins() -> None:
+    """The interrupt comes when gRPC knows of the call, and nobody is there yet who would see its end."""
+    with scripted(WatchJob=[watched(job(1))]) as (address, _):
+        result = subprocess.run(
+            [sys.executable, "-c", BEGINNING.format(address=address)],
+            capture_output=True,
+            text=True,
+            timeout=30,
+            check=False,
+        )
+    assert (result.returncode, result.stdout, result.stderr) == (130, "", "robosc-client: interrupted\n")
 
 
 def test_the_exit_status_is_the_commands() -> None:

@@ -8,20 +8,22 @@ import sys
 import threading
 import time
 import tty
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import grpc
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from robosc.cli.main import main as robosc
-from robosc.signatures import make_key_pair, read_private_key, sign
-from robosc.supervisor import encode, make_supervisor
 from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.commands.bench import varied
+from robosc_client.jobs import MAXIMUM_IDEMPOTENCY_KEY, MAXIMUM_LABEL
 from robosc_client.load import Measured
 from robosc_client.main import main
+from robosc_server.jobs import convert
 from support.answers import (
     enveloped,
     exploration,
@@ -33,28 +35,9 @@ from support.answers import (
     verification,
     watched,
 )
-from support.models import EXAMPLES, bundle_of, example_bundle
+from support.client_commands import FINDING, MADE, MODEL, NOTHING, SUCCEEDED, job_answers, run
+from support.models import bundle_of
 from support.scripted_service import PATIENCE_S, Refusal, scripted
-
-MODEL = str(EXAMPLES / "line_follower" / "line_follower.rscd")
-
-
-def encoded_supervisor(example: str) -> bytes:
-    """The file of an example's supervisor."""
-    made = make_supervisor(example_bundle(f"{example}/{example}")).supervisor
-    assert made is not None
-    return encode(made)
-
-
-MADE = supervisor(encoded_supervisor("line_follower"))
-SUCCEEDED = jobs_pb2.JOB_STATE_SUCCEEDED
-
-
-def run(capfd: pytest.CaptureFixture[str], *arguments: Any) -> Any:
-    status = main([*map(str, arguments)])
-    printed = capfd.readouterr()
-    assert "Traceback" not in printed.err
-    return status, printed.out, printed.err
 
 
 class TestSubmit:
@@ -65,7 +48,7 @@ class TestSubmit:
             (["synth", MODEL, "--deployment", "layer", "--max-nodes", "9"], "synthesize"),
             (["generate", MODEL, "--target", "ros2", "--package", "p"], "generate"),
             (["explore", MODEL, "--limit", "7"], "explore"),
-            (["verify", MODEL, "--property", "EF true", "--strict"], "verify"),
+            (["verify", MODEL, "--property", "EF true"], "verify"),
             (["format", MODEL], "format"),
         ],
     )
@@ -85,14 +68,74 @@ class TestSubmit:
         if kind == "explore":
             assert chosen.maximum_states == 7
         if kind == "verify":
-            assert (list(chosen.properties), chosen.strict) == (["EF true"], True)
+            assert (list(chosen.properties), chosen.strict, chosen.maximum_states) == (["EF true"], False, 0)
         if kind == "generate":
             assert (chosen.target, chosen.generation.package) == ("ros2", "p")
 
-    def test_wrong_use(self, capfd: pytest.CaptureFixture[str]) -> None:
-        status, _, err = run(capfd, "submit", "verify", MODEL, "--server", "127.0.0.1:1")
+    @pytest.mark.parametrize(
+        ("arguments", "words"),
+        [
+            (["verify", MODEL], "(robosc-client submit verify MODEL --property PROPERTY)"),
+            (["verify", MODEL, "--property", "EF true", "--strict"], "they need FILE.rsup"),
+            (["verify", MODEL, "--property", "EF true", "--limit", "7"], "they need FILE.rsup"),
+            (["verify", MODEL, "--property", "AG nonsense"], "nonsense"),
+            (["verify", "made.rsup", MODEL, "--reorder"], "they need --property"),
+            (["verify", "made.rsup"], "needs its model"),
+            (["verify", MODEL, "--property", "EF true", "--max-nodes", str(2**64)], "--max-nodes is at most"),
+            (["synth", MODEL, "--max-nodes", str(2**64)], "--max-nodes is at most"),
+            (["format", "/nothing.rscd"], "cannot read /nothing.rscd"),
+        ],
+    )
+    @pytest.mark.parametrize("more", [[], ["--json"]])
+    def test_wrong_use(self, capfd: pytest.CaptureFixture[str], arguments: Any, words: str, more: Any) -> None:
+        """As the commands refuse it that wait for their result, before a server is asked."""
+        status, out, err = run(capfd, "submit", *arguments, "--server", "127.0.0.1:1", *more)
         assert status == 2
-        assert "--property" in err
+        assert words in (out if more else err)
+        assert not more or json.loads(out)
+
+    @pytest.mark.parametrize(
+        ("arguments", "words"),
+        [
+            (["check", MODEL, "--idempotency-key", ""], "1 to 128 printable ASCII characters"),
+            (["check", MODEL, "--idempotency-key", "x" * 129], "1 to 128 printable ASCII characters"),
+            (["check", MODEL, "--idempotency-key", "é"], "1 to 128 printable ASCII characters"),
+            (["check", MODEL, "--label", "two\nlines"], "at most 200 printable characters"),
+            (["check", MODEL, "--label", "x" * 201], "at most 200 printable characters"),
+            (["check", MODEL, "--keep", "inf"], "above 0 and below 1,000,000,000"),
+            (["explore", MODEL, "--limit", "0"], "a number from 1 to 1,000,000,000"),
+            (["explore", MODEL, "--allow-livelock"], "unrecognized arguments"),
+            (["format", MODEL, "-L", "."], "unrecognized arguments"),
+        ],
+    )
+    def test_wrong_options(self, capfd: pytest.CaptureFixture[str], arguments: Any, words: str) -> None:
+        with pytest.raises(SystemExit) as left:
+            main(["submit", *arguments, "--server", "127.0.0.1:1"])
+        assert left.value.code == 2
+        assert words in capfd.readouterr().err
+
+    def test_bounds_are_the_server_s(self) -> None:
+        assert (MAXIMUM_LABEL, MAXIMUM_IDEMPOTENCY_KEY) == (convert.MAXIMUM_LABEL, convert.MAXIMUM_IDEMPOTENCY_KEY)
+
+    def test_a_supervisor_to_verify(self, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+        place = tmp_path / "made.rsup"
+        place.write_bytes(b"supervisor")
+        with scripted(SubmitJob=[[jobs_pb2.SubmitJobResponse(job=job())]]) as (address, script):
+            assert run(capfd, "submit", "verify", place, MODEL, "--strict", "--server", address)[0] == 0
+            (request,) = script.of("SubmitJob")
+        sent = request.task.verify
+        assert (sent.supervisor, sent.strict, sent.maximum_states) == (b"supervisor", True, 1_000_000)
+
+    def test_a_text_that_is_no_model(self, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+        """Has a layout all the same, which is the server's to judge."""
+        file = tmp_path / "odd.rscd"
+        file.write_bytes(b"\xef\xbb\xbfrobot {")
+        with scripted(SubmitJob=[[jobs_pb2.SubmitJobResponse(job=job())]]) as (address, script):
+            assert run(capfd, "submit", "format", file, "--server", address)[0] == 0
+            (request,) = script.of("SubmitJob")
+            assert (request.task.format.file.name, request.task.format.file.text) == ("odd.rscd", "robot {")
+            file.write_bytes(b"\xff")
+            assert run(capfd, "submit", "format", file, "--server", address)[0] == 1
 
     def test_submitted_and_watched(self, capfd: pytest.CaptureFixture[str]) -> None:
         answers = {
@@ -181,10 +224,6 @@ class TestWatch:
 
 
 class TestGet:
-    def answers(self, kind: str, messages: Any) -> Any:
-        found = job(9, SUCCEEDED, kind=getattr(jobs_pb2, f"TASK_KIND_{kind.upper()}"))
-        return {"GetJob": [[jobs_pb2.GetJobResponse(job=found)]], "GetJobResult": [enveloped(kind, messages)]}
-
     def test_where_it_is(self, capfd: pytest.CaptureFixture[str]) -> None:
         message = job(4, progress=pb.Progress(stage="check", message="half"), label="mine")
         with scripted(GetJob=[[jobs_pb2.GetJobResponse(job=message)]]) as (address, _):
@@ -213,7 +252,7 @@ class TestGet:
     def test_results(
         self, capfd: pytest.CaptureFixture[str], tmp_path: Path, kind: str, messages: Any, status: int, word: str
     ) -> None:
-        with scripted(**self.answers(kind, messages)) as (address, _):
+        with scripted(**job_answers(kind, messages)) as (address, _):
             found, out, _ = run(capfd, "get", "job-1", "--result", "--json", "--server", address)
             assert found == status, out
             assert word in out
@@ -221,9 +260,12 @@ class TestGet:
             assert run(capfd, "get", "job-1", "--result", "--server", address)[0] == status
             place = tmp_path / "out"
             found, _, err = run(capfd, "get", "job-1", "-o", place, "--server", address)
-        if status or kind == "check":
+        if kind == "check":
             assert found == 2
             assert "--result" in err
+        elif status:
+            assert (found, err) == (1, "robot.rscd: because\n")
+            assert not place.exists()
         else:
             assert (found, place.exists()) == (0, True)
         if kind == "generate":
@@ -231,9 +273,78 @@ class TestGet:
         if kind == "explore":
             assert len(json.loads(place.read_text())["states"]) == 2
 
+    @pytest.mark.parametrize(
+        ("kind", "messages", "words"),
+        [
+            ("synthesize", [synthesis(reason="none exists", diagnostics=[FINDING])], ["error: bad [x]", "none exists"]),
+            ("generate", [pb.GenerateResponse(result=pb.GenerationResult(**NOTHING))], ["error: bad [x]", "1 error"]),
+            ("explore", [pb.ExploreResponse(result=pb.ExplorationResult(**NOTHING))], ["error: bad [x]", "1 error"]),
+            (
+                "explore",
+                [
+                    pb.ExploreResponse(
+                        result=pb.ExplorationResult(
+                            status=pb.SYNTHESIS_STATUS_UNSUPPORTED_MODEL, reason="more than 7 states"
+                        )
+                    )
+                ],
+                ["robosc-client: more than 7 states"],
+            ),
+            ("format", [pb.FormatResponse(diagnostics=[FINDING])], ["error: bad [x]", "1 error"]),
+            (
+                "verify",
+                [
+                    pb.VerifyResponse(
+                        result=pb.VerificationResult(
+                            status=pb.VERIFICATION_STATUS_UNSUPPORTED_MODEL, reason="too strange"
+                        )
+                    )
+                ],
+                ["too strange"],
+            ),
+        ],
+    )
+    def test_nothing_that_could_be_written(
+        self, capfd: pytest.CaptureFixture[str], tmp_path: Path, kind: str, messages: Any, words: Any
+    ) -> None:
+        """Then it is told why, as the command does that waits for it."""
+        place = tmp_path / "out"
+        with scripted(**job_answers(kind, messages)) as (address, _):
+            status, out, err = run(capfd, "get", "job-1", "-o", place, "--server", address)
+            assert (status, out) == (1, "")
+            for word in words:
+                assert word in err
+            status, out, _ = run(capfd, "get", "job-1", "-o", place, "--json", "--server", address)
+        assert status == 1
+        found = json.loads(out)["result"]
+        assert found["diagnostics"] if "1 error" in words else found["reason"]
+        assert not place.exists()
+
+    @pytest.mark.parametrize(
+        ("state", "words"),
+        [
+            (jobs_pb2.JOB_STATE_FAILED, "job job-1 has failed: too long [CPU_LIMIT]"),
+            (jobs_pb2.JOB_STATE_CANCELLED, "job job-1 was cancelled"),
+        ],
+    )
+    def test_without_a_result(self, capfd: pytest.CaptureFixture[str], tmp_path: Path, state: Any, words: str) -> None:
+        """As `watch` ends; where the job is can be told of any."""
+        with scripted(GetJob=[[jobs_pb2.GetJobResponse(job=job(4, state))]]) as (address, script):
+            for more in (["--result"], ["-o", tmp_path / "out"]):
+                told = run(capfd, "get", "job-1", *more, "--server", address)
+                assert told == (1, "", f"robosc-client: {words}\n")
+                status, out, _ = run(capfd, "get", "job-1", *more, "--json", "--server", address)
+                document = json.loads(out)
+                assert (status, document["result"]) == (1, None)
+                has_failed = state == jobs_pb2.JOB_STATE_FAILED
+                reason = {"reason": "CPU_LIMIT", "message": "too long"} if has_failed else None
+                assert document["job"]["failure"] == reason
+            assert run(capfd, "get", "job-1", "--server", address)[0] == 0
+            assert {name for name, _ in script.requests} == {"GetJob"}
+
     def test_a_result_of_another_kind(self, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
         """Is none of this job: a text must not come where a supervisor is wanted."""
-        answers = self.answers("synthesize", [])
+        answers = job_answers("synthesize", [])
         answers["GetJobResult"] = [enveloped("format", [pb.FormatResponse(text="robot R { }\n")])]
         with scripted(**answers) as (address, _):
             for more in (["-o", tmp_path / "out"], ["--result"], ["--result", "--json"]):
@@ -245,7 +356,7 @@ class TestGet:
     def test_a_text_on_a_terminal_and_in_a_file(self, tmp_path: Path) -> None:
         """What would move the cursor is shown, and not obeyed; a file has every byte."""
         text = "robot R {\n\t// \x1b]0;owned\x07 \x9b2J\r\n}\n"
-        with scripted(**self.answers("format", [pb.FormatResponse(text=text)])) as (address, _):
+        with scripted(**job_answers("format", [pb.FormatResponse(text=text)])) as (address, _):
             command = [sys.executable, "-m", "robosc_client.main", "get", "job-1", "--result", "--server", address]
             piped = subprocess.run(command, capture_output=True, timeout=PATIENCE_S, check=True).stdout
             main_end, other_end = os.openpty()
@@ -265,132 +376,14 @@ class TestGet:
         (outside / "file").write_text("mine")
         (folder / "link").symlink_to(outside)
         for path in ("link/x", "../outside/x", str(outside / "x"), "a/../../outside/x"):
-            with scripted(**self.answers("generate", generation({path: (b"x", True)}))) as (address, _):
+            with scripted(**job_answers("generate", generation({path: (b"x", True)}))) as (address, _):
                 assert run(capfd, "get", "job-1", "-o", folder, "--server", address)[0] in (1, 3)
         (folder / "file").symlink_to(outside / "file")
-        with scripted(**self.answers("generate", generation({"file": (b"x", False)}))) as (address, _):
+        with scripted(**job_answers("generate", generation({"file": (b"x", False)}))) as (address, _):
             assert run(capfd, "get", "job-1", "-o", folder, "--force", "--server", address)[0] == 0
         assert [item.name for item in outside.iterdir()] == ["file"]
         assert (outside / "file").read_text() == "mine"
         assert not (folder / "file").is_symlink()
-
-
-class TestSignatures:
-    @pytest.fixture
-    def made(self, tmp_path: Path) -> Any:
-        """A supervisor's file, and keys: `right` has signed it."""
-        for name in ("right", "wrong"):
-            make_key_pair(tmp_path / f"{name}.key", tmp_path / f"{name}.pub")
-        assert robosc(["synth", MODEL, "-o", str(tmp_path / "made.rsup")]) == 0
-        content = (tmp_path / "made.rsup").read_bytes()
-        return content, sign(content, read_private_key(tmp_path / "right.key"))
-
-    @pytest.mark.parametrize("command", ["synth", "get"])
-    def test_checked_and_kept(self, capfd: pytest.CaptureFixture[str], tmp_path: Path, made: Any, command: str) -> None:
-        content, signature = made
-        place = tmp_path / "there.rsup"
-        beside = tmp_path / "there.rsup.sig"
-        what = ["synth", MODEL] if command == "synth" else ["get", "job-1"]
-
-        def asked(answer: Any, *more: Any) -> Any:
-            answers = {
-                "Synthesize": [[answer]],
-                "GetJob": [[jobs_pb2.GetJobResponse(job=job(9, SUCCEEDED))]],
-                "GetJobResult": [enveloped("synthesize", [answer])],
-            }
-            with scripted(**answers) as (address, _):
-                return run(capfd, *what, "-o", place, "--server", address, *more)
-
-        trusted = ["--signed-by", tmp_path / "right.pub"]
-        assert asked(supervisor(content, signature=signature), *trusted)[0] == 0
-        assert (place.read_bytes(), beside.read_bytes()) == (content, signature)
-        assert robosc(["verify", str(place), "--signed-by", str(tmp_path / "right.pub")]) == 0
-        # Without one, that of an earlier supervisor must not stay.
-        assert asked(supervisor(content))[0] == 0
-        assert not beside.exists()
-        place.unlink()
-        for answer, keys in (
-            (supervisor(content), trusted),
-            (supervisor(content, signature=signature), ["--signed-by", tmp_path / "wrong.pub"]),
-            (supervisor(content, signature=b"x"), trusted),
-            (supervisor(content + b" ", signature=signature), trusted),
-        ):
-            status, _, err = asked(answer, *keys)
-            assert status in (1, 3)
-            assert err
-            assert not place.exists()
-            assert not beside.exists()
-
-    @pytest.mark.parametrize(
-        ("made_of", "options"),
-        [
-            ("navigation", []),
-            ("line_follower", ["--deployment", "layer"]),
-        ],
-    )
-    def test_a_supervisor_that_was_not_asked_for(
-        self, capfd: pytest.CaptureFixture[str], tmp_path: Path, made: Any, made_of: str, options: Any
-    ) -> None:
-        """Is refused although its signature is right, and without one, too."""
-        content = encoded_supervisor(made_of)
-        answer = supervisor(content, signature=sign(content, read_private_key(tmp_path / "right.key")))
-        place = tmp_path / "there.rsup"
-        with scripted(Synthesize=[[answer]]) as (address, _):
-            for trusted in ([], ["--signed-by", tmp_path / "right.pub"]):
-                status, _, err = run(capfd, "synth", MODEL, *options, "-o", place, "--server", address, *trusted)
-                assert status == 3
-                assert "is refused: it was made" in err
-                assert list(tmp_path.glob("there*")) == []
-
-    def test_a_job_s_supervisor(self, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-        """Must be one, and of the deployment that is named."""
-        place = tmp_path / "there.rsup"
-        for answer, options, status in (
-            (MADE, ["--deployment", "controller"], 0),
-            (MADE, ["--deployment", "layer"], 3),
-            (supervisor(b"{}"), [], 3),
-        ):
-            place.unlink(missing_ok=True)
-            with scripted(**TestGet().answers("synthesize", [answer])) as (address, _):
-                assert run(capfd, "get", "job-1", "-o", place, *options, "--server", address)[0] == status
-            assert place.exists() == (status == 0)
-        assert run(capfd, "get", "job-1", "--deployment", "layer", "--server", "127.0.0.1:1")[0] == 2
-
-    @pytest.mark.parametrize(
-        ("kind", "messages"),
-        [
-            ("check", [pb.CheckResponse()]),
-            ("synthesize", [synthesis()]),
-            ("generate", generation()),
-            ("explore", exploration()),
-            ("verify", [verification()]),
-            ("format", [pb.FormatResponse(text="robot R { }\n")]),
-        ],
-    )
-    def test_what_nobody_can_have_signed(
-        self, capfd: pytest.CaptureFixture[str], tmp_path: Path, made: Any, kind: str, messages: Any
-    ) -> None:
-        trusted = ["--signed-by", tmp_path / "right.pub"]
-        with scripted(**TestGet().answers(kind, messages)) as (address, _):
-            for more in (["-o", tmp_path / "out"], ["--result"], ["--result", "--json"]):
-                status, _, err = run(capfd, "get", "job-1", *more, *trusted, "--server", address)
-                assert status == 3
-                assert "no supervisor" in err
-            assert run(capfd, "get", "job-1", *trusted, "--server", address)[0] == 2
-        assert not (tmp_path / "out").exists()
-
-    def test_results_that_are_printed(self, capfd: pytest.CaptureFixture[str], tmp_path: Path, made: Any) -> None:
-        content, signature = made
-        unknown = b"{}"
-        signed = sign(unknown, read_private_key(tmp_path / "right.key"))
-        for answer, status in (
-            (supervisor(content, signature=signature), 0),
-            (supervisor(content), 3),
-            (supervisor(unknown, signature=signed), 3),
-        ):
-            with scripted(**TestGet().answers("synthesize", [answer])) as (address, _):
-                options = ["--result", "--signed-by", tmp_path / "right.pub", "--server", address]
-                assert run(capfd, "get", "job-1", *options)[0] == status
 
 
 class TestListAndCancel:
@@ -403,6 +396,29 @@ class TestListAndCancel:
             (request,) = script.of("ListJobs")
             assert len(json.loads(run(capfd, "list", *chosen, "--json", "--server", address)[1])["jobs"]) == 5
         assert (list(request.states), request.kind, request.all_owners, request.page_size) == ([2, 1], 1, True, 5)
+
+    def test_kinds_as_the_commands_call_them(self, capfd: pytest.CaptureFixture[str]) -> None:
+        with scripted(ListJobs=[[jobs_pb2.ListJobsResponse()]]) as (address, script):
+            for name in ("synth", "synthesize"):
+                assert run(capfd, "list", "--kind", name, "--server", address)[0] == 0
+            assert [request.kind for request in script.of("ListJobs")] == [jobs_pb2.TASK_KIND_SYNTHESIZE] * 2
+
+    @pytest.mark.parametrize(
+        ("options", "words"),
+        [
+            (["--most", "0"], "a number from 1 to 1,000,000 is needed"),
+            (["--most", "x"], "a number from 1 to 1,000,000 is needed"),
+            (["--kind", "fly"], "'fly' is none of check, synthesize, generate, explore, verify, format, synth"),
+            (["--state", "idle"], "'idle' is none of queued, running, succeeded, failed, cancelled"),
+            (["--deadline", "inf"], "above 0 and below 1,000,000,000"),
+            (["--deadline", "soon"], "above 0 and below 1,000,000,000"),
+        ],
+    )
+    def test_wrong_use(self, capfd: pytest.CaptureFixture[str], options: Any, words: str) -> None:
+        with pytest.raises(SystemExit) as left:
+            main(["list", *options, "--server", "127.0.0.1:1"])
+        assert left.value.code == 2
+        assert words in capfd.readouterr().err
 
     def test_cancel(self, capfd: pytest.CaptureFixture[str]) -> None:
         ended = jobs_pb2.CancelJobResponse(job=job(2, jobs_pb2.JOB_STATE_CANCELLED))
@@ -442,8 +458,8 @@ class TestBench:
     def test_what_cannot_be_sent(self, capfd: pytest.CaptureFixture[str], more: Any) -> None:
         options = ["--task", "synth", "--max-nodes", str(2**70), "-n", "1", *more]
         status, _, err = run(capfd, "bench", MODEL, *options, "--server", "127.0.0.1:1")
-        assert status == 3
-        assert "cannot be sent" in err
+        assert status == 2
+        assert "--max-nodes is at most" in err
 
     def test_errors_by_reason(self, capfd: pytest.CaptureFixture[str]) -> None:
         refusal = Refusal(grpc.StatusCode.RESOURCE_EXHAUSTED, "busy", "SERVER_BUSY", 1.0)
@@ -451,6 +467,31 @@ class TestBench:
             status, out, _ = run(capfd, "bench", MODEL, "-n", "10", "--json", "--server", address)
         assert status == 3
         assert (json.loads(out)["calls"], json.loads(out)["errors"]) == (1, {"SERVER_BUSY": 9})
+
+    @pytest.mark.parametrize("json_flag", [[], ["--json"]])
+    def test_interrupted_it_tells_what_it_has_measured(self, json_flag: Any) -> None:
+        begun, ended = threading.Event(), threading.Event()
+
+        def stuck(context: Any) -> None:
+            context.add_callback(ended.set)
+            begun.set()
+            ended.wait(PATIENCE_S)
+
+        refusal = Refusal(grpc.StatusCode.RESOURCE_EXHAUSTED, "busy", "SERVER_BUSY", 1.0)
+        with scripted(Check=[[pb.CheckResponse()], [refusal], [pb.CheckResponse()], [stuck]]) as (address, _):
+            words = ["-m", "robosc_client.command", "bench", MODEL, "-c", "1", "--server", address, *json_flag]
+            with subprocess.Popen(
+                [sys.executable, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            ) as process:
+                assert begun.wait(PATIENCE_S)
+                process.send_signal(signal.SIGINT)
+                output, error = process.communicate(timeout=PATIENCE_S)
+        assert (process.returncode, error) == (130, "robosc-client: interrupted\n")
+        if json_flag:
+            told = json.loads(output)
+            assert (told["calls"], told["errors"], told["interrupted"]) == (2, {"SERVER_BUSY": 1}, True)
+        else:
+            assert output.startswith("2 calls in ") and "errors: 1 SERVER_BUSY" in output
 
     def test_a_model_is_varied_in_a_comment_alone(self) -> None:
         bundle = bundle_of("robot R { }")
@@ -464,6 +505,19 @@ class TestBench:
         assert Measured(1.0, (5.0,), 0, {}).percentile_s(50) == 5.0
         assert Measured(1.0, (), 0, {}).document()["milliseconds"]["p50"] is None
         assert measured.calls_per_second == 50
+
+    @given(
+        st.lists(st.floats(0, 1e3), min_size=1, max_size=300),
+        st.integers(1, 100),
+    )
+    def test_percentiles_are_what_they_are_called(self, times: list[float], percent: int) -> None:
+        """The least of the times within which at least so many of a hundred calls were answered."""
+        wanted = min(
+            time_s
+            for time_s in times
+            if Fraction(sum(other <= time_s for other in times), len(times)) >= Fraction(percent, 100)
+        )
+        assert Measured(1.0, tuple(sorted(times)), 0, {}).percentile_s(percent) == wanted
 
     def test_wrong_use(self, capfd: pytest.CaptureFixture[str]) -> None:
         for options in (["-c", "0"], ["-n", "0"], ["-n", "1", "-d", "1"], ["-d", "0"], ["--task", "fly"]):

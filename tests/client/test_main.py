@@ -6,26 +6,32 @@ import signal
 import subprocess
 import sys
 import threading
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
+from grpc_health.v1 import health_pb2
 
 from robosc.cli.main import main as robosc
 from robosc.language import load_bundle
 from robosc.model.structure import Deployment
 from robosc.supervisor import decode, encode
+from robosc_api.security import ServerSecurity
+from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.main import main as robosc_client
-from support.answers import exploration, supervisor, synthesis, verification
+from support.answers import exploration, job, supervisor, synthesis, verification
+from support.certificates import Authority
 from support.fake_tasks import TASK_FUNCTION
+from support.health_servers import answering
 from support.long_work import long_work
-from support.models import EXAMPLE_DEPLOYMENTS
+from support.models import EXAMPLE_DEPLOYMENTS, UNSUPPORTED
 from support.models import EXAMPLES as EXAMPLES_FOLDER
 from support.mutants import change
 from support.scripted_service import scripted
-from support.service import PATIENCE_S, eventually, is_running, served, server_process
+from support.service import PATIENCE_S, eventually, is_running, logged_server_process, served, server_process
 
 EXAMPLES = sorted(EXAMPLES_FOLDER.glob("*/*.rscd"))
 NAVIGATION = EXAMPLES_FOLDER / "navigation" / "navigation.rscd"
@@ -60,6 +66,12 @@ robot R {
         }
     }
     requirement go needs C.b
+}
+"""
+
+LIVELOCK = """
+robot R {
+    component C { behaviour { initial marked state a { transition goto b } state b { transition goto a } } }
 }
 """
 
@@ -178,8 +190,52 @@ class TestSameAsHere:
         assert here[0] == 0
         assert "'green' and 'red' can both be requested on '/light' in the initial state" in "".join(here[1:3])
 
-    def test_synth_json(self, both: Any) -> None:
-        here, there = both("synth", EXAMPLES[0], "--json")
+    @pytest.mark.parametrize("model", EXAMPLES, ids=lambda path: path.stem)
+    def test_check_that_synthesizes(self, both: Any, model: Any) -> None:
+        deployment = "layer" if model.stem.endswith("_layer") else "controller"
+        for how in ([], ["--json"]) if model == NAVIGATION else ([],):
+            here, there = both("check", model, "--synthesize", "--deployment", deployment, *how)
+            assert here == there
+            assert here[0] == 0
+
+    @pytest.mark.parametrize("how", [[], ["--json"], ["--strict"], ["--engine", "autoref"]])
+    @pytest.mark.parametrize(
+        ("text", "status"),
+        [
+            (EMPTY, 1),
+            (ERRONEOUS, 1),
+            (COMPETING, 0),
+            (LIBRARY, 0),
+            (UNSUPPORTED, 1),
+            (LIVELOCK, 1),
+            ("robot R {", 1),
+            ("x\0", 1),
+        ],
+    )
+    def test_check_that_synthesizes_in_vain(self, both: Any, tmp_path: Path, text: str, status: int, how: Any) -> None:
+        here, there = both("check", write(tmp_path, text), "--synthesize", *how)
+        assert here == there
+        assert here[0] == (1 if how == ["--strict"] and text == COMPETING else status)
+        if how == ["--json"] and text == UNSUPPORTED:
+            assert json.loads(here[1])["status"] == "unsupported model"
+
+    @pytest.mark.parametrize(
+        "how", [["--deployment", "layer"], ["--engine", "cudd"], ["--reorder"], ["--max-nodes", "9"]]
+    )
+    def test_check_that_does_not_synthesize(self, both: Any, how: Any) -> None:
+        here, there = both("check", EXAMPLES[0], *how)
+        assert here == there
+        assert here[0] == 2
+
+    @pytest.mark.parametrize("states", [0, 5, 200_000])
+    def test_verify_limit(self, both: Any, states: int) -> None:
+        here, there = both("synth", NAVIGATION, "--verify-limit", states, "-o", "robot.rsup")
+        assert here == there
+        assert (b'"not checked"' in there[3]["robot.rsup"][0]) is (states < 10)
+
+    @pytest.mark.parametrize("how", [[], ["-o", "robot.rsup"]])
+    def test_synth_json(self, both: Any, how: Any) -> None:
+        here, there = both("synth", EXAMPLES[0], "--json", *how)
         assert here == there
         assert '"summary"' in here[1]
 
@@ -307,7 +363,56 @@ class TestExitCodes:
     def test_nobody_there(self, tmp_path: Path, capfd: pytest.CaptureFixture[str], command: Any) -> None:
         model = write(tmp_path, "")
         status, error = self.run(capfd, command[0], model, *command[1:], "--server", "127.0.0.1:1")
-        assert (status, error) == (3, "robosc-client: no server answers at 127.0.0.1:1\n")
+        assert status == 3
+        assert error.startswith("robosc-client: no server answers at 127.0.0.1:1: ")
+        assert "refused" in error
+        assert error.count("\n") == 1
+
+    @pytest.mark.parametrize("command", [["check"], ["synth"], ["bench", "-n", "1"], ["submit", "check"]])
+    def test_what_cannot_be_used_never_reaches_a_server(
+        self, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, command: Any
+    ) -> None:
+        """And is wrong use, from wherever it comes."""
+        monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "settings"))
+        model, none = write(tmp_path, ""), tmp_path / "none"
+        (tmp_path / "settings" / "robosc").mkdir(parents=True)
+        profile = f"[profiles.lab]\nserver = 'lab.example:1'\ntoken_file = '{tmp_path / 'token'}'\n"
+        (tmp_path / "settings" / "robosc" / "client.toml").write_text(profile)
+        (tmp_path / "token").write_text("secret")
+        (tmp_path / "token").chmod(0o600)
+        nobody = ["--server", "127.0.0.1:1"]
+        for more in (
+            [*nobody, "--ca", none],
+            [*nobody, "--ca", model],
+            [*nobody, "--certificate", model],
+            [*nobody, "--key", model],
+            [*nobody, "--tls", "--key", model],
+            [*nobody, "--token-file", none],
+            ["--profile", "lab"],
+        ):
+            status, error = self.run(capfd, *command, model, *more)
+            assert status == 2, more
+            assert error.count("\n") == 1
+        monkeypatch.setenv("ROBOSC_CA", str(none))
+        assert self.run(capfd, *command, model, *nobody)[0] == 2
+
+    @pytest.mark.parametrize(
+        "command", [["version"], ["list"], ["watch", "job-1"], ["health"]], ids=lambda words: words[0]
+    )
+    def test_another_authority(self, tmp_path: Path, capfd: pytest.CaptureFixture[str], command: Any) -> None:
+        """A server that is there and not believed is not told of as one that is not there."""
+        for name in ("theirs", "mine"):
+            (tmp_path / name).mkdir()
+        certificate, key = Authority(tmp_path / "theirs").sign("server")
+        mine = Authority(tmp_path / "mine", "another").file
+        with answering(
+            health_pb2.HealthCheckResponse.SERVING, ServerSecurity(certificate=certificate, key=key)
+        ) as address:
+            status, error = self.run(capfd, *command, "--server", address, "--ca", mine, "--deadline", "1")
+        assert status == 3
+        assert error.startswith(f"robosc-client: no server answers at {address}: ")
+        assert "CERTIFICATE_VERIFY_FAILED" in error
+        assert error.count("\n") == 1
 
     def test_deadline(self, tmp_path: Path, capfd: pytest.CaptureFixture[str], fake: Any) -> None:
         status, error = self.run(
@@ -344,6 +449,13 @@ class TestExitCodes:
         assert arguments[1] in error
         assert error.count("\n") == 1
 
+    def test_limits_that_no_request_can_say(self, capfd: pytest.CaptureFixture[str], supervisors: Path) -> None:
+        """Are refused before a server is asked: 0 would be its own limit, and no limit of the caller's."""
+        command = ["verify", supervisors / "right.rsup", NAVIGATION, "--limit", "0", "--server", "127.0.0.1:1"]
+        status, error = self.run(capfd, *command)
+        assert status == 2
+        assert error == "robosc-client: --limit 0 cannot be asked of a server: it searches one state at least\n"
+
     def test_no_file(self, tmp_path: Path, capfd: pytest.CaptureFixture[str], fake: Any) -> None:
         status, error = self.run(capfd, "check", tmp_path / "none.rscd", "--server", fake)
         assert status == 2
@@ -373,6 +485,39 @@ class TestExitCodes:
             with pytest.raises(SystemExit):
                 robosc_client(arguments)
             assert "exit status:" in capfd.readouterr().out
+
+    @pytest.mark.parametrize(
+        ("command", "has_model"),
+        [
+            (["synth"], True), (["check"], True), (["submit", "synth"], True), (["get"], True), (["targets"], False),
+            (["list"], False), (["version"], False), (["cancel"], False), (["health"], False),
+            (["profile", "add"], False), (["profile", "list"], False),
+        ],
+    )  # fmt: skip
+    def test_help_tells_the_command_s_own(
+        self, capfd: pytest.CaptureFixture[str], command: Any, has_model: bool
+    ) -> None:
+        with pytest.raises(SystemExit):
+            robosc_client([*command, "--help"])
+        told = capfd.readouterr().out.partition("exit status:")[2]
+        assert "  130  Ctrl-C\n" in told
+        assert ("model" in told) is has_model
+
+    def test_verify_names_this_program(self, capfd: pytest.CaptureFixture[str]) -> None:
+        status, error = self.run(capfd, "verify", NAVIGATION, "--server", "127.0.0.1:1")
+        assert status == 2
+        assert "(robosc-client verify FILE.rsup MODEL)" in error
+        assert "robosc verify" not in error
+
+    @pytest.mark.parametrize(
+        ("command", "option"), [("synth", "--max-nodes"), ("explore", "--max-nodes"), ("explore", "--limit")]
+    )
+    def test_numbers_that_no_request_can_say(
+        self, capfd: pytest.CaptureFixture[str], command: str, option: str
+    ) -> None:
+        status, error = self.run(capfd, command, NAVIGATION, option, 10**20, "--server", "127.0.0.1:1")
+        assert status == 2
+        assert f"{option} is at most 18446744073709551615" in error
 
     @pytest.mark.parametrize(
         ("answer", "status", "words"),
@@ -469,7 +614,22 @@ class TestPrograms:
         assert outcome.returncode == 0
         assert "Traceback" not in outcome.stderr
 
-    @pytest.mark.parametrize("command", [["check"], ["synth"], ["generate", "--target", "ros2", "-o", "out"]])
+    @pytest.mark.parametrize(
+        "command",
+        [
+            ["check", "MODEL"],
+            ["check", "MODEL", "--synthesize"],
+            ["synth", "MODEL"],
+            ["generate", "MODEL", "--target", "ros2", "-o", "out"],
+            ["verify", "MODEL", "--property", "EF true"],
+            ["format", "MODEL"],
+            ["submit", "format", "MODEL"],
+            ["watch", "job-1"],
+            ["list"],
+            ["bench", "MODEL", "-c", "3"],
+        ],
+        ids=" ".join,
+    )
     def test_interrupted_client(self, tmp_path: Path, command: Any) -> None:
         begun, ended = threading.Event(), threading.Event()
 
@@ -479,8 +639,14 @@ class TestPrograms:
             ended.wait(PATIENCE_S)
 
         model = write(tmp_path, "robot R { }")
-        with scripted(Check=[[stuck]], Synthesize=[[stuck]], Generate=[[stuck]]) as (address, _):
-            words = ["-m", "robosc_client.command", command[0], str(model), *command[1:], "--server", address]
+        services = (
+            pb.DESCRIPTOR.services_by_name["SynthesisService"],
+            jobs_pb2.DESCRIPTOR.services_by_name["JobService"],
+        )
+        answers = {method.name: [[stuck]] for service in services for method in service.methods}
+        with scripted(**answers) as (address, _):
+            given = [str(model) if word == "MODEL" else word for word in command]
+            words = ["-m", "robosc_client.command", *given, "--server", address]
             with subprocess.Popen(
                 [sys.executable, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
             ) as process:
@@ -490,14 +656,33 @@ class TestPrograms:
             assert (process.returncode, output, error) == (130, "", "robosc-client: interrupted\n")
             assert ended.wait(PATIENCE_S)
 
+    @pytest.mark.parametrize("json", [[], ["--json"]])
+    def test_a_reader_who_leaves(self, json: Any) -> None:
+        """As `| head` does: that is no fault, and nobody is told of it."""
+        page = jobs_pb2.ListJobsResponse(
+            jobs=[job(id=f"job-{number}") for number in range(100)], next_page_token="more"
+        )
+        pages = [[jobs_pb2.ListJobsResponse(jobs=page.jobs, next_page_token=str(number))] for number in range(50)]
+        with scripted(ListJobs=pages) as (address, _):
+            words = ["-m", "robosc_client.command", "list", "--most", "5000", "--server", address, *json]
+            with subprocess.Popen(
+                [sys.executable, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            ) as process:
+                assert process.stdout is not None
+                assert process.stdout.readline()
+                process.stdout.close()
+                assert process.stderr is not None
+                assert process.stderr.read() == ""
+                assert process.wait(PATIENCE_S) == 0
+
     @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
     def test_server_stops_gracefully(self, number: Any, capfd: pytest.CaptureFixture[str]) -> None:
-        with server_process() as (process, address):
+        with logged_server_process() as (process, address, log):
             workers = children(process.pid)
             assert workers
             assert robosc_client(["check", str(EXAMPLES[0]), "--server", address]) == 0
             process.send_signal(number)
-            assert process.wait(PATIENCE_S) == 0
+            assert process.wait(PATIENCE_S) == 0, "".join(log)
             assert process.stdout is not None
             assert process.stdout.read() == ""
         assert all(eventually(partial(has_ended, pid)) for pid in workers)
@@ -513,6 +698,9 @@ class TestPrograms:
 
 def children(pid: Any) -> Any:
     """Numbers of a process's children."""
-    return [
-        int(child) for task in Path(f"/proc/{pid}/task").iterdir() for child in (task / "children").read_text().split()
-    ]
+    found: list[int] = []
+    for task in Path(f"/proc/{pid}/task").iterdir():
+        # A thread may end meanwhile.
+        with suppress(FileNotFoundError, ProcessLookupError):
+            found += map(int, (task / "children").read_text().split())
+    return found

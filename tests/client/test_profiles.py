@@ -13,8 +13,10 @@ import pytest
 from robosc_api.security import Credentials
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.commands.connection import target_of
-from robosc_client.main import main, make_parser
+from robosc_client.main import make_parser
 from robosc_client.profiles import Profile, add_profile, profiles_file, read_profiles
+from support.certificates import Authority
+from support.client_commands import run
 from support.scripted_service import PATIENCE_S, scripted
 
 
@@ -27,20 +29,13 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "settings" / "robosc"
 
 
-def run(capfd: pytest.CaptureFixture[str], *arguments: Any) -> Any:
-    status = main([*map(str, arguments)])
-    printed = capfd.readouterr()
-    assert "Traceback" not in printed.err
-    return status, printed.out, printed.err
-
-
 def target(*arguments: str) -> Any:
     """Whom a command asks, and what it shows."""
     return target_of(make_parser().parse_args(["version", *arguments]))
 
 
 def test_added_listed_shown_removed(capfd: pytest.CaptureFixture[str], tmp_path: Path, folder: Path) -> None:
-    ca = tmp_path / "ca.pem"
+    ca = Authority(tmp_path, "ca").file
     assert run(capfd, "profile", "add", "lab", "--server", "lab.example:50051", "--ca", ca)[0] == 0
     assert run(capfd, "profile", "add", "home", "--server", "[::1]:1", "--tls", "--json")[0] == 0
     assert run(capfd, "profile", "list") == (0, f"* {'lab':20} lab.example:50051\n  {'home':20} [::1]:1\n", "")
@@ -78,6 +73,32 @@ def test_a_token_is_kept_for_its_owner_alone(
         monkeypatch.setattr(sys, "stdin", io.StringIO(text))
         assert run(capfd, "profile", "add", "lab", "--server", "127.0.0.1:1", "--token")[0] == 2
     assert not read_profiles().by_name
+
+
+def test_what_could_never_be_used(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, folder: Path
+) -> None:
+    """Is refused when it is kept, not when it is needed; no token is asked for before that."""
+    none, token = tmp_path / "none", tmp_path / "token"
+    token.write_text("secret")
+    token.chmod(0o600)
+    monkeypatch.setattr(sys, "stdin", io.StringIO("secret\n"))
+    for options, words in (
+        (["--ca", none], str(none)),
+        (["--ca", token], str(token)),
+        (["--certificate", none, "--key", none], str(none)),
+        (["--key", token], "belong together"),
+        (["--tls", "--token-file", none], str(none)),
+        (["--token-file", token], "with TLS only"),
+        (["--token"], "with TLS only"),
+    ):
+        status, out, err = run(capfd, "profile", "add", "lab", "--server", "lab.example:1", *options)
+        assert (status, out) == (2, ""), options
+        assert words in err
+        assert err.count("\n") == 1
+    assert list(folder.rglob("*")) == []
+    assert run(capfd, "profile", "add", "lab", "--server", "lab.example:1", "--tls", "--token")[0] == 0
+    assert run(capfd, "profile", "add", "here", "--server", "[::1]:1", "--token-file", token)[0] == 0
 
 
 def test_comments_stay(capfd: pytest.CaptureFixture[str]) -> None:
@@ -129,14 +150,16 @@ def test_whom_a_token_is_sent_to(
 ) -> None:
     """The environment's is for a server that is named; a profile has its own, or none."""
     environment, own, given = (tmp_path / name for name in ("environment", "own", "given"))
+    own.write_text("secret")
+    own.chmod(0o600)
     monkeypatch.setenv("ROBOSC_TOKEN_FILE", str(environment))
     monkeypatch.setenv("ROBOSC_CA", str(environment))
-    assert run(capfd, "profile", "add", "own", "--server", "a:1", "--token-file", own)[0] == 0
+    assert run(capfd, "profile", "add", "own", "--server", "127.0.0.2:1", "--token-file", own)[0] == 0
     assert run(capfd, "profile", "add", "none", "--server", "b:1", "--tls")[0] == 0
     assert target("--server", "c:1") == ("c:1", Credentials(ca=environment, token_file=environment))
-    assert target("--profile", "own") == ("a:1", Credentials(token_file=own))
+    assert target("--profile", "own") == ("127.0.0.2:1", Credentials(token_file=own))
     assert target("--profile", "none") == ("b:1", Credentials(is_secure=True))
-    assert target("--profile", "own", "--token-file", str(given)) == ("a:1", Credentials(token_file=given))
+    assert target("--profile", "own", "--token-file", str(given)) == ("127.0.0.2:1", Credentials(token_file=given))
 
 
 def test_what_a_profile_says_is_relative_to_its_file() -> None:
@@ -163,7 +186,9 @@ def test_a_folder_that_cannot_be_written(capfd: pytest.CaptureFixture[str], fold
 
 def test_a_path_that_is_no_unicode(capfd: pytest.CaptureFixture[str], folder: Path, tmp_path: Path) -> None:
     """Cannot stand in the file; nothing is written, and nothing is left."""
-    status, _, err = run(capfd, "profile", "add", "lab", "--server", "lab:1", "--ca", tmp_path / "\udcff.pem")
+    ca = tmp_path / "\udcff.pem"
+    Authority(tmp_path).file.rename(ca)
+    status, _, err = run(capfd, "profile", "add", "lab", "--server", "lab:1", "--ca", ca)
     assert status == 2
     assert "no UTF-8" in err
     assert list(folder.rglob("*")) == []
@@ -181,7 +206,7 @@ def test_what_is_half_written_does_not_stay(folder: Path, monkeypatch: pytest.Mo
 
 def test_ctrl_d_at_the_prompt(folder: Path) -> None:
     main_end, other_end = os.openpty()
-    command = [sys.executable, "-m", "robosc_client.main", "profile", "add", "lab", "--server", "lab:1", "--token"]
+    command = [sys.executable, "-m", "robosc_client.main", "profile", "add", "lab", "--server", "[::1]:1", "--token"]
     with subprocess.Popen(
         command, stdin=other_end, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as process:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robosc_client import NO_RETRIES, ClientError, DeadlineError, RetryPolicy, ServerBusyError, ServerUnavailableError
-from robosc_client.convert.failures import Failure
+from robosc_client.convert.failures import Failure, first_line
 from robosc_client.retry import Attempts
 
 AWAY = Failure(grpc.StatusCode.UNAVAILABLE)
@@ -114,6 +114,18 @@ def test_a_watch_has_all_attempts_again_after_each_message() -> None:
         assert [attempts.delay_after(AWAY, has_answered=True) for _ in range(2)] == pytest.approx([0.1, 0.2])
         attempts.succeeded()
     assert len(delays(attempts, has_answered=True)) == 2
+
+
+def test_why_nobody_answers() -> None:
+    """gRPC's own reason, on one line that no terminal obeys."""
+    for told, words in (("", ""), ("connection refused", ": connection refused")):
+        with pytest.raises(ServerUnavailableError) as caught:
+            Attempts(NO_RETRIES, "there:1", None).delay_after(
+                Failure(grpc.StatusCode.UNAVAILABLE, told), has_answered=False
+            )
+        assert str(caught.value) == f"no server answers at there:1{words}"
+    assert first_line("\n first \x1b[2J\x07\nsecond") == "first \\x1b[2J\\x07"
+    assert len(first_line("x" * 10_000)) < 1000
 
 
 @given(

@@ -8,7 +8,7 @@ from robosc import __version__
 from robosc.cli.output import ExitCode, print_json
 from robosc.source import visible
 from robosc_client import Client
-from robosc_client.commands.connection import add_connection_arguments
+from robosc_client.commands.connection import add_connection_arguments, exit_statuses
 
 
 def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -19,7 +19,7 @@ def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
     version.set_defaults(run=_version)
     for parser in (targets, version):
         parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
-        add_connection_arguments(parser)
+        add_connection_arguments(parser, epilog=exit_statuses("done"))
 
 
 def _targets(arguments: argparse.Namespace, client: Client) -> int:

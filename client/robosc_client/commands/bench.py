@@ -8,11 +8,11 @@ from collections.abc import Callable
 from typing import Any
 
 from robosc.cli.arguments import add_model_arguments, read_bundle
-from robosc.cli.output import CommandError, ExitCode, print_json
+from robosc.cli.output import ExitCode, UsageError, print_json
 from robosc.source import Bundle, SourceFile
 from robosc_api.security import SecurityError
 from robosc_client import Check, Synthesize, Task
-from robosc_client.commands.connection import add_connection_arguments, seconds, target_of
+from robosc_client.commands.connection import add_connection_arguments, exit_statuses, number_up_to, seconds, target_of
 from robosc_client.commands.shown import Shown
 from robosc_client.commands.tasks import add_synthesis_arguments, synthesis_options
 from robosc_client.convert.requests import request_of
@@ -21,8 +21,10 @@ from robosc_client.load import MAXIMUM_CONCURRENCY, Load, Measured, measure
 _DESCRIPTION = """\
 Ask a server for the same again and again, and tell how many calls a second it answers and how long they take. Each of
 the concurrent callers has one call under way at any time. The server answers what it knows from its store; with
---uncached, a comment in the model makes every request another one.
+--uncached, a comment in the model makes every request another one. Interrupted, it tells what it has measured so far.
 """
+
+_EPILOG = exit_statuses("every call was answered", "the model's file is no text", "a call was not answered")
 
 _RUN = secrets.token_hex(8)
 """Of this process: what another one has asked is no request of this one."""
@@ -39,37 +41,29 @@ def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
     add_model_arguments(parser)
     parser.add_argument("--task", choices=list(_METHODS), default="check", help="what is asked (default: %(default)s)")
     parser.add_argument(
-        "-c", "--concurrency", type=_callers, default=8, metavar="N", help="callers at once (default: %(default)s)"
+        "-c",
+        "--concurrency",
+        type=number_up_to(MAXIMUM_CONCURRENCY),
+        default=8,
+        metavar="N",
+        help="callers at once (default: %(default)s)",
     )
     amount = parser.add_mutually_exclusive_group()
-    amount.add_argument("-n", "--count", type=_count, metavar="N", help="calls in all")
+    amount.add_argument("-n", "--count", type=number_up_to(10**9), metavar="N", help="calls in all")
     amount.add_argument(
         "-d", "--duration", type=seconds, default=10.0, metavar="SECONDS", help="how long (default: %(default)g)"
     )
     parser.add_argument(
-        "--connections", type=_callers, default=1, metavar="N", help="connections (default: %(default)s)"
+        "--connections",
+        type=number_up_to(MAXIMUM_CONCURRENCY),
+        default=1,
+        metavar="N",
+        help="connections (default: %(default)s)",
     )
     parser.add_argument("--uncached", action="store_true", help="make every request another one")
     add_synthesis_arguments(parser)
-    add_connection_arguments(parser)
+    add_connection_arguments(parser, epilog=_EPILOG)
     parser.set_defaults(run_alone=_bench)
-
-
-def _callers(text: str) -> int:
-    value = int(text)
-    if not 0 < value <= MAXIMUM_CONCURRENCY:
-        raise ValueError
-    return value
-
-
-def _count(text: str) -> int:
-    value = int(text)
-    if not 0 < value <= 10**9:
-        raise ValueError
-    return value
-
-
-_callers.__name__ = _count.__name__ = "number"
 
 
 def _bench(arguments: argparse.Namespace) -> int:
@@ -91,8 +85,11 @@ def _bench(arguments: argparse.Namespace) -> int:
             shown.show(f"{arguments.concurrency} callers at {address}")
             measured = asyncio.run(measure(address, credentials, load))
     except SecurityError as error:
-        raise CommandError(str(error), ExitCode.SERVICE) from error
+        raise UsageError(str(error)) from error
     _report(arguments, measured)
+    if measured.is_interrupted:
+        sys.stderr.write("robosc-client: interrupted\n")
+        return ExitCode.INTERRUPTED
     return ExitCode.SERVICE if measured.errors else ExitCode.OK
 
 

@@ -2,6 +2,7 @@
 
 import argparse
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 from robosc.cli.output import UsageError
@@ -11,20 +12,51 @@ from robosc_client.profiles import Profile, is_address, read_profiles, require_p
 
 PROFILE_VARIABLE = "ROBOSC_PROFILE"
 
-EPILOG = """\
-exit status:
-  0  done; the model has no errors
-  1  the model has errors, no supervisor exists, one that was checked is wrong, or a job has failed
-  2  wrong use
-  3  the server is not there, refused, failed or did not answer before the deadline
-"""
+SERVICE = (
+    "the server is not there, refused, failed or did not answer before the deadline; or its answer is not believed"
+)
+SIGNED_SERVICE = f"{SERVICE}, such\n     as a supervisor that none of the keys of --signed-by has signed"
+"""What the exit status 3 tells; the latter where signatures are asked for."""
+
+
+def exit_statuses(done: str, failed: str | None = None, service: str | None = SERVICE) -> str:
+    """What the exit statuses of a command tell, for its help.
+
+    Args:
+        done: What 0 tells.
+        failed: What 1 tells; None: it does not happen.
+        service: What 3 tells; None: no server is asked.
+    """
+    told = {0: done, 1: failed, 2: "wrong use", 3: service, 130: "Ctrl-C"}
+    return "exit status:\n" + "".join(f"  {status}  {what}\n" for status, what in told.items() if what is not None)
+
+
+EPILOG = exit_statuses(
+    "done; the model has no errors",
+    "the model has errors, no supervisor exists, one that was checked is wrong; or a job that is watched or asked for\n"
+    "     its result has failed or was cancelled",
+    SIGNED_SERVICE,
+)
+"""Of all commands together."""
+
+MODEL_EPILOG = exit_statuses("done; the model has no errors", "the model has errors, or no supervisor exists")
+
+_ENDLESS_S = 1e9
 
 _FIELDS = ("ca", "certificate", "key", "token_file")
 
 
-def add_connection_arguments(parser: argparse.ArgumentParser) -> None:
-    """Which server is asked, and how long."""
-    parser.epilog, parser.formatter_class = EPILOG, argparse.RawDescriptionHelpFormatter
+def add_connection_arguments(
+    parser: argparse.ArgumentParser, *, deadline_s: float | None = None, epilog: str = MODEL_EPILOG
+) -> None:
+    """Which server is asked, and how long.
+
+    Args:
+        parser: Of the command.
+        deadline_s: Seconds, unless the arguments say otherwise; None: as long as it takes.
+        epilog: What its exit statuses tell.
+    """
+    parser.epilog, parser.formatter_class = epilog, argparse.RawDescriptionHelpFormatter
     server = parser.add_mutually_exclusive_group()
     server.add_argument("--server", type=address, metavar="HOST:PORT", help="where the server listens")
     server.add_argument(
@@ -39,8 +71,10 @@ def add_connection_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--deadline",
         type=seconds,
+        default=deadline_s,
         metavar="SECONDS",
-        help="give up after so long (default: as long as the server works on it)",
+        help="give up after so long "
+        f"(default: {'as long as the server works on it' if deadline_s is None else f'{deadline_s:g}'})",
     )
 
 
@@ -60,6 +94,8 @@ def target_of(arguments: argparse.Namespace) -> tuple[str, Credentials]:
     if profile is not None:
         defaults = {name: getattr(profile, name) for name in _FIELDS}
     found: dict[str, Path | None] = {name: getattr(arguments, name) or defaults[name] for name in _FIELDS}
+    if (found["certificate"] is None) != (found["key"] is None):
+        raise UsageError("a certificate and its key belong together: --certificate and --key, or neither")
     is_secure = arguments.tls or (profile is not None and profile.tls)
     credentials = Credentials(is_secure=is_secure, **found)
     return (arguments.server if profile is None else profile.server), credentials
@@ -84,11 +120,25 @@ def address(text: str) -> str:
 
 def seconds(text: str) -> float:
     """A positive number of seconds, for a parser."""
-    number = float(text)
-    if not 0 < number < 1e9:
-        raise argparse.ArgumentTypeError("a positive number of seconds is needed")
+    try:
+        number = float(text)
+    except ValueError:
+        number = 0.0
+    if not 0 < number < _ENDLESS_S:
+        raise argparse.ArgumentTypeError(f"a number of seconds above 0 and below {_ENDLESS_S:,.0f} is needed")
     return number
 
 
-# How argparse calls it in "invalid ... value".
-seconds.__name__ = "number"
+def number_up_to(most: int) -> Callable[[str], int]:
+    """Reads a number from 1 to another one, for a parser."""
+
+    def read(text: str) -> int:
+        try:
+            number = int(text)
+        except ValueError:
+            number = 0
+        if not 0 < number <= most:
+            raise argparse.ArgumentTypeError(f"a number from 1 to {most:,} is needed")
+        return number
+
+    return read

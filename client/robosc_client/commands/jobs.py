@@ -2,18 +2,30 @@
 
 import argparse
 import sys
+from collections.abc import Callable, Collection, Mapping
 from datetime import datetime
-from pathlib import Path
-from typing import Any
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
 
-from robosc.cli.arguments import add_engine_options, add_model_arguments, read_bundle
+from robosc.cli.arguments import (
+    MAXIMUM_LIMIT,
+    SYNTHESIS_STATES,
+    add_engine_options,
+    add_model_arguments,
+    add_verify_limit_argument,
+    given_path,
+    read_bundle,
+)
 from robosc.cli.output import CommandError, ExitCode, UsageError, print_diagnostics, print_json, write_bytes
 from robosc.cli.properties import add_arguments as add_property_arguments
+from robosc.cli.properties import property_file
 from robosc.cli.sign import read_supervisor
+from robosc.cli.synth import reasons_json, report_reasons
+from robosc.cli.verify import FOREIGN_STATES
 from robosc.exploration import DEFAULT_LIMIT
 from robosc.json_documents import diagnostics_json, json_text
 from robosc.model.structure import Deployment
-from robosc.source import visible
+from robosc.source import Bundle, SourceFile, visible
 from robosc.targets import ControllerConfigError, GenerateOptions, read_controller_config, write_files
 from robosc_client import (
     Check,
@@ -33,16 +45,30 @@ from robosc_client import (
     TaskKind,
     TaskResult,
     Verification,
+    Verify,
 )
-from robosc_client.commands.connection import add_connection_arguments, seconds
+from robosc_client.commands.connection import (
+    SIGNED_SERVICE,
+    add_connection_arguments,
+    exit_statuses,
+    number_up_to,
+    seconds,
+)
 from robosc_client.commands.shown import Shown
+from robosc_client.commands.supervisor_file import write_supervisor
 from robosc_client.commands.tasks import (
     add_synthesis_arguments,
+    are_understood,
     require_signature,
+    run_verify,
     synthesis_options,
+    trusted_keys,
     verify_task,
-    write_signature,
 )
+from robosc_client.jobs import MAXIMUM_IDEMPOTENCY_KEY, MAXIMUM_LABEL
+
+if TYPE_CHECKING:
+    from robosc.signatures import PublicKey
 
 _SUBMIT = """\
 Have a server do something without waiting for it: the job's id is printed, and the job goes on whatever becomes of this
@@ -54,6 +80,25 @@ Tell where a job is; with -o or --result, what it has found: -o writes a supervi
 graph, a report or a text to a file, or generated files to a folder.
 """
 
+_EPILOG = exit_statuses("done")
+
+_SUBMIT_EPILOG = exit_statuses(
+    "the server has the job; with --watch: it has succeeded",
+    "the model's files are no texts; with --watch: the job has failed or was cancelled",
+)
+
+_WATCH_EPILOG = exit_statuses(
+    "the job has succeeded, which it also does where it finds that a model has errors",
+    "it has failed or was cancelled",
+)
+
+_GET_EPILOG = exit_statuses(
+    "told where the job is, also if it has failed; with --result or -o: done, and the model has no errors",
+    "with --result or -o: the job has failed or was cancelled; the model has errors, no supervisor exists, or\n"
+    "     one that was checked is wrong; a property fails",
+    SIGNED_SERVICE,
+)
+
 
 def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the commands."""
@@ -63,14 +108,14 @@ def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
     watch = commands.add_parser("watch", help="tell how a job gets on, until it has ended")
     watch.set_defaults(run=_watch)
     get = commands.add_parser("get", help="tell where a job is, or what it has found", description=_GET)
-    get.add_argument("-o", "--output", type=Path, metavar="PATH", help="write what it has found")
+    get.add_argument("-o", "--output", type=given_path, metavar="PATH", help="write what it has found")
     get.add_argument("--result", action="store_true", help="print what it has found, not only where it is")
     get.add_argument("--force", action="store_true", help="overwrite generated files even where you changed them")
     get.add_argument(
         "--signed-by",
         action="append",
         default=[],
-        type=Path,
+        type=given_path,
         metavar="FILE.pub",
         help="the server must have signed the supervisor by a key of this file (may be repeated)",
     )
@@ -90,27 +135,51 @@ def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
         "--state",
         action="append",
         default=[],
-        type=JobState,
-        choices=list(JobState),
-        help="only such (may be repeated)",
+        type=_one_of(JobState, {}),
+        metavar="STATE",
+        help=f"only such: {', '.join(JobState)} (may be repeated)",
     )
-    listing.add_argument("--kind", type=TaskKind, choices=list(TaskKind), help="only jobs that do this")
+    listing.add_argument(
+        "--kind",
+        type=_one_of(TaskKind, {"synth": TaskKind.SYNTHESIZE}),
+        metavar="KIND",
+        help=f"only jobs that do this: {', '.join(TaskKind)} (or synth)",
+    )
     listing.add_argument("--all", action="store_true", help="those of all owners (for a token with the scope admin)")
-    listing.add_argument("--most", type=_number, default=100, metavar="N", help="at most N (default: %(default)s)")
+    listing.add_argument(
+        "--most", type=number_up_to(1_000_000), default=100, metavar="N", help="at most N (default: %(default)s)"
+    )
     listing.set_defaults(run=_list)
-    for parser in (watch, get, cancel, listing):
+    for parser, epilog in ((watch, _WATCH_EPILOG), (get, _GET_EPILOG), (cancel, _EPILOG), (listing, _EPILOG)):
         parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
-        add_connection_arguments(parser)
+        add_connection_arguments(parser, epilog=epilog)
 
 
-def _number(text: str) -> int:
-    value = int(text)
-    if not 0 < value <= 1_000_000:
-        raise ValueError
-    return value
+def _one_of[Choice: StrEnum](choices: type[Choice], shorter: Mapping[str, Choice]) -> Callable[[str], Choice]:
+    """Reads one of some values by its name or by a shorter one, for a parser."""
+    names = {**{str(choice): choice for choice in choices}, **shorter}
+
+    def read(text: str) -> Choice:
+        if text not in names:
+            raise argparse.ArgumentTypeError(f"{text!r} is none of {', '.join(names)}")
+        return names[text]
+
+    return read
 
 
-_number.__name__ = "number"
+def _label(text: str) -> str:
+    if len(text) > MAXIMUM_LABEL or not text.isprintable():
+        raise argparse.ArgumentTypeError(f"a label has at most {MAXIMUM_LABEL} printable characters")
+    return text
+
+
+def _idempotency_key(text: str) -> str:
+    is_printable = all(" " <= character <= "~" for character in text)
+    if not 0 < len(text) <= MAXIMUM_IDEMPOTENCY_KEY or not is_printable:
+        raise argparse.ArgumentTypeError(
+            f"an idempotency key has 1 to {MAXIMUM_IDEMPOTENCY_KEY} printable ASCII characters"
+        )
+    return text
 
 
 def _add_tasks(submit: argparse.ArgumentParser) -> None:
@@ -126,19 +195,33 @@ def _add_tasks(submit: argparse.ArgumentParser) -> None:
         parser = tasks.add_parser(name, help=what)
         if name == "verify":
             _add_verify_arguments(parser)
-        add_model_arguments(parser)
+        if name == "format":
+            parser.add_argument("file", type=given_path, metavar="FILE", help="a model or library")
+            parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
+        else:
+            add_model_arguments(parser)
         if name in ("synth", "generate", "explore"):
-            add_synthesis_arguments(parser)
+            # A graph is of everything allowed, whatever goes on for ever.
+            add_synthesis_arguments(parser, has_choice=name != "explore")
+        if name == "synth":
+            add_verify_limit_argument(parser, "--verify-limit", SYNTHESIS_STATES)
         if name == "generate":
             parser.add_argument("--target", required=True, metavar="NAME", help="what to generate: see 'targets'")
             parser.add_argument("--package", metavar="NAME", help="name of the generated package")
         if name == "explore":
             parser.add_argument(
-                "--limit", type=_number, default=DEFAULT_LIMIT, metavar="N", help="give up beyond N states"
+                "--limit",
+                type=number_up_to(MAXIMUM_LIMIT),
+                default=DEFAULT_LIMIT,
+                metavar="N",
+                help="give up beyond N states (default: %(default)s)",
             )
-        parser.add_argument("--label", default="", metavar="TEXT", help="what lists call the job")
+        parser.add_argument("--label", type=_label, default="", metavar="TEXT", help="what lists call the job")
         parser.add_argument(
-            "--idempotency-key", metavar="TEXT", help="the same key again gives the same job (default: a new one)"
+            "--idempotency-key",
+            type=_idempotency_key,
+            metavar="TEXT",
+            help="the same key again gives the same job (default: a new one)",
         )
         parser.add_argument(
             "--keep", type=seconds, metavar="SECONDS", help="keep the job so long after its end (default: the server's)"
@@ -147,11 +230,11 @@ def _add_tasks(submit: argparse.ArgumentParser) -> None:
             "--watch", action="store_true", help="print the id, and wait until it has ended, as 'watch' does"
         )
         parser.set_defaults(run=_submit)
-        add_connection_arguments(parser)
+        add_connection_arguments(parser, epilog=_SUBMIT_EPILOG)
 
 
 def _add_verify_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("supervisor", nargs="?", type=Path, metavar="FILE.rsup", help="the supervisor to check")
+    parser.add_argument("supervisor", nargs="?", type=given_path, metavar="FILE.rsup", help="the supervisor to check")
     add_property_arguments(parser)
     parser.add_argument(
         "--deployment",
@@ -159,10 +242,16 @@ def _add_verify_arguments(parser: argparse.ArgumentParser) -> None:
         help="refuse a supervisor made for another deployment (default: as the file says; without a file: controller)",
     )
     parser.add_argument(
-        "--limit", type=_number, metavar="N", help="verify up to N states one by one (default: the server's)"
+        "--limit",
+        type=number_up_to(MAXIMUM_LIMIT),
+        default=FOREIGN_STATES,
+        metavar="N",
+        help="verify up to N states of a supervisor file one by one (default: %(default)s)",
     )
     parser.add_argument("--strict", action="store_true", help="permissiveness must have been checked, too")
     add_engine_options(parser)
+    # A server knows no keys that it could check a file by.
+    parser.set_defaults(signed_by=[])
 
 
 def _generation(arguments: argparse.Namespace) -> GenerateOptions:
@@ -173,8 +262,12 @@ def _generation(arguments: argparse.Namespace) -> GenerateOptions:
         raise UsageError(str(error)) from error
 
 
-def _task(arguments: argparse.Namespace) -> Task:
-    """What is to be done."""
+def _task(arguments: argparse.Namespace) -> Task | None:
+    """What is to be done; None: that cannot be, and why has been told."""
+    if arguments.task == "format":
+        return Format(SourceFile(arguments.file.name, property_file(arguments.file).text))
+    if arguments.task == "verify":
+        return _verification(arguments)
     bundle = read_bundle(arguments)
     match arguments.task:
         case "check":
@@ -183,20 +276,35 @@ def _task(arguments: argparse.Namespace) -> Task:
             return Synthesize(bundle, synthesis_options(arguments))
         case "generate":
             return Generate(bundle, arguments.target, _generation(arguments), synthesis_options(arguments))
-        case "explore":
-            return Explore(bundle, synthesis_options(arguments), arguments.limit)
-        case "verify":
-            supervisor = b"" if arguments.supervisor is None else read_supervisor(arguments.supervisor)
-            if not supervisor and not (arguments.property or arguments.properties):
-                raise UsageError("verify needs a supervisor file, or properties (--property PROPERTY)")
-            return verify_task(arguments, bundle, supervisor)
         case _:
-            return Format(bundle.main)
+            return Explore(bundle, synthesis_options(arguments), arguments.limit)
+
+
+def _verification(arguments: argparse.Namespace) -> Verify | None:
+    """What is to be verified, refused as `verify` refuses it; None: what is wrong with a property has been told."""
+    found: list[Verify] = []
+
+    def with_file(arguments: argparse.Namespace) -> int:
+        found.append(verify_task(arguments, read_bundle(arguments), read_supervisor(arguments.supervisor)))
+        return ExitCode.OK
+
+    def of_model(arguments: argparse.Namespace) -> int:
+        bundle = read_bundle(arguments)
+        if are_understood(arguments, bundle):
+            arguments.limit = None
+            found.append(verify_task(arguments, bundle, b""))
+        return ExitCode.OK
+
+    run_verify(arguments, "robosc-client submit verify", with_file, of_model)
+    return found[0] if found else None
 
 
 def _submit(arguments: argparse.Namespace, client: Client) -> int:
+    task = _task(arguments)
+    if task is None:
+        return ExitCode.USAGE
     found = client.submit(
-        _task(arguments),
+        task,
         label=arguments.label,
         idempotency_key=arguments.idempotency_key,
         retention_s=arguments.keep,
@@ -223,7 +331,7 @@ def _watch(arguments: argparse.Namespace, client: Client) -> int:
     seen: Job | None = None
     with Shown() as shown:
         for job in client.watch(arguments.job, deadline_s=arguments.deadline):
-            shown.show(_line(job))
+            shown.show(_line(job), job.progress.stage if job.progress is not None else "")
             if not arguments.json and (seen is None or job.state is not seen.state):
                 shown.write(_line(job))
             seen = job
@@ -236,25 +344,52 @@ def _get(arguments: argparse.Namespace, client: Client) -> int:
     wants_result = arguments.result or arguments.output is not None
     if (arguments.signed_by or arguments.deployment) and not wants_result:
         raise UsageError("--signed-by and --deployment are about what a job has found: they need -o or --result")
+    keys = trusted_keys(arguments)
     job = client.get_job(arguments.job, deadline_s=arguments.deadline)
     if not wants_result:
         return _report(arguments, job)
+    if job.state in (JobState.FAILED, JobState.CANCELLED):
+        return _report_no_result(arguments, job)
     found = client.job_result(arguments.job, kind=job.kind, deadline_s=arguments.deadline)
-    _require_sound(arguments, found)
-    if arguments.output is not None:
-        _write(arguments, found)
+    _require_sound(arguments, found, keys)
+    has_nothing = arguments.output is not None and not _write(arguments, found)
     if arguments.json:
-        print_json({"job": job_json(job), "result": result_json(found) if arguments.result else None})
+        print_json({"job": job_json(job), "result": result_json(found) if arguments.result or has_nothing else None})
     elif arguments.result:
         _print(found)
+    elif has_nothing and not isinstance(found, tuple):
+        _report_nothing(job, found)
     return ExitCode.OK if _is_good(found) else ExitCode.FAILED
 
 
-def _require_sound(arguments: argparse.Namespace, found: TaskResult) -> None:
+def _report_no_result(arguments: argparse.Namespace, job: Job) -> int:
+    """Tell why a job that has ended has no result."""
+    why = "was cancelled" if job.failure is None else f"has failed: {job.failure.message} [{job.failure.reason}]"
+    sys.stderr.write(f"robosc-client: job {job.id} {why}\n")
+    if arguments.json:
+        print_json({"job": job_json(job), "result": None})
+    return ExitCode.FAILED
+
+
+def _report_nothing(job: Job, found: Synthesis | Generation | Exploration | Verification | Formatted) -> None:
+    """Tell why there is nothing to write, as the command would have told that does the same at once."""
+    if isinstance(found, Verification | Formatted):
+        print_diagnostics(found.diagnostics, None)
+        if isinstance(found, Verification) and found.reason:
+            sys.stderr.write(f"{job.main_file}: {visible(found.reason)}\n")
+        return
+    from robosc_client.made import made_of
+
+    made = made_of(found)
+    print_diagnostics(made.diagnostics, None)
+    report_reasons(made, Bundle(SourceFile(job.main_file, "")))
+
+
+def _require_sound(arguments: argparse.Namespace, found: TaskResult, keys: "Collection[PublicKey]") -> None:
     """Do nothing if a supervisor that was found is one, and is as the arguments want it.
 
     Raises:
-        CommandError: No key of the arguments has signed it, or it is no supervisor where one is wanted.
+        CommandError: None of the keys has signed it, or it is no supervisor where one is wanted.
         ServiceError: The supervisor is no valid one, or for another deployment.
     """
     from robosc_client.made import decoded, require_deployment
@@ -262,13 +397,13 @@ def _require_sound(arguments: argparse.Namespace, found: TaskResult) -> None:
     supervisor = decoded(found.supervisor) if isinstance(found, Synthesis) and found.supervisor else None
     if supervisor is None or not isinstance(found, Synthesis):
         # Whatever else the server sends, a graph or a report, nobody has signed.
-        if arguments.signed_by or arguments.deployment:
+        if keys or arguments.deployment:
             raise CommandError("the job has found no supervisor, and one is asked for", ExitCode.SERVICE)
         return
     if arguments.deployment:
         require_deployment(supervisor, Deployment(arguments.deployment))
-    if arguments.signed_by:
-        require_signature(arguments, found.supervisor, found.signature)
+    if keys:
+        require_signature(keys, found.supervisor, found.signature)
 
 
 def _cancel(arguments: argparse.Namespace, client: Client) -> int:
@@ -350,7 +485,7 @@ def result_json(found: TaskResult) -> dict[str, Any]:
             return dict(found.report) or {"status": str(found.status), "reason": found.reason}
         case Formatted():
             return {"text": found.text, **diagnostics_json(found.diagnostics)}
-    result = {"status": str(found.status), "reason": found.reason, **diagnostics_json(found.diagnostics)}
+    result = {"status": str(found.status), **reasons_json(found), **diagnostics_json(found.diagnostics)}
     match found:
         case Synthesis():
             result["summary"] = found.summary and found.summary.text
@@ -390,18 +525,19 @@ def _is_good(found: TaskResult) -> bool:
     return found.status == "supervisor"
 
 
-def _write(arguments: argparse.Namespace, found: TaskResult) -> None:
-    """Write what a job has found.
+def _write(arguments: argparse.Namespace, found: TaskResult) -> bool:
+    """Write what a job has found; whether there is anything to write.
 
     Raises:
-        UsageError: There is nothing to write, or it cannot be written.
+        UsageError: It cannot be written, or is never anything for a file.
     """
     import msgspec
 
     match found:
+        case tuple():
+            raise UsageError("a check finds nothing that could be written to a file: see --result")
         case Synthesis() if found.supervisor:
-            write_signature(arguments.output, found.signature)
-            write_bytes(arguments.output, found.supervisor)
+            write_supervisor(arguments.output, found.supervisor, found.signature)
         case Generation() if found.files is not None:
             write_files(found.files, arguments.output, arguments.force)
         case Exploration() if found.graph is not None:
@@ -411,4 +547,5 @@ def _write(arguments: argparse.Namespace, found: TaskResult) -> None:
         case Formatted() if found.text is not None:
             write_bytes(arguments.output, found.text.encode("utf-8"))
         case _:
-            raise UsageError(f"the job has found nothing that could be written to {arguments.output}: see --result")
+            return False
+    return True

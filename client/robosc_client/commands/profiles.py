@@ -3,10 +3,12 @@
 import argparse
 import getpass
 import sys
-from pathlib import Path
 
+from robosc.cli.arguments import given_path
 from robosc.cli.output import ExitCode, UsageError, print_json
-from robosc_client.commands.connection import address
+from robosc_api.security import Credentials, SecurityError, check_credentials
+from robosc_api.security.addresses import is_loopback_host, split
+from robosc_client.commands.connection import address, exit_statuses
 from robosc_client.profiles import (
     MAXIMUM_TOKEN_BYTES,
     Profile,
@@ -23,6 +25,9 @@ command that names no server.
 """
 
 
+_EPILOG = exit_statuses("done", service=None)
+
+
 def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command with its own commands."""
     parser = commands.add_parser("profile", help="keep servers by name", description=_DESCRIPTION)
@@ -37,9 +42,9 @@ def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
         ("certificate", "own certificate chain (PEM)"),
         ("key", "its private key (PEM)"),
     ):
-        add.add_argument(f"--{name}", type=Path, metavar="FILE", help=what)
+        add.add_argument(f"--{name}", type=given_path, metavar="FILE", help=what)
     token = add.add_mutually_exclusive_group()
-    token.add_argument("--token-file", type=Path, metavar="FILE", help="file with a token")
+    token.add_argument("--token-file", type=given_path, metavar="FILE", help="file with a token")
     token.add_argument(
         "--token", action="store_true", help="read a token from standard input, and keep it in a file of your own"
     )
@@ -56,6 +61,7 @@ def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
     remove.add_argument("name", metavar="NAME", help="which")
     remove.set_defaults(run_alone=_remove)
     for command in (add, shown, show, remove):
+        command.epilog, command.formatter_class = _EPILOG, argparse.RawDescriptionHelpFormatter
         command.add_argument("--json", action="store_true", help="print one JSON document for machines")
 
 
@@ -66,9 +72,32 @@ def _add(arguments: argparse.Namespace) -> int:
         for value in (getattr(arguments, name),)
     }
     profile = Profile(server=arguments.server, tls=arguments.tls, **paths)
+    _require_usable(profile, has_token=arguments.token or profile.token_file is not None)
     token = _token() if arguments.token else None
     add_profile(arguments.name, profile, token=token, is_default=arguments.default, replaces=arguments.force)
     return _print(arguments, f"{profiles_file()}: profile {arguments.name} for {arguments.server}\n")
+
+
+def _require_usable(profile: Profile, *, has_token: bool) -> None:
+    """Do nothing if a server can be reached as a profile says, as far as that is known without asking it.
+
+    Raises:
+        UsageError: A file is not there or is not what it is to be, or a token would be sent in the clear.
+    """
+    credentials = Credentials(
+        is_secure=profile.tls,
+        ca=profile.ca,
+        certificate=profile.certificate,
+        key=profile.key,
+        token_file=profile.token_file,
+    )
+    try:
+        check_credentials(credentials)
+    except SecurityError as error:
+        raise UsageError(str(error)) from error
+    is_secure = profile.tls or profile.ca is not None or profile.certificate is not None
+    if has_token and not is_secure and not is_loopback_host(split(profile.server)[0]):
+        raise UsageError(f"a token is sent to another machine with TLS only: --tls or --ca for {profile.server}")
 
 
 def _token() -> str:

@@ -1,4 +1,4 @@
-"""What is shown while work goes on: a line with what moves, on a terminal alone."""
+"""What is shown while work goes on: a line with a bar, on a terminal alone."""
 
 import sys
 from types import TracebackType
@@ -10,6 +10,10 @@ if TYPE_CHECKING:
     import rich.progress
 
 _MAXIMUM = 100
+_BAR_WIDTH = 20
+
+_STAGES = ("check", "synthesis", "verification", "controller")
+"""What a supervisor goes through, one after the other; how long each takes depends on the model."""
 
 
 class Shown:
@@ -22,15 +26,16 @@ class Shown:
     def __enter__(self) -> Self:
         if sys.stderr.isatty():
             from rich.console import Console
+            from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeElapsedColumn
             from rich.progress import Progress as Bar
-            from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 
             # What a server says is text, and no markup.
-            columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+            words = TextColumn("{task.description}", markup=False)
+            columns = (SpinnerColumn(), BarColumn(_BAR_WIDTH), words, TimeElapsedColumn())
             console = Console(stderr=True)
             self._bar = Bar(*columns, console=console, transient=True, redirect_stdout=False, redirect_stderr=False)
             self._bar.start()
-            self._line = self._bar.add_task("")
+            self._line = self._bar.add_task("", total=None)
         return self
 
     def __exit__(
@@ -39,10 +44,19 @@ class Shown:
         if self._bar is not None:
             self._bar.stop()
 
-    def show(self, text: str) -> None:
-        """Replace the line."""
+    def show(self, text: str, stage: str = "") -> None:
+        """Replace the line.
+
+        Args:
+            text: What it says.
+            stage: Where the work is, for the bar; one that moves to and fro stands for what is not known.
+        """
         if self._bar is not None and self._line is not None:
             self._bar.update(self._line, description=text[:_MAXIMUM])
+            if stage in _STAGES:
+                self._bar.update(self._line, total=len(_STAGES), completed=_STAGES.index(stage))
+            elif stage and self._bar.tasks[0].total is not None:
+                self._bar.update(self._line, completed=len(_STAGES))
 
     def write(self, line: str) -> None:
         """Write a line of the result to standard output, above the line that moves."""
@@ -55,4 +69,4 @@ class Shown:
 
     def tell(self, progress: Progress) -> None:
         """Replace the line by where the work is."""
-        self.show(f"{progress.stage}: {progress.message}")
+        self.show(f"{progress.stage}: {progress.message}", progress.stage)

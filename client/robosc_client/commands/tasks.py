@@ -5,22 +5,32 @@ What they print and write is what those of `robosc` print and write.
 
 import argparse
 import sys
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Collection
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
+from robosc.cli import check as check_here
 from robosc.cli import explore as explore_here
 from robosc.cli import format as format_here
 from robosc.cli import properties, synth
 from robosc.cli import verify as verify_here
 from robosc.cli.arguments import (
+    SYNTHESIS_STATES,
     add_deployment_argument,
     add_engine_options,
     add_livelock_argument,
     add_model_arguments,
+    add_verify_limit_argument,
+    given_path,
     read_bundle,
 )
-from robosc.cli.check import report_check
-from robosc.cli.generate import add_generate_arguments, generate_options, report_generated
+from robosc.cli.generate import (
+    NOT_WRITTEN,
+    WRITTEN,
+    add_generate_arguments,
+    generate_options,
+    report_generated,
+)
 from robosc.cli.output import (
     CommandError,
     ExitCode,
@@ -28,37 +38,40 @@ from robosc.cli.output import (
     print_diagnostics,
     print_json,
     require_other_file,
-    write_bytes,
 )
 from robosc.cli.sign import read_supervisor, signer_of
-from robosc.cli.synth import add_output_argument, report_synthesis
+from robosc.cli.synth import add_output_argument, report_written
 from robosc.errors import InvalidSupervisorError, LanguageError, UnsupportedModelError
+from robosc.json_documents import diagnostics_json
 from robosc.model.structure import Deployment
 from robosc.source import Bundle, SourceFile, visible
 from robosc_client import Client, SynthesisOptions, Verification, VerificationStatus, Verify
-from robosc_client.commands.connection import add_connection_arguments
+from robosc_client.commands.connection import SERVICE, SIGNED_SERVICE, add_connection_arguments, exit_statuses
 from robosc_client.commands.shown import Shown
+from robosc_client.commands.supervisor_file import write_supervisor
 from robosc_client.errors import malformed
+
+if TYPE_CHECKING:
+    from robosc.signatures import PublicKey
+    from robosc.supervisor import Made
+
+_MAXIMUM_SENDABLE = 2**64 - 1
 
 type Commands = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
 def add_parsers(commands: Commands) -> None:
     """Add the commands."""
-    check = commands.add_parser("check", help="find everything that is wrong with a model")
-    add_model_arguments(check)
-    check.add_argument("--strict", action="store_true", help="exit with 1 for warnings too")
-    check.set_defaults(run=_check)
-
     make = commands.add_parser("synth", help="synthesize a supervisor")
     add_model_arguments(make)
     add_output_argument(make)
     add_synthesis_arguments(make)
+    add_verify_limit_argument(make, "--verify-limit", SYNTHESIS_STATES)
     make.add_argument(
         "--signed-by",
         action="append",
         default=[],
-        type=Path,
+        type=given_path,
         metavar="FILE.pub",
         help="the server must have signed the supervisor by a key of this file (may be repeated)",
     )
@@ -70,7 +83,7 @@ def add_parsers(commands: Commands) -> None:
     add_synthesis_arguments(generate)
     generate.set_defaults(run=_generate)
 
-    for module, run in ((explore_here, _explore), (verify_here, _verify), (format_here, _format)):
+    for module, run in ((check_here, _check), (explore_here, _explore), (verify_here, _verify), (format_here, _format)):
         module.add_parser(commands)
         name = module.__name__.rpartition(".")[2]
         commands.choices[name].set_defaults(run=run)
@@ -78,24 +91,44 @@ def add_parsers(commands: Commands) -> None:
     commands.choices["verify"].usage = usage.replace("robosc verify", "robosc-client verify")
     for name in ("check", "synth", "generate", "explore", "verify", "format"):
         add_connection_arguments(commands.choices[name])
-    commands.choices["verify"].epilog = f"{properties.EPILOG}  3  the server is not there, refused or failed\n"
+    commands.choices["verify"].epilog = f"{properties.EPILOG}  3  {SERVICE}\n  130  Ctrl-C\n"
+    generate.epilog = exit_statuses(WRITTEN, NOT_WRITTEN)
+    make.epilog = exit_statuses("done", "the model has errors, or no supervisor exists", SIGNED_SERVICE)
 
 
-def add_synthesis_arguments(parser: argparse.ArgumentParser) -> None:
-    """How a supervisor is made."""
+def add_synthesis_arguments(parser: argparse.ArgumentParser, *, has_choice: bool = True) -> None:
+    """How a supervisor is made.
+
+    Args:
+        parser: Of the command.
+        has_choice: Whether silent steps that never end can be refused.
+    """
     add_deployment_argument(parser)
     add_engine_options(parser)
-    add_livelock_argument(parser)
+    if has_choice:
+        add_livelock_argument(parser)
+
+
+def sendable(number: int | None, option: str) -> int | None:
+    """A number of an option, if a request can say it.
+
+    Raises:
+        UsageError: It cannot.
+    """
+    if number is not None and number > _MAXIMUM_SENDABLE:
+        raise UsageError(f"{option} is at most {_MAXIMUM_SENDABLE}, which is all that a request can say")
+    return number
 
 
 def synthesis_options(arguments: argparse.Namespace) -> SynthesisOptions:
     """What `add_synthesis_arguments` has read."""
     return SynthesisOptions(
         deployment=Deployment(arguments.deployment),
-        engine=arguments.engine,
+        engine=arguments.engine or "auto",
         allow_livelock=getattr(arguments, "allow_livelock", True),
         allow_reordering=arguments.reorder,
-        maximum_nodes=arguments.max_nodes,
+        maximum_nodes=sendable(arguments.max_nodes, "--max-nodes"),
+        verified_states=getattr(arguments, "verify_limit", None),
     )
 
 
@@ -121,27 +154,31 @@ def verify_task(arguments: argparse.Namespace, bundle: Bundle, supervisor: bytes
         property_files=tuple(listings),
         engine=arguments.engine,
         allow_reordering=arguments.reorder,
-        maximum_nodes=arguments.max_nodes,
-        # A request has no word for 0, which would be the server's own limit.
-        maximum_states=None if arguments.limit is None else max(arguments.limit, 1),
+        maximum_nodes=sendable(arguments.max_nodes, "--max-nodes"),
+        maximum_states=arguments.limit,
         is_strict=arguments.strict,
     )
 
 
 def _check(arguments: argparse.Namespace, client: Client) -> int:
-    bundle = None
-    try:
-        bundle = read_bundle(arguments)
-        diagnostics = client.check(bundle, deadline_s=arguments.deadline)
-    except LanguageError as error:
-        diagnostics = error.diagnostics
-    return report_check(arguments, diagnostics, bundle)
+    from robosc_client.made import made_of
+
+    def make(bundle: Bundle) -> "Made":
+        options = replace(synthesis_options(arguments), allow_livelock=False)
+        with Shown() as shown:
+            found = client.synthesize(bundle, options, deadline_s=arguments.deadline, on_progress=shown.tell)
+        return made_of(found)
+
+    return check_here.run_with(arguments, lambda bundle: client.check(bundle, deadline_s=arguments.deadline), make)
 
 
 def _synth(arguments: argparse.Namespace, client: Client) -> int:
     from robosc_client.made import made_of, require_made_for
 
+    if arguments.output is not None and not arguments.output.name:
+        raise UsageError("-o needs the name of a file")
     require_other_file(arguments.output, arguments.model)
+    keys = trusted_keys(arguments)
     bundle = read_bundle(arguments)
     options = synthesis_options(arguments)
     with Shown() as shown:
@@ -149,60 +186,50 @@ def _synth(arguments: argparse.Namespace, client: Client) -> int:
     made = made_of(found, found.supervisor)
     if made.supervisor is not None:
         require_made_for(made.supervisor, bundle, options.deployment)
-        if arguments.signed_by:
-            require_signature(arguments, found.supervisor, found.signature)
+        if keys:
+            require_signature(keys, found.supervisor, found.signature)
         if arguments.output is not None:
-            write_signature(arguments.output, found.signature)
-    return report_synthesis(arguments, made, bundle)
+            write_supervisor(arguments.output, found.supervisor, found.signature)
+    return report_written(arguments, made, bundle)
 
 
-def require_signature(arguments: argparse.Namespace, supervisor: bytes, signature: bytes) -> None:
-    """Do nothing if a key that `--signed-by` names has signed a supervisor's file.
+def trusted_keys(arguments: argparse.Namespace) -> "tuple[PublicKey, ...]":
+    """The keys that `--signed-by` names; read before a server works for nothing.
 
     Raises:
-        CommandError: None has.
-        UsageError: A file cannot be read.
-        SignatureError: A file holds no key.
+        UsageError: A file cannot be read or holds no key, or the package for keys is not installed.
     """
-    from robosc.signatures import MAXIMUM_KEY_BYTES, PublicKey, SignatureError, read_public_keys, signer
+    if not arguments.signed_by:
+        return ()
+    from robosc.signatures import MAXIMUM_KEY_BYTES, SignatureError, SigningUnavailableError, read_public_keys
 
     keys: list[PublicKey] = []
     for path in arguments.signed_by:
         try:
             with path.open("rb") as stream:
                 text = stream.read(MAXIMUM_KEY_BYTES + 1).decode("utf-8", "replace")
+            keys += read_public_keys(text, str(path))
         except OSError as error:
             raise UsageError(f"cannot read {path}: {error.strerror or error}") from error
-        keys += read_public_keys(text, str(path))
+        except (SignatureError, SigningUnavailableError) as error:
+            raise UsageError(str(error)) from error
+    return tuple(keys)
+
+
+def require_signature(keys: "Collection[PublicKey]", supervisor: bytes, signature: bytes) -> None:
+    """Do nothing if one of these keys has signed a supervisor's file.
+
+    Raises:
+        CommandError: None has.
+    """
+    from robosc.signatures import SignatureError, signer
+
     if not signature:
         raise CommandError("the server has not signed the supervisor", ExitCode.SERVICE)
     try:
         signer(supervisor, signature, keys)
     except SignatureError as error:
         raise CommandError(f"the server's supervisor: {error}", ExitCode.SERVICE) from error
-
-
-def write_signature(output: Path, signature: bytes) -> None:
-    """Write the signature beside a supervisor's file.
-
-    Args:
-        output: The supervisor's file.
-        signature: The signature; empty: there is none, and none stays there.
-
-    Raises:
-        UsageError: A file cannot be written.
-    """
-    from robosc.signatures import signature_file
-
-    place = signature_file(output)
-    if signature:
-        write_bytes(place, signature)
-    else:
-        # One that is there is of an earlier supervisor, and would not fit.
-        try:
-            place.unlink(missing_ok=True)
-        except OSError as error:
-            raise UsageError(f"cannot remove {place}: {error.strerror or error}") from error
 
 
 def _generate(arguments: argparse.Namespace, client: Client) -> int:
@@ -224,16 +251,15 @@ def _generate(arguments: argparse.Namespace, client: Client) -> int:
 
 def _explore(arguments: argparse.Namespace, client: Client) -> int:
     from robosc.exploration import graph_dot, graph_json, graph_text
-    from robosc.json_documents import diagnostics_json
     from robosc_client.made import graph_of, made_of
 
     bundle = read_bundle(arguments)
-    options = synthesis_options(arguments)
+    options, limit = synthesis_options(arguments), sendable(arguments.limit, "--limit")
     with Shown() as shown:
         found = client.explore(
             bundle,
             options,
-            maximum_states=arguments.limit,
+            maximum_states=limit,
             deadline_s=arguments.deadline,
             on_progress=shown.tell,
         )
@@ -253,11 +279,29 @@ def _explore(arguments: argparse.Namespace, client: Client) -> int:
 
 
 def _verify(arguments: argparse.Namespace, client: Client) -> int:
-    return verify_here.run_with(
+    return run_verify(
         arguments,
+        "robosc-client verify",
         lambda arguments: _verify_supervisor(arguments, client),
         lambda arguments: _verify_properties(arguments, client),
     )
+
+
+def run_verify(
+    arguments: argparse.Namespace,
+    command: str,
+    verify_supervisor: Callable[[argparse.Namespace], int],
+    verify_properties: Callable[[argparse.Namespace], int],
+) -> int:
+    """As `robosc.cli.verify.run_with`, for a command of this program.
+
+    Raises:
+        UsageError: As there; it names this command.
+    """
+    try:
+        return verify_here.run_with(arguments, verify_supervisor, verify_properties)
+    except UsageError as error:
+        raise UsageError(str(error).replace("robosc verify", command)) from error
 
 
 def _verify_supervisor(arguments: argparse.Namespace, client: Client) -> int:
@@ -265,6 +309,8 @@ def _verify_supervisor(arguments: argparse.Namespace, client: Client) -> int:
     from robosc.supervisor.codec import decode
     from robosc_client.made import require_recheck
 
+    if arguments.limit < 1:
+        raise UsageError("--limit 0 cannot be asked of a server: it searches one state at least")
     content = read_supervisor(arguments.supervisor)
     bundle = read_bundle(arguments)
     try:
@@ -280,16 +326,20 @@ def _verify_supervisor(arguments: argparse.Namespace, client: Client) -> int:
 
 
 def _verify_properties(arguments: argparse.Namespace, client: Client) -> int:
-    from robosc.model import check
-
     bundle = read_bundle(arguments)
-    # What is wrong with a property is told before the server is asked.
-    model = check(bundle).model
-    if model is not None and properties.read_properties(arguments, model) is None:
+    if not are_understood(arguments, bundle):
         return ExitCode.USAGE
     arguments.limit = None
     found = _verified(arguments, client, verify_task(arguments, bundle, b""))
     return _report_verdicts(arguments, found, bundle, Deployment(arguments.deployment))
+
+
+def are_understood(arguments: argparse.Namespace, bundle: Bundle) -> bool:
+    """Whether the properties can be understood; what is wrong with one is told before the server is asked."""
+    from robosc.model import check
+
+    model = check(bundle).model
+    return model is None or properties.read_properties(arguments, model) is not None
 
 
 def _verified(arguments: argparse.Namespace, client: Client, task: Verify) -> Verification:

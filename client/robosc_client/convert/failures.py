@@ -11,6 +11,7 @@ from robosc.source import visible
 _DETAILS = "grpc-status-details-bin"
 _DOMAIN = "robosc"
 _MAXIMUM_MESSAGE = 2000
+_MAXIMUM_REASON = 400
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,16 +31,23 @@ class Failure:
     retry_after_s: float | None = None
 
 
+def first_line(text: str) -> str:
+    """What gRPC or a server says of a connection, as a sentence may end with it: bounded, harmless on a terminal."""
+    return visible(text[:_MAXIMUM_REASON].strip().partition("\n")[0].rstrip())
+
+
 def failure_of(error: grpc.RpcError) -> Failure:
     """How a call failed; what is malformed in the details counts as not told."""
     # Every error of a call is also a grpc.Call; the stubs do not say so.
     call: Any = error
-    message = visible((call.details() or "")[:_MAXIMUM_MESSAGE])
+    details = call.details() or ""
+    message = visible(details[:_MAXIMUM_MESSAGE])
     for key, value in call.trailing_metadata() or ():
         if key == _DETAILS and isinstance(value, bytes):
             reason, retry_after_s = _details(value)
             return Failure(call.code(), message, reason, retry_after_s)
-    return Failure(call.code(), message)
+    # Without a word of a server, this is gRPC's own.
+    return Failure(call.code(), first_line(details) if call.code() is grpc.StatusCode.UNAVAILABLE else message)
 
 
 def _details(content: bytes) -> tuple[str, float | None]:

@@ -73,7 +73,9 @@ def _request(task: Task) -> Request:
             )
         case Explore():
             return pb.ExploreRequest(
-                bundle=_bundle(task.bundle), options=_options(task.options), maximum_states=task.maximum_states or 0
+                bundle=_bundle(task.bundle),
+                options=_options(task.options),
+                maximum_states=_limit(task.maximum_states, "maximum_states"),
             )
         case Verify():
             return _verify_request(task)
@@ -127,7 +129,7 @@ def _verify_request(task: Verify) -> pb.VerifyRequest:
         deployment=_DEPLOYMENTS[task.deployment],
         engine=_engine(task.engine),
         allow_reordering=task.allow_reordering,
-        maximum_nodes=task.maximum_nodes or 0,
+        maximum_nodes=_limit(task.maximum_nodes, "maximum_nodes"),
     )
     return pb.VerifyRequest(
         bundle=_bundle(task.bundle),
@@ -135,7 +137,7 @@ def _verify_request(task: Verify) -> pb.VerifyRequest:
         supervisor=task.supervisor,
         properties=task.properties,
         property_files=map(_file, task.property_files),
-        maximum_states=task.maximum_states or 0,
+        maximum_states=_limit(task.maximum_states, "maximum_states"),
         strict=task.is_strict,
     )
 
@@ -146,8 +148,20 @@ def _options(options: SynthesisOptions) -> pb.SynthesisOptions:
         engine=_engine(options.engine),
         allow_livelock=options.allow_livelock,
         allow_reordering=options.allow_reordering,
-        maximum_nodes=options.maximum_nodes or 0,
+        maximum_nodes=_limit(options.maximum_nodes, "maximum_nodes"),
+        verified_states=options.verified_states,
     )
+
+
+def _limit(most: int | None, name: str) -> int:
+    """A limit as a request has it, where 0 is the server's own.
+
+    Raises:
+        ValueError: It is 0 or less, which no request can say.
+    """
+    if most is not None and most < 1:
+        raise ValueError(f"{name} is {most}, and must be at least 1")
+    return most or 0
 
 
 def _engine(name: str) -> str:

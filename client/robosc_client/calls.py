@@ -1,0 +1,207 @@
+"""Calls on their way to a result, over as many attempts as it takes: the same for both clients.
+
+No input or output is done here. A client makes the call that it is told of, gives every message that it receives, or
+the error, and waits as long as it is told to.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import grpc
+
+from robosc_api.v1 import jobs_pb2
+from robosc_client.convert import jobs
+from robosc_client.convert.assembly import Assembly, Whole
+from robosc_client.convert.failures import Failure, failure_of
+from robosc_client.convert.requests import list_request
+from robosc_client.errors import malformed
+from robosc_client.jobs import Job, JobState, TaskKind
+from robosc_client.results import Progress
+from robosc_client.retry import Attempts, RetryPolicy
+
+MAXIMUM_PAGE = 1000
+"""Jobs that one answer lists."""
+
+LOST = Failure(grpc.StatusCode.UNAVAILABLE, "the watch ended before the job")
+"""How a watch has failed that ends well before its job does."""
+
+_EMPTY_PAGES = 100
+
+type OnProgress = Callable[[Progress], None]
+
+
+def ignored(progress: Progress) -> None:
+    """Nobody wants to know."""
+
+
+@dataclass(frozen=True, slots=True)
+class Operation[Result]:
+    """One call, to be made until it is answered.
+
+    Attributes:
+        method: Name of the method.
+        request: The request message.
+        assembly: Makes what puts an answer together; each attempt needs another.
+        is_stream: Whether the answer is a stream of messages.
+        is_about_jobs: Whether the method is of the service for jobs.
+        deadline_s: Seconds for all attempts together; None: any number.
+        on_progress: Told where the work is.
+    """
+
+    method: str
+    request: Any
+    assembly: Callable[[], Assembly[Result]]
+    is_stream: bool = False
+    is_about_jobs: bool = False
+    deadline_s: float | None = None
+    on_progress: OnProgress = ignored
+
+
+class Course[Result]:
+    """One operation on its way to its result."""
+
+    def __init__(self, operation: Operation[Result], policy: RetryPolicy, address: str) -> None:
+        """Begin.
+
+        Args:
+            operation: What is called.
+            policy: How often and when.
+            address: Whom it is called of, for messages.
+        """
+        self._operation = operation
+        self._attempts = Attempts(policy, address, operation.deadline_s)
+        self._has_answered = False
+        self._assembly = operation.assembly()
+
+    def begin(self) -> float | None:
+        """An attempt is made: seconds that it may take; None: any number.
+
+        Raises:
+            DeadlineError: There are none left.
+        """
+        self._has_answered = False
+        self._assembly = self._operation.assembly()
+        return self._attempts.timeout_s()
+
+    def take(self, message: Any) -> None:
+        """The next message of the attempt; raises ServiceError for what no RoboSC server sends here."""
+        self._has_answered = True
+        progress = self._assembly.take(message)
+        if progress is not None:
+            self._operation.on_progress(progress)
+
+    def result(self) -> Result:
+        """What it was called for, once the attempt's messages have ended; raises ServiceError where it is not whole."""
+        return self._assembly.result()
+
+    def failed(self, error: grpc.RpcError) -> float:
+        """The attempt has failed: seconds until the next one.
+
+        Raises:
+            ClientError: There is no next one.
+        """
+        return self._attempts.delay_after(failure_of(error), has_answered=self._has_answered)
+
+
+def about(job_id: str) -> Callable[[Any], Job]:
+    """Reads the job in a message; it raises ServiceError for another job than this."""
+
+    def convert(message: Any) -> Job:
+        job = jobs.job_in(message)
+        if job.id != job_id:
+            raise malformed("it tells of another job")
+        return job
+
+    return convert
+
+
+class Listing:
+    """Pages of jobs, as they are asked for."""
+
+    def __init__(
+        self,
+        states: tuple[JobState, ...],
+        kind: TaskKind | None,
+        *,
+        all_owners: bool,
+        page_size: int,
+        deadline_s: float | None = None,
+    ) -> None:
+        """Begin with the first page.
+
+        Raises:
+            ValueError: The size of a page is none.
+        """
+        if not 0 < page_size <= MAXIMUM_PAGE:
+            raise ValueError(f"a page has from 1 to {MAXIMUM_PAGE} jobs")
+        self._chosen = (states, kind)
+        self._all_owners = all_owners
+        self._page_size = page_size
+        self._deadline_s = deadline_s
+        self._token = ""
+        self._empty = 0
+        self.is_over = False
+
+    def operation(self) -> Operation[tuple[tuple[Job, ...], str]]:
+        """Asks for the next page."""
+        states, kind = self._chosen
+        request = list_request(
+            states, kind, all_owners=self._all_owners, page_size=self._page_size, page_token=self._token
+        )
+
+        def convert(message: jobs_pb2.ListJobsResponse) -> tuple[tuple[Job, ...], str]:
+            return jobs.page_of(message, self._page_size)
+
+        return Operation("ListJobs", request, lambda: Whole(convert), is_about_jobs=True, deadline_s=self._deadline_s)
+
+    def take(self, page: tuple[tuple[Job, ...], str]) -> tuple[Job, ...]:
+        """The jobs of a page.
+
+        Raises:
+            ServiceError: Pages do not get on.
+        """
+        found, token = page
+        self._empty = 0 if found else self._empty + 1
+        if (token and token == self._token) or self._empty > _EMPTY_PAGES:
+            raise malformed("a list of jobs has no end")
+        self._token = token
+        self.is_over = not token
+        return found
+
+
+class Watching:
+    """One job's changes, over as many connections as it takes.
+
+    Attributes:
+        is_over: Whether the job has ended.
+    """
+
+    def __init__(self, job_id: str, after_revision: int = 0, deadline_s: float | None = None) -> None:
+        self._job_id = job_id
+        self._revision = after_revision
+        self._deadline_s = deadline_s
+        self.is_over = False
+
+    def attempts(self, policy: RetryPolicy, address: str) -> Attempts:
+        """How often and when it is asked for."""
+        return Attempts(policy, address, self._deadline_s, is_watch=True)
+
+    def operation(self) -> Operation[Job]:
+        """Asks for what comes after all that was seen; every message is one for `take`."""
+        request = jobs_pb2.WatchJobRequest(id=self._job_id, after_revision=self._revision)
+        return Operation("WatchJob", request, lambda: Whole(self.take), is_stream=True, is_about_jobs=True)
+
+    def take(self, message: jobs_pb2.WatchJobResponse) -> Job:
+        """The job as it is now.
+
+        Raises:
+            ServiceError: It is another job, or nothing has changed.
+        """
+        job = about(self._job_id)(message)
+        # A job that has ended is told of even if nothing has changed.
+        if job.revision < self._revision or (job.revision == self._revision and not job.state.has_ended):
+            raise malformed("a job's changes are not in their order")
+        self._revision = job.revision
+        self.is_over = job.state.has_ended
+        return job

@@ -1,0 +1,62 @@
+"""`robosc-client health`: whether a server is well, by gRPC's health check."""
+
+import argparse
+import sys
+
+from robosc.cli.output import CommandError, ExitCode, print_json
+from robosc.source import visible
+from robosc_client.commands.connection import add_connection_arguments, exit_statuses, target_of
+from robosc_client.connection import CHANNEL_OPTIONS
+from robosc_client.convert.failures import first_line
+from robosc_client.errors import CredentialsError
+
+_DESCRIPTION = """\
+Ask a server whether it is well, by gRPC's health check: for scripts, monitors and people. It is asked once.
+"""
+
+_EPILOG = exit_statuses(
+    "it is well",
+    "it says that it is not, as while it ends or cannot reach what it needs, or that it has no such service",
+    "it is not there, refused, or did not answer before the deadline",
+)
+
+_DEADLINE_S = 5.0
+
+# gRPC's name for how a health check ends that is about a service nobody knows (gRPC Health Checking Protocol).
+_NO_SUCH_SERVICE = "NOT_FOUND:"
+
+
+def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command."""
+    parser = commands.add_parser("health", help="ask whether a server is well", description=_DESCRIPTION)
+    parser.add_argument(
+        "--service",
+        default="",
+        metavar="NAME",
+        help="one of its services, such as robosc_api.v1.JobService (default: the server as a whole)",
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
+    add_connection_arguments(parser, deadline_s=_DEADLINE_S, epilog=_EPILOG)
+    parser.set_defaults(run_alone=_health)
+
+
+def _health(arguments: argparse.Namespace) -> int:
+    from robosc_api.health import ask_service
+    from robosc_api.security import SecurityError
+
+    address, credentials = target_of(arguments)
+    try:
+        found = ask_service(
+            address, arguments.service, credentials, timeout_s=arguments.deadline, options=CHANNEL_OPTIONS
+        )
+    except SecurityError as error:
+        raise CredentialsError(str(error)) from error
+    if not found.has_answered:
+        if found.words.startswith(_NO_SUCH_SERVICE):
+            raise CommandError(f"there is no service {arguments.service!r} at {address}", ExitCode.FAILED)
+        raise CommandError(f"no server answers at {address}: {first_line(found.words)}", ExitCode.SERVICE)
+    if arguments.json:
+        print_json({"server": address, "service": arguments.service, "status": found.words})
+    else:
+        sys.stdout.write(f"{visible(found.words)}\n")
+    return ExitCode.OK if found.is_serving else ExitCode.FAILED

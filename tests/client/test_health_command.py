@@ -1,0 +1,61 @@
+"""`robosc-client health` against a server that is as it is said to be."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from grpc_health.v1 import health_pb2
+
+from robosc_api.security import ServerSecurity
+from robosc_client.main import main
+from support.certificates import Authority
+from support.health_servers import answering
+
+Status = health_pb2.HealthCheckResponse
+IN_THE_CLEAR = ServerSecurity()
+
+
+@pytest.fixture
+def asked(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "settings"))
+
+    def ask(*arguments: Any) -> Any:
+        status = main(["health", *map(str, arguments)])
+        printed = capfd.readouterr()
+        return status, printed.out, printed.err
+
+    return ask
+
+
+def test_well_and_not_well(asked: Any) -> None:
+    with answering(Status.SERVING, Jobs=Status.NOT_SERVING, Odd=Status.UNKNOWN) as address:
+        assert asked("--server", address) == (0, "SERVING\n", "")
+        assert asked("--server", address, "--service", "Jobs") == (1, "NOT_SERVING\n", "")
+        assert asked("--server", address, "--service", "Odd") == (1, "UNKNOWN\n", "")
+        status, out, err = asked("--server", address, "--service", "None")
+        assert (status, out, err) == (1, "", f"robosc-client: there is no service 'None' at {address}\n")
+        assert json.loads(asked("--server", address, "--service", "None", "--json")[1])["error"]["status"] == 1
+        status, out, _ = asked("--server", address, "--service", "Jobs", "--json")
+        assert (status, json.loads(out)) == (1, {"server": address, "service": "Jobs", "status": "NOT_SERVING"})
+
+
+def test_nobody_there(asked: Any) -> None:
+    status, out, err = asked("--server", "127.0.0.1:1")
+    assert (status, out) == (3, "")
+    assert err.startswith("robosc-client: no server answers at 127.0.0.1:1: UNAVAILABLE: ")
+    assert err.count("\n") == 1
+    assert json.loads(asked("--server", "127.0.0.1:1", "--json")[1])["error"]["status"] == 3
+
+
+def test_with_tls_as_a_profile_says(asked: Any, tmp_path: Path) -> None:
+    authority = Authority(tmp_path)
+    certificate, key = authority.sign("server")
+    with answering(Status.SERVING, ServerSecurity(certificate=certificate, key=key)) as address:
+        assert main(["profile", "add", "lab", "--server", address, "--ca", str(authority.file)]) == 0
+        status, out, _ = asked()
+        assert (status, out.splitlines()[-1]) == (0, "SERVING")
+        # In the clear, and believing others.
+        for wrong in ([], ["--tls"]):
+            assert asked("--server", address, *wrong)[0] == 3
+        assert asked("--server", address, "--ca", tmp_path / "none.pem")[0] == 2

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 import yaml
 
+from robosc_server.operations.ending import END_S
 from robosc_server.operations.settings import Settings, settings_from
 from support.checkers import checked
 from support.containers import IMAGES, TOP
@@ -162,7 +163,7 @@ def test_the_settings_of_compose_can_be_used(compose: dict[str, Any]) -> None:
     assert host in compose["services"] and passfile in secrets
     assert settings.workers == f"dask://{compose['services']['worker']['command'][0].removeprefix('tcp://')}"
     assert compose["services"]["server"]["ports"][0].endswith(f":{settings.port}")
-    assert _seconds(server["stop_grace_period"]) > settings.drain_seconds
+    assert _seconds(server["stop_grace_period"]) > settings.drain_seconds + END_S
     threads = int(_after(compose["services"]["worker"]["command"], "--nthreads"))
     memory = int(compose["services"]["worker"]["mem_limit"].removesuffix("g")) * 2**30
     assert threads * settings.task_memory_bytes < memory

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from robosc.signatures import make_key_pair
+from robosc_server.operations.ending import END_S
 from robosc_server.operations.settings import Settings, settings_from
 from robosc_server.signing import SigningError, read_signing_key
 from support.checkers import checked
@@ -124,7 +125,7 @@ def test_the_settings_can_be_used_and_fit_the_pod(variant: str, tmp_path: Path) 
     settings = settings_of(variant, tmp_path)
     pod = named(variant, "Deployment", "robosc-server")["spec"]["template"]["spec"]
     (container,) = pod["containers"]
-    assert settings.drain_seconds + 5 < pod["terminationGracePeriodSeconds"]
+    assert settings.drain_seconds + 5 + END_S < pod["terminationGracePeriodSeconds"]
     ports = {port["name"]: port["containerPort"] for port in container["ports"]}
     assert settings.port == ports["grpc"]
     assert str(settings.metrics_address).endswith(f":{ports['metrics']}")

@@ -54,6 +54,7 @@ def tls(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.real_time
 def test_the_container_answers_and_ends(
     image: Image, network: Network, configuration: Path, tls: Path, tmp_path: Path
 ) -> None:

@@ -95,6 +95,7 @@ def assert_confined(container: Container, state: str, user: int) -> None:
     assert container.run(["touch", f"{state}/mine", "/tmp/mine"]).returncode == 0
 
 
+@pytest.mark.real_time
 def test_the_container_answers_and_ends(image: Image, network: Network, secrets: Secrets, tmp_path: Path) -> None:
     stage = image.stage
     start = Start(

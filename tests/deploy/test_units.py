@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from robosc_server.operations.ending import END_S
 from robosc_server.operations.settings import Settings
 from support.containers import TOP
 from support.units import read_unit
@@ -71,7 +72,7 @@ def test_a_unit_promises_nothing_that_its_program_does_not_keep(file: Path) -> N
 
 def test_the_servers_unit_gives_it_time_to_drain_and_settings_that_there_are() -> None:
     unit = read_unit(TOP / "deploy" / "systemd" / "robosc-server.service")
-    assert float(unit.one("TimeoutStopSec")) > Settings().drain_seconds
+    assert float(unit.one("TimeoutStopSec")) > Settings().drain_seconds + END_S
     # Dask and what counts the memory of processes read /proc/meminfo and its like.
     assert not unit.all("ProcSubset")
     for text in unit.all("Environment"):

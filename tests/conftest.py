@@ -4,6 +4,8 @@ Programs that they start can be interrupted, tests that share something dear run
 figures are told at the end of the run.
 """
 
+import importlib
+import os
 import signal
 from collections.abc import Generator
 from pathlib import Path
@@ -14,6 +16,14 @@ import pytest
 from xdist.scheduler import LoadScopeScheduling  # type: ignore[import-untyped]
 
 from support.real_time import LATE_S, Lateness, MachineLateError, preferred
+
+# Our programs have gRPC's own log off, which is read at its import: in this process, which runs what they run, it would
+# stand among what they tell. Programs that are started hide it themselves.
+_verbosity = os.environ.get("GRPC_VERBOSITY")
+os.environ.setdefault("GRPC_VERBOSITY", "NONE")
+importlib.import_module("grpc")
+if _verbosity is None:
+    del os.environ["GRPC_VERBOSITY"]
 
 # A shell starts what it runs in the background with SIGINT ignored, and programs hand that down: Ctrl-C would not reach
 # the programs of the tests.
@@ -35,6 +45,10 @@ _IN_REAL_TIME = (
     "tests/bridge/daemon/test_run.py",
     "tests/bridge/daemon/test_simulated_scanner.py",
     "tests/bridge/devices/test_drive_bases.py",
+    "tests/bridge/devices/test_mavlink_rover.py",
+    "tests/bridge/devices/test_mavlink_rover_faults.py",
+    "tests/bridge/devices/test_mavlink_rover_obstacles.py",
+    "tests/bridge/devices/test_mavlink_rover_refusals.py",
     "tests/bridge/ground/test_ground_run.py",
     "tests/bridge/remote/test_whole.py",
     "tests/bridge/terminal/test_teleop.py",
@@ -46,6 +60,7 @@ _IN_REAL_TIME = (
     "tests/end_to_end/test_twin_ros1.py",
     "tests/end_to_end/test_twin_ros2.py",
     "tests/end_to_end/test_twin_roslaunch.py",
+    "tests/server/test_ended_in_time.py",
     "tests/test_tutorial.py",
 )
 
@@ -56,8 +71,10 @@ _BY_FILE = (
     "tests/robosc/targets/cpp/",
     "tests/server/jobs/test_job_faults.py",
     "tests/server/jobs/test_job_replicas.py",
+    "tests/server/test_hostile_models.py",
     "tests/server/test_reflection_client.py",
     "tests/server/test_replicas_on_a_cluster.py",
+    "tests/server/test_store_faults.py",
     "tests/server/test_typescript_client.py",
     "tests/server/workers/",
 )

@@ -14,7 +14,7 @@ NOTHING_CHOSEN=5
 INTERRUPTED=2
 
 many() {
-  "$PYTHON" -m pytest -n "$WORKERS" --dist loadscope --durations 20 "$@"
+  "$PYTHON" -m pytest -n "$WORKERS" --dist loadscope --durations 20 -r fEs "$@"
 }
 
 # Who chooses by markers has said which ones: pytest knows one choice alone.
@@ -30,7 +30,7 @@ done
 many -m 'not real_time' "$@"
 first=$?
 [ "$first" -ne "$INTERRUPTED" ] || exit "$INTERRUPTED"
-"$PYTHON" -m pytest -m real_time --durations 20 "$@"
+"$PYTHON" -m pytest -m real_time --durations 20 -r fEs "$@"
 second=$?
 
 # Its failures stand far above.

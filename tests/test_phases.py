@@ -59,18 +59,18 @@ def test_both_phases_run_and_a_failure_in_either_counts(first: int, second: int,
     found, told = run(tmp_path, first, second, "tests/a", "-k", "b")
     assert found == status
     assert told == [
-        "-m pytest -n 3 --dist loadscope --durations 20 -m not real_time tests/a -k b",
-        "-m pytest -m real_time --durations 20 tests/a -k b",
+        "-m pytest -n 3 --dist loadscope --durations 20 -r fEs -m not real_time tests/a -k b",
+        "-m pytest -m real_time --durations 20 -r fEs tests/a -k b",
     ]
 
 
 def test_after_an_interrupt_there_is_no_second_phase(tmp_path: Path) -> None:
-    assert run(tmp_path, 2, 0) == (2, ["-m pytest -n 3 --dist loadscope --durations 20 -m not real_time"])
+    assert run(tmp_path, 2, 0) == (2, ["-m pytest -n 3 --dist loadscope --durations 20 -r fEs -m not real_time"])
 
 
 @pytest.mark.parametrize("words", [("-m", "ros2"), ("tests/a", "-mros2")])
 def test_who_chooses_by_markers_gets_one_phase(words: tuple[str, ...], tmp_path: Path) -> None:
-    given = ["-m pytest -n 3 --dist loadscope --durations 20 " + " ".join(words)]
+    given = ["-m pytest -n 3 --dist loadscope --durations 20 -r fEs " + " ".join(words)]
     assert run(tmp_path, 0, 1, *words) == (1, given)
 
 
@@ -79,12 +79,14 @@ def test_what_lives_by_the_clock_is_marked() -> None:
     whole, some, folder = (
         "tests/bridge/daemon/test_run.py",
         "tests/bridge/devices/test_dynamixel_bus.py",
-        "tests/deploy",
+        "tests/api",
     )
-    others = {f"tests/deploy/{file.name}" for file in SCRIPT.with_name("deploy").glob("test_*.py")}
+    # Words that somebody gives every pytest would change what is printed.
+    plain = {name: value for name, value in os.environ.items() if name != "PYTEST_ADDOPTS"}
+    others = {f"tests/api/{file.name}" for file in SCRIPT.with_name("api").glob("test_*.py")}
     for marked, files in (("real_time", {whole, some}), ("not real_time", {some, *others})):
         command = ["-m", "pytest", "-p", "no:cacheprovider", "--collect-only", "-q", "-m", marked, whole, some, folder]
         ended = subprocess.run(
-            [sys.executable, *command], cwd=SCRIPT.parents[1], capture_output=True, text=True, timeout=120
+            [sys.executable, *command], cwd=SCRIPT.parents[1], env=plain, capture_output=True, text=True, timeout=120
         )
         assert {line.partition("::")[0] for line in ended.stdout.splitlines() if "::" in line} == files

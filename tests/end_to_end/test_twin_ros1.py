@@ -213,7 +213,7 @@ def test_a_helper_says_in_one_line_what_is_wrong_with_a_parameter(master: Master
 
 
 def test_the_maze_solver_gets_out_of_the_spiral(tmp_path: Path, record_property: Callable[[str, object], None]) -> None:
-    outcome = run_maze(tmp_path / "run", "maze-spiral", speed=15.0, say=lambda line: None)
+    outcome = run_maze(tmp_path / "run", "maze-spiral", speed=6.0, say=lambda line: None)
     assert outcome.faults == ()
     assert outcome.figures["collisions"] == 0.0
     assert outcome.connection == "ros1"

@@ -185,7 +185,7 @@ def alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_the_maze_solver_gets_out_of_the_spiral(alone: Path, record_property: Callable[[str, object], None]) -> None:
-    outcome = run_maze(alone, "maze-spiral", speed=15.0, say=lambda line: None)
+    outcome = run_maze(alone, "maze-spiral", speed=6.0, say=lambda line: None)
     assert outcome.faults == ()
     assert outcome.figures["collisions"] == 0.0
     assert outcome.connection == "ros2"

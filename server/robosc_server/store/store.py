@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from itertools import batched
 
-from sqlalchemy import Connection
+from sqlalchemy import Connection, func, select
 
 from robosc_server.store import job_rows, replica_rows, result_rows
 from robosc_server.store.database import Database
@@ -21,6 +21,8 @@ _SWEPT_AT_ONCE = 200
 _TAKEN_AT_ONCE = 200
 _THINNED_AT_ONCE = 50
 _FREE_PAGES = 2000
+_SWEEPING = 0x526F626F5343
+"""The advisory lock of PostgreSQL that one of several servers has while it makes room: any number that is ours."""
 
 
 def _nothing() -> None:
@@ -275,8 +277,8 @@ class Store:
     ) -> int:
         """Have owners give something back until all together hold no more than a bound; how many things that were."""
         held, total = await self._database.read(sizes), 0
-        while (excess := sum(held.values()) - bound) > 0:
-            number, held = await self._database.write(partial(_given, give, held, excess))
+        while sum(held.values()) > bound:
+            number, held = await self._database.write(partial(_given, sizes, give, held, bound))
             if not number:
                 break
             total += number
@@ -284,12 +286,19 @@ class Store:
 
 
 def _given(
+    sizes: Callable[[Connection], dict[str, int]],
     give: Callable[[Connection, dict[str, int], int, int], tuple[int, dict[str, int]]],
     held: dict[str, int],
-    excess: int,
+    bound: int,
     connection: Connection,
 ) -> tuple[int, dict[str, int]]:
-    return give(connection, held, excess, _THINNED_AT_ONCE)
+    """Some of what is too much goes; where other servers do the same, one at a time, and by what is held by then."""
+    if connection.dialect.name == "postgresql":
+        if not connection.scalar(select(func.pg_try_advisory_xact_lock(_SWEEPING))):
+            return 0, held
+        held = sizes(connection)
+    excess = sum(held.values()) - bound
+    return give(connection, held, excess, _THINNED_AT_ONCE) if excess > 0 else (0, held)
 
 
 def _beat(replica: str, connection: Connection) -> bool:

@@ -97,7 +97,8 @@ def is_refused_while_others_are_answered(served: Server, text: str, ending: tupl
         assert refusal.result() == ending
         assert meanwhile
         served.answers_another()
-        assert served.busy_workers() == []
+        # What a process had of memory is given back before it is gone.
+        assert eventually(lambda: served.busy_workers() == [])
 
 
 def test_a_model_that_takes_all_memory(tmp_path: Path) -> None:

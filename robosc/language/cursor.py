@@ -9,6 +9,7 @@ the innermost one.
 
 import difflib
 from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.language import syntax
@@ -33,6 +34,20 @@ class TooManyFaults(Exception):
     """There are so many syntax errors that the rest of the text is left unread."""
 
 
+class Extent(NamedTuple):
+    """Where an item of a list stands in the text.
+
+    Attributes:
+        item: Its tree.
+        begin: Offset of its first character.
+        end: Offset behind its last one.
+    """
+
+    item: object
+    begin: int
+    end: int
+
+
 class Cursor:
     """Reads tokens one after the other.
 
@@ -41,12 +56,14 @@ class Cursor:
         kinds: Their kinds.
         place: Index of the next token.
         diagnostics: What was found so far.
+        extents: The items of lists that were read so far.
     """
 
     def __init__(self, file: SourceFile, tokens: Tokens, places: Places) -> None:
         self.texts, self.kinds, self._starts = tokens
         self.place = 0
         self.diagnostics: list[Diagnostic] = []
+        self.extents: list[Extent] = []
         self._file = file
         self._places = places
         self._lists: list[Mapping[str, object]] = []
@@ -227,9 +244,13 @@ class Cursor:
                     break
                 continue
             try:
-                found.append(parser())
+                item = parser()
             except Fault:
                 self._recover(begin)
+                continue
+            found.append(item)
+            last = self.place - 1
+            self.extents.append(Extent(item, self._starts[begin], self._starts[last] + len(self.texts[last])))
         self._braces.pop()
         self._lists.pop()
         self._depth -= 1
@@ -318,4 +339,4 @@ class Cursor:
         self.place = self._resumed = index
 
 
-__all__ = ["Cursor", "Fault", "TooManyFaults"]
+__all__ = ["Cursor", "Extent", "Fault", "TooManyFaults"]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from robosc.errors import Diagnostic, RelatedPlace, sorted_diagnostics
 from robosc.language import syntax
-from robosc.language.cursor import Fault, TooManyFaults
+from robosc.language.cursor import Extent, Fault, TooManyFaults
 from robosc.language.expressions import ExpressionParser
 from robosc.language.limits import FRAMES_PER_LEVEL, MAXIMUM_NESTING
 from robosc.language.tokens import Kind, Places, Tokens, obstacle, tokenize
@@ -30,10 +30,14 @@ class Parsed:
     Attributes:
         tree: The syntax tree, or None where there are errors.
         diagnostics: Everything that is wrong with the text, by place.
+        sound: The syntax tree of the items that are sound, or None where not even the first words are.
+        extents: Where each sound item that stands in a list begins and ends, inner ones first.
     """
 
     tree: syntax.File | None
     diagnostics: tuple[Diagnostic, ...]
+    sound: syntax.File | None = None
+    extents: tuple[Extent, ...] = ()
 
 
 def parse(file: SourceFile) -> Parsed:
@@ -49,7 +53,7 @@ def parse(file: SourceFile) -> Parsed:
     with suppress(Fault, TooManyFaults):
         tree = parser.file()
     diagnostics = sorted_diagnostics(parser.diagnostics)
-    return Parsed(None if diagnostics else tree, diagnostics)
+    return Parsed(None if diagnostics else tree, diagnostics, tree, tuple(parser.extents))
 
 
 class _Parser(ExpressionParser):

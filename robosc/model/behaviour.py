@@ -116,7 +116,9 @@ def component_names(part: Part, tree: BehaviourTree | None, types: Types, findin
     for variable in tree.variables:
         variables.setdefault(variable.name.text, _variable_type(variable, part, types, findings))
     declared = {variable.name.text: variable.type.location for variable in reversed(tree.variables)}
-    return ComponentNames(part.name, frozenset(state.name.text for state in tree.states), variables, declared)
+    names = [*(state.name for state in tree.states), *(variable.name for variable in tree.variables)]
+    places = {name.text: name.location for name in reversed(names)}
+    return ComponentNames(part.name, frozenset(state.name.text for state in tree.states), variables, declared, places)
 
 
 def _unique_names(tree: BehaviourTree, findings: Findings) -> None:
@@ -273,10 +275,12 @@ class BehaviourBuilder:
         if name.text not in self._states_by_name:
             self._findings.unknown("state", name.text, name.location, self._states_by_name)
             return None
+        self._findings.bindings.bind(name, self._states_by_name[name.text].name.location)
         return name.text
 
     def _event(self, tree: syntax.CommunicationTransition) -> tuple[Communication, EventKind] | None:
         communication = self._communications.get(tree.communication.text)
+        self._findings.bindings.bind_communication(tree.communication)
         if communication is None:
             self._unknown_communication(tree.communication)
             return None
@@ -339,6 +343,7 @@ class BehaviourBuilder:
         if access.root is not None and len(names) == 2 and own is not None:
             component = self._scope.components.get(access.root.text)
             if component is not None and component.name == own.name:
+                self._findings.bindings.bind(access.root, self._scope.component_places.get(access.root.text))
                 names = names[1:]
         name = names[0]
         if own is None or len(names) != 1 or not isinstance(name, syntax.Name) or name.text not in own.variables:
@@ -351,6 +356,7 @@ class BehaviourBuilder:
                 "Assign a variable of this behaviour" + (f": {', '.join(known)}." if known else "."),
             )
             return None
+        self._findings.bindings.bind(name, own.places.get(name.text))
         return name.text
 
     def _assigned(self, update: syntax.Update, name: str, checker: ExpressionChecker) -> Expression | None:

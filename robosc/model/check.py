@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from robosc.errors import Diagnostic, InternalError, LanguageError, RelatedPlace, Severity, sorted_diagnostics
-from robosc.language import parse, syntax
+from robosc.language import Parsed, parse, syntax
 from robosc.model.behaviour import (
     BehaviourBuilder,
     BehaviourTree,
@@ -12,6 +12,7 @@ from robosc.model.behaviour import (
     component_names,
     partial_updates,
 )
+from robosc.model.bindings import Bindings
 from robosc.model.communications import (
     CommunicationTree,
     build_communication,
@@ -51,11 +52,13 @@ class Checked:
         model: The robot, or None if there are errors or the main file is a library.
         diagnostics: Every finding, sorted by place.
         places: Where the parts of the model stand, or None without a model.
+        bindings: What the names of the text mean, as far as it was read.
     """
 
     model: Model | None
     diagnostics: tuple[Diagnostic, ...]
     places: Places | None = None
+    bindings: Bindings = field(default_factory=Bindings)
 
     @property
     def has_errors(self) -> bool:
@@ -78,20 +81,57 @@ class Checked:
         raise LanguageError([library, *self.diagnostics])
 
 
+@dataclass(frozen=True, slots=True)
+class Inspected:
+    """What can be told of a bundle whatever is wrong with it, for editors.
+
+    Attributes:
+        checked: As `check` has it.
+        parsed: What became of the main text.
+        parts: The components of the robot, imports followed.
+        scopes: What names mean in each place of it; None where there is no tree.
+        units: The files that were read, the main one first.
+    """
+
+    checked: Checked
+    parsed: Parsed
+    parts: tuple[Part, ...] = ()
+    scopes: Scopes | None = None
+    units: tuple[Unit, ...] = ()
+
+
 def check(bundle: Bundle) -> Checked:
     """Check the main file of a bundle with the libraries that it imports from; never raises for any text."""
     parsed = parse(bundle.main)
     if parsed.tree is None:
         return Checked(None, parsed.diagnostics)
-    findings = Findings()
-    checker = _RobotChecker(parsed.tree, bundle, findings)
+    return _checked(_RobotChecker(parsed.tree, bundle, Findings()), parsed.tree)
+
+
+def inspect(bundle: Bundle) -> Inspected:
+    """As `check`; of a text with errors, what is sound of it has its names bound all the same."""
+    parsed = parse(bundle.main)
+    if parsed.sound is None:
+        return Inspected(Checked(None, parsed.diagnostics), parsed)
+    checker = _RobotChecker(parsed.sound, bundle, Findings())
+    if parsed.tree is not None:
+        checked = _checked(checker, parsed.tree)
+    else:
+        # What is missing has left faults behind that are none: they are not told.
+        checker.model()
+        checked = Checked(None, parsed.diagnostics, bindings=checker.findings.bindings)
+    return Inspected(checked, parsed, checker.parts, checker.scopes, checker.units)
+
+
+def _checked(checker: "_RobotChecker", tree: syntax.File) -> Checked:
+    findings = checker.findings
     model = checker.model()
     diagnostics = sorted_diagnostics(findings.diagnostics)
-    if findings.has_errors or parsed.tree.is_library:
-        return Checked(None, diagnostics)
+    if findings.has_errors or tree.is_library:
+        return Checked(None, diagnostics, bindings=findings.bindings)
     if model is None:
         raise InternalError("a model without errors could not be built")
-    return Checked(model, diagnostics, checker.places)
+    return Checked(model, diagnostics, checker.places, findings.bindings)
 
 
 class _RobotChecker:
@@ -99,49 +139,55 @@ class _RobotChecker:
 
     def __init__(self, tree: syntax.File, bundle: Bundle, findings: Findings) -> None:
         self._tree = tree
-        self._findings = findings
+        self.findings = findings
         self._types = Types(findings)
         self._unit = make_unit(tree, findings)
         self._interfaces = bundle.interfaces
         self._libraries = Libraries(bundle, self._unit, findings)
-        self._parts = parts_of(self._unit, self._libraries, findings)
+        self.parts = parts_of(self._unit, self._libraries, findings)
         self.places = Places(tree.name.location)
+        self.scopes: Scopes | None = None
+
+    @property
+    def units(self) -> tuple[Unit, ...]:
+        """The files that were read, the main one first."""
+        return tuple(dict.fromkeys((self._unit, *self._libraries.units)))
 
     def model(self) -> Model | None:
         """The model, or None where it cannot be built."""
         self._resolve_own_types()
-        trees = communication_trees(self._parts, self._findings)
+        trees = communication_trees(self.parts, self.findings)
         communications = self._communications(trees)
-        behaviour_trees = {part.name: behaviour_tree(part, self._findings) for part in self._parts}
+        behaviour_trees = {part.name: behaviour_tree(part, self.findings) for part in self.parts}
         names = {
-            part.name: component_names(part, behaviour_trees[part.name], self._types, self._findings)
-            for part in self._parts
+            part.name: component_names(part, behaviour_trees[part.name], self._types, self.findings)
+            for part in self.parts
         }
-        constants = Constants(self._types, self._findings)
-        scopes = Scopes(self._unit, self._types, self._parts, self._libraries, names, constants)
+        constants = Constants(self._types, self.findings)
+        self.scopes = scopes = Scopes(self._unit, self._types, self.parts, self._libraries, names, constants)
         scopes.of(self._unit)  # Also a file whose constants nothing uses has them checked.
         enums = self._enums(scopes)
         behaviours = self._behaviours(behaviour_trees, scopes, communications)
-        restrictions = Restrictions(self._unit, self._parts, self._libraries, scopes, self._types, self._findings)
+        restrictions = Restrictions(self._unit, self.parts, self._libraries, scopes, self._types, self.findings)
         restrictions.build(communications, self.places)
         requirements, provides = tuple(restrictions.requirements), tuple(restrictions.provides)
         invariants = tuple(restrictions.invariants)
-        communications = with_conditions(trees, communications, scopes, self._findings)
+        communications = with_conditions(trees, communications, scopes, self.findings)
         marked = mark_synthesis_variables(behaviours, requirements, provides, invariants)
         for name, behaviour in marked.items():
             tree = behaviour_trees[name]
             if tree is not None:
-                check_synthesis_variables(tree, behaviour, communications, self._types, self._findings)
-                partial_updates(tree, behaviour, self._findings)
-        check_fields(communications.values(), self._interfaces, self.places.communications, self._types, self._findings)
+                check_synthesis_variables(tree, behaviour, communications, self._types, self.findings)
+                partial_updates(tree, behaviour, self.findings)
+        check_fields(communications.values(), self._interfaces, self.places.communications, self._types, self.findings)
         self._check_requests(communications, marked, requirements)
         self._check_empty(communications)
         self.places.objects.update(self._types.object_places)
-        if self._findings.has_errors:
+        if self.findings.has_errors:
             return None
         return Model(
             name=self._tree.name.text,
-            components=tuple(Component(part.name, marked.get(part.name)) for part in self._parts),
+            components=tuple(Component(part.name, marked.get(part.name)) for part in self.parts),
             communications=tuple(communications.values()),
             enums=enums,
             objects=tuple(self._types.objects.values()),
@@ -159,13 +205,13 @@ class _RobotChecker:
     def _communications(self, trees: Iterable[CommunicationTree]) -> dict[str, Communication]:
         found: dict[str, Communication] = {}
         for item in trees:
-            communication = build_communication(item, self._types, self._findings)
+            communication = build_communication(item, self._types, self.findings)
             if communication is not None and communication.name not in found:
                 found[communication.name] = communication
                 self.places.communications[communication.name] = item.location
                 self.places.identifiers[communication.name] = item.identifier_location
-        self._findings.communications_are_broken({item.tree.name.text for item in trees} - found.keys())
-        check_topics(found.values(), self.places.communications, self._types, self._findings)
+        self.findings.communications_are_broken({item.tree.name.text for item in trees} - found.keys())
+        check_topics(found.values(), self.places.communications, self._types, self.findings)
         return found
 
     def _enums(self, scopes: Scopes) -> tuple[EnumDefinition, ...]:
@@ -173,7 +219,7 @@ class _RobotChecker:
         found = []
         for key, (enum, unit, tree) in self._types.enums.items():
             source = self._types.sources[key]
-            checker = ExpressionChecker(scopes.for_rules(unit, source), self._findings)
+            checker = ExpressionChecker(scopes.for_rules(unit, source), self.findings)
             rules = []
             for rule in tree.rules:
                 condition = None if rule.condition is None else checker.condition(rule.condition)
@@ -199,13 +245,13 @@ class _RobotChecker:
             if enum.values
         }
         found: dict[str, Behaviour] = {}
-        for part in self._parts:
+        for part in self.parts:
             self.places.components[part.name] = part.place
             tree = trees[part.name]
             if tree is None:
                 continue
             unknown = self._unknown_communication(part, communications)
-            builder = BehaviourBuilder(tree, scopes.inside(part), communications, defaults, self._findings, unknown)
+            builder = BehaviourBuilder(tree, scopes.inside(part), communications, defaults, self.findings, unknown)
             found[part.name] = builder.build()
             self._place_behaviour(tree)
         return found
@@ -217,7 +263,7 @@ class _RobotChecker:
         self.places.transitions[name] = tuple(transition.location for _, transition in tree.transitions)
 
     def _unknown_communication(self, part: Part, communications: Mapping[str, Communication]) -> "_Unknown":
-        return _Unknown(part, self._unit, communications, self._findings)
+        return _Unknown(part, self._unit, communications, self.findings)
 
     def _check_requests(
         self,
@@ -232,7 +278,7 @@ class _RobotChecker:
                 if communications[name].kind is CommunicationKind.ACTION:
                     component = own.breaking(name, requirement.condition)
                     if component is not None:
-                        self._findings.note(
+                        self.findings.note(
                             "request-leaves-requirement",
                             f"the request of '{name}' makes this requirement false in '{component}', so it never "
                             "cancels it",
@@ -241,8 +287,8 @@ class _RobotChecker:
                         )
 
     def _check_empty(self, communications: Mapping[str, Communication]) -> None:
-        if not communications and not self._tree.is_library and not self._findings.has_errors:
-            self._findings.warning(
+        if not communications and not self._tree.is_library and not self.findings.has_errors:
+            self.findings.warning(
                 "empty-model",
                 f"'{self._tree.name.text}' has no communication: there is nothing to synthesize",
                 self._tree.name.location,

@@ -63,6 +63,8 @@ def communication_trees(parts: Sequence[Part], findings: Findings) -> tuple[Comm
     ]
     names = [syntax.Name(item.tree.name.text, item.location) for item in trees]
     unique(names, "duplicate-communication", "communication", findings)
+    for item in trees:
+        findings.bindings.communications.setdefault(item.tree.name.text, item.tree.name.location)
     return tuple(trees)
 
 
@@ -148,6 +150,7 @@ def _interface(link: syntax.Name | None, part: Part, findings: Findings) -> Inte
     if found is None:
         findings.unknown("interface", link.text, link.location, part.unit.interfaces)
         return None
+    findings.bindings.bind(link, found.name.location)
     return Interface(found.type.text, found.package.text)
 
 

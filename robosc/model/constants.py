@@ -100,7 +100,8 @@ class Constants:
 
     def _checker(self, unit: Unit, scopes: Scopes) -> ExpressionChecker:
         if unit not in self._checkers:
-            scope = replace(scopes.of_constants(unit), constants=self._names(unit, scopes))
+            visible = self._names(unit, scopes)
+            scope = replace(scopes.of_constants(unit), constants=visible, constant_places=visible.places)
             self._checkers[unit] = ExpressionChecker(scope, self._findings)
         return self._checkers[unit]
 
@@ -162,6 +163,7 @@ class VisibleConstants(Mapping[str, Typed | None]):
 
     Attributes:
         ambiguous: Names that several libraries define, with the libraries' names.
+        places: Where each is defined.
     """
 
     def __init__(
@@ -175,6 +177,7 @@ class VisibleConstants(Mapping[str, Typed | None]):
         self._scopes = scopes
         self._homes = homes
         self.ambiguous = ambiguous
+        self.places = {name: home.constants[name].name.location for name, home in homes.items()}
 
     def __getitem__(self, name: str) -> Typed | None:
         return self._constants.resolve(self._homes[name], name, self._scopes)

@@ -79,7 +79,8 @@ class ExpressionChecker:
     def __init__(self, scope: Scope, findings: Findings) -> None:
         self._scope = scope
         self._findings = findings
-        self._elements: list[tuple[str, Type]] = []
+        self._elements: list[tuple[syntax.Name, Type]] = []
+        self._bind = findings.bindings.bind
         self._ranges: dict[Expression, Range] = {}
 
     @contextmanager
@@ -224,7 +225,7 @@ class ExpressionChecker:
         if not isinstance(tree, syntax.Access) or tree.root is None or tree.steps:
             return False
         name = tree.root.text
-        if any(variable == name for variable, _ in self._elements):
+        if any(variable.text == name for variable, _ in self._elements):
             return False
         if name in self._scope.constants and not self._scope.enums_with(name):
             return False
@@ -347,7 +348,7 @@ class ExpressionChecker:
         if found is None:
             return None
         part, element = found
-        self._elements.append((tree.variable.text, element))
+        self._elements.append((tree.variable, element))
         condition = self.condition(tree.condition)
         self._elements.pop()
         if condition is None:
@@ -379,19 +380,22 @@ class ExpressionChecker:
             return self._received(tree)
         name, own = tree.root.text, self._scope.own
         for level, (variable, element) in enumerate(reversed(self._elements)):
-            if variable == name:
+            if variable.text == name:
+                self._bind(tree.root, variable.location)
                 walked = self._walk(element, tree.steps)
                 return None if walked is None else Typed(Element(level, walked[0]), walked[1])
         if tree.steps and name in self._scope.components:
+            self._bind(tree.root, self._scope.component_places.get(name))
             return self._component_part(tree, self._scope.components[name])
         if own and name in own.variables:
             return self._variable(tree, own, tree.root, tree.steps)
         if not tree.steps and name in self._scope.constants:
             is_wanted_value = isinstance(wanted, EnumType) and wanted in self._scope.enums_with(name)
             if not is_wanted_value:
+                self._bind(tree.root, self._scope.constant_places.get(name))
                 return self._scope.constants[name]  # None for a broken one, which has been reported.
         if not tree.steps and self._scope.enums_with(name):
-            return self._enum_value(tree, name, wanted)
+            return self._enum_value(tree, tree.root, wanted)
         if tree.steps and name in self._scope.enums:
             return self._qualified_value(tree, self._scope.enums[name])
         if name in self._scope.components:
@@ -431,6 +435,7 @@ class ExpressionChecker:
         if step.text in component.variables:
             return self._variable(tree, component, step, tree.steps[1:])
         if step.text in component.states:
+            self._bind(step, component.places.get(step.text))
             if len(tree.steps) > 1:
                 self._no_parts(tree.steps[1], "a state")
                 return None
@@ -447,6 +452,7 @@ class ExpressionChecker:
         rest: Sequence[_Step],
     ) -> Typed | None:
         found = component.variables[name.text]
+        self._bind(name, component.places.get(name.text))
         if rest:
             self._no_parts(rest[0], "a variable")
             return None
@@ -455,12 +461,13 @@ class ExpressionChecker:
     def _no_parts(self, step: _Step, what: str) -> None:
         self._findings.error("type-mismatch", f"{what} has no parts", step.location, "Remove what follows the name.")
 
-    def _enum_value(self, tree: syntax.Access, name: str, wanted: Type | None) -> Typed | None:
+    def _enum_value(self, tree: syntax.Access, named: syntax.Name, wanted: Type | None) -> Typed | None:
+        name = named.text
         enums = self._scope.enums_with(name)
-        if isinstance(wanted, EnumType) and wanted in enums:
-            return Typed(EnumValue(wanted.name, name), wanted)
-        if len(enums) == 1:
-            return Typed(EnumValue(enums[0].name, name), enums[0])
+        meant = wanted if isinstance(wanted, EnumType) and wanted in enums else enums[0] if len(enums) == 1 else None
+        if meant is not None:
+            self._bind(named, self._scope.types.value_places.get((meant.name, name)))
+            return Typed(EnumValue(meant.name, name), meant)
         names = sorted(here for here, enum in self._scope.enums.items() if enum in enums)
         sayable = [f"'{here}.{name}'" for here in names if "." not in here]
         self._findings.error(
@@ -473,7 +480,11 @@ class ExpressionChecker:
 
     def _qualified_value(self, tree: syntax.Access, enum: EnumType) -> Typed | None:
         step = tree.steps[0]
+        types = self._scope.types
+        if tree.root is not None and enum.name in types.enums:
+            self._bind(tree.root, types.enums[enum.name][2].name.location)
         if isinstance(step, syntax.Name) and step.text in enum.values and len(tree.steps) == 1:
+            self._bind(step, types.value_places.get((enum.name, step.text)))
             return Typed(EnumValue(enum.name, step.text), enum)
         if isinstance(step, syntax.Name) and step.text not in enum.values:
             self._findings.unknown(f"value of '{enum.name}'", step.text, step.location, enum.values)
@@ -538,6 +549,8 @@ class ExpressionChecker:
             self._findings.error("type-mismatch", f"{type_text(whole)} is no array", step.location, "Remove the index.")
             return None
         found = self._scope.types.property_type(whole, step.text)
+        if found is not None and isinstance(whole, ObjectType):
+            self._bind(step, self._scope.types.property_places.get((whole.name, step.text)))
         if found is None:
             known = self._scope.types.property_names(whole)
             if known:

@@ -4,6 +4,7 @@ import difflib
 from collections.abc import Iterable
 
 from robosc.errors import Diagnostic, RelatedPlace, Severity
+from robosc.model.bindings import Bindings
 from robosc.source import Location
 
 _MAXIMUM_COMPARISONS = 20_000
@@ -14,10 +15,16 @@ _MAXIMUM_COMPARED = 64
 
 
 class Findings:
-    """A growing list of diagnostics: the one thing that the checks share and add to."""
+    """A growing list of diagnostics, and what names mean: the one thing that the checks share and add to.
+
+    Attributes:
+        diagnostics: What was found so far.
+        bindings: What names mean, as far as they mean something.
+    """
 
     def __init__(self) -> None:
         self.diagnostics: list[Diagnostic] = []
+        self.bindings = Bindings()
         self._comparisons = _MAXIMUM_COMPARISONS
         self._broken_communications: set[str] = set()
 

@@ -49,6 +49,7 @@ def _restricted(
 ) -> Iterator[str]:
     for name in tree.communications:
         communication = communications.get(name.text)
+        findings.bindings.bind_communication(name)
         if communication is None:
             findings.unknown_communication(name.text, name.location, communications)
         elif communication.kind is CommunicationKind.OUTGOING_MESSAGE:
@@ -86,6 +87,7 @@ class ProvideBuilder:
         name = tree.communication
         condition = None if tree.condition is None else self._checker.condition(tree.condition)
         communication = communications.get(name.text)
+        self._findings.bindings.bind_communication(name)
         if communication is None:
             self._findings.unknown_communication(name.text, name.location, communications)
             return None
@@ -150,6 +152,7 @@ class ProvideBuilder:
                 known = self._types.property_names(wanted)
                 self._findings.unknown(f"property of '{wanted.name}'", name.text, name.location, known)
                 continue
+            self._findings.bindings.bind(name, self._types.property_places.get((wanted.name, name.text)))
             value = self._value(part, type_, name)
             if value is not None:
                 properties.append((name.text, value))

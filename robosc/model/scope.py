@@ -24,12 +24,14 @@ class ComponentNames:
         states: Names of its states.
         variables: Types of its variables; None for one whose type is broken.
         declared: Where the type of each variable is written.
+        places: Where each state and variable is defined.
     """
 
     name: str
     states: frozenset[str]
     variables: Mapping[str, Type | None]
     declared: Mapping[str, Location] = field(default_factory=dict)
+    places: Mapping[str, Location] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +47,8 @@ class Scope:
         absent: Components whose import has failed, which has been reported.
         constants: Constants by name; None for one that is broken, which has been reported.
         ambiguous: Names of constants and enums that several libraries define, with the libraries' names.
+        component_places: Where each component has the name that it has here.
+        constant_places: Where each constant is defined.
     """
 
     types: Types
@@ -55,6 +59,8 @@ class Scope:
     absent: frozenset[str] = frozenset()
     constants: Mapping[str, "Typed | None"] = field(default_factory=dict)
     ambiguous: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    component_places: Mapping[str, Location] = field(default_factory=dict)
+    constant_places: Mapping[str, Location] = field(default_factory=dict)
     _values: dict[str, tuple[EnumType, ...]] = field(default_factory=dict)
 
     def with_received(self, received: Type | None) -> "Scope":
@@ -117,7 +123,13 @@ class Scopes:
             scope = Scope(self._types, components, self._enums(unit), absent=absent)
             constants = self._constants.visible_in(unit, self)
             shared = {**self._shared_types(unit), **constants.ambiguous}
-            self._scopes[unit] = replace(scope, constants=constants, ambiguous=shared)
+            self._scopes[unit] = replace(
+                scope,
+                constants=constants,
+                ambiguous=shared,
+                component_places={name: tree.name.location for name, tree in unit.components.items()},
+                constant_places=constants.places,
+            )
         return self._scopes[unit]
 
     def of_constants(self, unit: Unit) -> Scope:

@@ -50,6 +50,8 @@ class Types:
         object_places: Where they stand.
         enums: Enum types by model name, with the unit and tree they come from.
         sources: Source type of each enum by model name.
+        value_places: Where each value of an enum is defined, by model name and value.
+        property_places: Where each property of an object is defined, by model name and property.
     """
 
     def __init__(self, findings: Findings) -> None:
@@ -57,6 +59,8 @@ class Types:
         self.object_places: dict[str, Location] = {}
         self.enums: dict[str, tuple[EnumType, Unit, syntax.EnumDefinition]] = {}
         self.sources: dict[str, Type] = {}
+        self.value_places: dict[tuple[str, str], Location] = {}
+        self.property_places: dict[tuple[str, str], Location] = {}
         self._findings = findings
         self._open: list[str] = []
         self._properties: dict[str, dict[str, Type]] = {}
@@ -99,6 +103,7 @@ class Types:
             mend = f"Write '{meant}'." if meant else ""
             self._findings.unknown("data type", name.text, name.location, [*unit.types, *syntax.BasicTypeName], mend)
             return None
+        self._findings.bindings.bind(name, definition.name.location)
         key = unit.type_name(name.text)
         if key in self._open:
             self._findings.error(
@@ -135,6 +140,7 @@ class Types:
         self._open.append(key)
         properties: dict[str, Property] = {}
         for item in tree.properties:
+            self.property_places.setdefault((key, item.name.text), item.name.location)
             found = self.resolve(item.type, unit, in_object=True)
             if found is not None:
                 properties.setdefault(item.name.text, Property(item.name.text, found))
@@ -179,6 +185,8 @@ class Types:
         defaults = [rule for rule in tree.rules if rule.condition is None]
         if len(defaults) != 1:
             self._report_defaults(tree, defaults)
+        for rule in tree.rules:
+            self.value_places.setdefault((key, rule.value.text), rule.value.location)
         values = tuple(dict.fromkeys(rule.value.text for rule in tree.rules))
         unique([rule.value for rule in tree.rules], "duplicate-enum-value", "enum value", self._findings)
         self.enums[key] = (EnumType(key, values), unit, tree)

@@ -108,6 +108,11 @@ class Libraries:
             for library in declared_libraries(file.text):
                 self._declaring.setdefault(library, []).append(file)
 
+    @property
+    def units(self) -> tuple[Unit, ...]:
+        """The libraries that were asked for and found."""
+        return tuple(self._units.values())
+
     def unit(self, name: syntax.Name) -> Unit | None:
         """The library called `name`, or None after reporting why there is none."""
         if name.text not in self._units and name.text not in self._broken:
@@ -237,11 +242,13 @@ def _follow(
         library = libraries.unit(component.imported.library)
         if library is None:
             return None
+        findings.bindings.bind(component.imported.library, library.tree.name.location)
         wanted = component.imported.component
         if wanted.text not in library.components:
             findings.unknown(
                 f"component of library '{library.tree.name.text}'", wanted.text, wanted.location, library.components
             )
             return None
+        findings.bindings.bind(wanted, library.components[wanted.text].name.location)
         unit, component = library, library.components[wanted.text]
     return unit, component

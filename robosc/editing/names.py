@@ -1,0 +1,80 @@
+"""Names of a bundle: what stands at a place, where that is defined, and who else names it."""
+
+from collections.abc import Iterable, Iterator
+from functools import cached_property
+
+from robosc.editing.definitions import Definition, definitions
+from robosc.language.words import RESERVED_WORDS
+from robosc.model.check import Inspected
+from robosc.source import Location
+
+
+class Names:
+    """The names of a robot or library and of the libraries that it imports from.
+
+    Args:
+        inspected: What is known of the bundle.
+    """
+
+    def __init__(self, inspected: Inspected) -> None:
+        self._uses = inspected.checked.bindings.uses
+        self._trees = [unit.tree for unit in inspected.units]
+
+    @cached_property
+    def definitions(self) -> dict[Location, Definition]:
+        """Every definition by its place, the main file's first."""
+        return {item.location: item for tree in self._trees for item in definitions(tree)}
+
+    @cached_property
+    def _by_line(self) -> dict[tuple[str, int], list[Location]]:
+        found: dict[tuple[str, int], list[Location]] = {}
+        for place in (*self.definitions, *self._uses):
+            found.setdefault((place.file, place.line), []).append(place)
+        return found
+
+    @cached_property
+    def _by_definition(self) -> dict[Location, list[Location]]:
+        found: dict[Location, list[Location]] = {}
+        for use, definition in self._uses.items():
+            found.setdefault(definition, []).append(use)
+        return found
+
+    def at(self, file: str, line: int, column: int) -> tuple[Location, Definition] | None:
+        """The name that covers or touches a place, and what it means; None: there is no name that means something.
+
+        Args:
+            file: Name of the file.
+            line: Line, from 1.
+            column: Column in characters, from 1; behind the last character counts, too.
+        """
+        touched = [
+            place
+            for place in self._by_line.get((file, line), ())
+            if place.column <= column <= place.column + place.length
+        ]
+        # Of two that meet here, the one that begins here is meant.
+        for place in sorted(touched, key=lambda place: -place.column):
+            found = self.definitions.get(self._uses.get(place, place))
+            if found is not None:
+                return place, found
+        return None
+
+    def uses(self, definition: Definition) -> list[Location]:
+        """Every place that names a definition, sorted; its own is none of them."""
+        return sorted(self._by_definition.get(definition.location, ()))
+
+    def occurrences(self, file: str) -> Iterator[tuple[Location, Definition]]:
+        """Every name of a file that means something, sorted."""
+        places = {place for places in self._lines_of(file) for place in places}
+        for place in sorted(places):
+            found = self.definitions.get(self._uses.get(place, place))
+            if found is not None:
+                yield place, found
+
+    def _lines_of(self, file: str) -> Iterable[list[Location]]:
+        return (places for (name, _), places in self._by_line.items() if name == file)
+
+
+def spelled(name: str) -> str:
+    """A name as it is written: `^` keeps it from being a word of the language."""
+    return f"^{name}" if name in RESERVED_WORDS else name

@@ -115,6 +115,11 @@ class Stage:
 
         self.peer.publish(Empty(), "/halt")
 
+    def halts(self) -> None:
+        """It halts, and so has heard the message: what is sent from here reaches it."""
+        self.until(lambda: self.speed == 0.0, "the robot to halt", self.halt)
+        self.stands()
+
     def level(self, value: float) -> None:
         from std_msgs.msg import Float32
 
@@ -189,8 +194,7 @@ def _others(stage: Stage, topic: str) -> list[Any]:
 def test_activated_anew_it_begins_in_the_initial_state(start: Callable[..., Stage]) -> None:
     stage = start()
     stage.walks()
-    stage.until(lambda: stage.speed == 0.0, "the robot to halt", stage.halt)
-    stage.stands()
+    stage.halts()
     assert stage.change("deactivate") and stage.change("activate")
     stage.walks()
 
@@ -220,6 +224,9 @@ def test_shut_down_while_it_walks_it_stands(start: Callable[..., Stage]) -> None
 
 def test_what_came_while_it_was_deactivated_is_known(start: Callable[..., Stage]) -> None:
     stage = start()
+    stage.walks()
+    stage.halts()
+    assert stage.change("deactivate") and stage.change("activate")
     stage.walks()
     assert stage.change("deactivate")
     for _ in range(3):

@@ -138,6 +138,11 @@ async def until(condition: Callable[[], Awaitable[bool]]) -> None:
         await asyncio.sleep(0.005)
 
 
+async def has_begun(made: Parts, job_id: str, tasks: int = 1) -> bool:
+    """Whether a job is at work: it is marked as running before its worker begins, which has then begun so many."""
+    return len(made.workers.begun) == tasks and await is_in(made.manager, job_id, JobState.RUNNING)
+
+
 async def is_in(manager: JobManager, job_id: str, state: JobState) -> bool:
     """Whether a job is in a state."""
     return (await manager.get(job_id, ME)).state is state

@@ -12,7 +12,19 @@ from robosc_server.jobs import Caller, JobLimits, QueueLimits, carrying
 from robosc_server.store import JobFilter, JobRecord, JobState, StoreUnavailableError
 from robosc_server.store.records import STEP
 from robosc_server.tasks.task import Failure, Reason, Report, Result, TaskKind
-from support.job_parts import ME, Choices, Parts, ended, in_loop, is_in, messages_of_job, parts, sweep_by_hand, until
+from support.job_parts import (
+    ME,
+    Choices,
+    Parts,
+    ended,
+    has_begun,
+    in_loop,
+    is_in,
+    messages_of_job,
+    parts,
+    sweep_by_hand,
+    until,
+)
 from support.job_workers import messages_for, task_of
 
 _NEVER = "until /nowhere/never"
@@ -125,12 +137,12 @@ def test_cancelling_ends_what_waits_and_what_runs(tmp_path: Path) -> None:
     async def test() -> None:
         async with parts(tmp_path, Choices(capacity=1)) as made:
             jobs = [(await made.manager.submit(task_of(f"{_NEVER}\n{number}"), ME))[0] for number in range(3)]
-            await until(lambda: is_in(made.manager, jobs[0].id, JobState.RUNNING))
+            await until(lambda: has_begun(made, jobs[0].id))
             for job in (jobs[1], jobs[0]):
                 record = await made.manager.cancel(job.id, ME)
                 assert record.state is JobState.CANCELLED
                 assert await refusal_of(made.manager.result(job.id, ME)) is Reason.JOB_CANCELLED
-            await until(lambda: is_in(made.manager, jobs[2].id, JobState.RUNNING))
+            await until(lambda: has_begun(made, jobs[2].id, tasks=2))
             assert made.workers.killed == 1
             assert [text[-1] for text in made.workers.begun] == ["0", "2"]
             # What has ended stays as it is.

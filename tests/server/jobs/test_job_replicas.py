@@ -18,6 +18,7 @@ from support.job_parts import (
     Parts,
     Times,
     ended,
+    has_begun,
     in_loop,
     is_in,
     messages_of_job,
@@ -81,7 +82,7 @@ def test_a_job_is_cancelled_at_another_server_and_its_worker_stopped(database_ur
             ours, theirs = await replicas(stack, database_url, Times())
             running, _ = await ours.manager.submit(task_of(_NEVER), ME)
             waiting, _ = await ours.manager.submit(task_of(f"{_NEVER}\n2"), ME)
-            await until(lambda: is_in(theirs.manager, running.id, JobState.RUNNING))
+            await until(lambda: has_begun(ours, running.id))
             watching = asyncio.create_task(ended(ours.manager, waiting.id))
             for job in (waiting, running):
                 assert (await theirs.manager.cancel(job.id, ME)).state is JobState.CANCELLED
@@ -165,8 +166,8 @@ def test_servers_that_go_on_are_not_taken_for_dead_however_long_it_takes(databas
         choices = Choices(database_url, by_hand, times=times)
         async with parts(Path("unused"), choices) as ours, parts(Path("unused"), choices) as theirs:
             jobs = [(await made.manager.submit(task_of(f"{_NEVER}\n{made}"), ME))[0] for made in (ours, theirs)]
-            await until(lambda: is_in(ours.manager, jobs[0].id, JobState.RUNNING))
-            await until(lambda: is_in(ours.manager, jobs[1].id, JobState.RUNNING))
+            await until(lambda: has_begun(ours, jobs[0].id))
+            await until(lambda: has_begun(theirs, jobs[1].id))
             for _ in range(10):
                 for made in (ours, theirs):
                     await made.manager.look()
@@ -221,7 +222,7 @@ def test_a_server_that_was_taken_for_dead_stops_its_work_and_takes_part_again(
             stalled, living = await replicas(stack, database_url, times)
             gate = tmp_path / "gate"
             job, _ = await stalled.manager.submit(task_of(f"until {gate}"), ME)
-            await until(lambda: is_in(living.manager, job.id, JobState.RUNNING))
+            await until(lambda: has_begun(stalled, job.id))
             (looking, sweeping) = stalled.manager._keepers
             looking.cancel()
             await living.manager.look()

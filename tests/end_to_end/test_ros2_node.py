@@ -220,7 +220,14 @@ def test_the_state_is_published_as_semantics_says(start: StartNode, peer: Peer) 
     def content() -> Any:
         return json.loads(states[-1].data)
 
-    robot.until(lambda: bool(states) and content()["current"]["LidarSensor"]["state"] == "safe", "the state topic")
+    def heard() -> bool:
+        """Whether the node has heard both topics, of which either may reach it first."""
+        if not states:
+            return False
+        current = content()["current"]
+        return (current["LidarSensor"]["state"], current["LineDetector"]["state"]) == ("safe", "line_found")
+
+    robot.until(heard, "the state topic")
     state = content()
     assert state["current"]["LineDetector"] == {"state": "line_found", "variables": {"current_correction": "0.25"}}
     assert state["current"]["LidarSensor"] == {"state": "safe", "variables": {"ahead": "clear"}}

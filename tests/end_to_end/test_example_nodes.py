@@ -296,7 +296,8 @@ def test_a_misspelt_parameter_is_told(at: Stage) -> None:
 def test_the_calibrator_wants_odometry_at_rest(at: Stage) -> None:
     from std_srvs.srv import Trigger
 
-    node = at.helper("calibrator", "duration:=0.3")
+    # So long that it sees enough of them on a busy machine.
+    node = at.helper("calibrator", "duration:=20.0")
     client = at.peer.node.create_client(Trigger, "/calibrate")
     at.until(client.service_is_ready, "the service", node)
 
@@ -305,17 +306,17 @@ def test_the_calibrator_wants_odometry_at_rest(at: Stage) -> None:
         at.until(future.done, "the answer", node)
         return future.result().success, future.result().message
 
-    assert answer() == (False, "0 poses within 0.3 s; there must be 5")
+    assert answer() == (False, "0 poses within 20 s; there must be 5")
     at.robot = robot = KinematicRobot(at.peer, World())
     at.peer.wait_for_peers(["/odom"])
-    at.go_on(0.6)
-    assert answer() == (True, "")
+    while (told := answer()) != (True, ""):
+        assert told[1].endswith(" poses within 20 s; there must be 5")
 
     def drive() -> None:
         robot.x += 0.005
 
     robot.on_step = drive
-    at.go_on(0.5)
-    success, message = answer()
-    assert not success
-    assert message.startswith("the robot has moved by 0.")
+    while (told := answer()) == (True, ""):
+        at.go_on(0.1)
+    assert told[0] is False
+    assert told[1].startswith("the robot has moved by 0.")

@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Future
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ from robosc_server.workers import WorkersError, dask_task
 from robosc_server.workers.dask_cluster import DaskWorkers
 from robosc_server.workers.dask_spending import Spending
 from robosc_server.workers.dask_task import answer, outcome_of
-from robosc_server.workers.frames import FrameError
+from robosc_server.workers.frames import FrameError, too_large
 from robosc_server.workers.local import LocalWorkers
 from robosc_server.workers.opening import open_workers
 from support.background import BackgroundLoop, eventually, is_running, parent_of
@@ -400,8 +400,10 @@ def test_answers_travel_as_bytes(said: list[bytes] | str) -> None:
 
 @given(st.binary(max_size=100))
 def test_bytes_that_are_no_answer_are_one_kind_of_error(content: bytes) -> None:
-    with pytest.raises(FrameError):
-        outcome_of(content, LIMITS)
+    with suppress(FrameError):
+        outcome = outcome_of(content, LIMITS)
+        # A frame may announce more than a result may have, whatever comes then; or the bytes are an answer after all.
+        assert outcome == too_large(LIMITS) or content.startswith(answer(outcome))
 
 
 def test_a_fault_of_ours_on_the_cluster_is_an_answer(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from support.example_robots import Stage, stage
+from support.example_robots import LIMIT_S, Stage, stage
 from support.kinematic_robot import KinematicRobot, World, floor_picture
 
 pytest.importorskip("rclpy", reason="ROS 2 (rclpy) is not installed")
@@ -300,6 +300,7 @@ def test_the_calibrator_wants_odometry_at_rest(at: Stage) -> None:
     node = at.helper("calibrator", "duration:=20.0")
     client = at.peer.node.create_client(Trigger, "/calibrate")
     at.until(client.service_is_ready, "the service", node)
+    at.peer.ask(client, Trigger.Request(), LIMIT_S, node)
 
     def answer() -> tuple[bool, str]:
         future = client.call_async(Trigger.Request())

@@ -72,6 +72,8 @@ class Stage:
         self._change = peer.node.create_client(ChangeState, f"/{PACKAGE}/change_state")
         self._get = peer.node.create_client(GetState, f"/{PACKAGE}/get_state")
         self.until(lambda: self._change.service_is_ready() and self._get.service_is_ready(), "the node's services")
+        # Who is found last is found after the other: a change is never asked for twice.
+        peer.ask(self._get, GetState.Request(), LIMIT_S, node)
 
     def until(self, condition: Callable[[], bool], what: str, repeat: Callable[[], object] = lambda: None) -> None:
         self.peer.spin_until(condition, LIMIT_S, what, self.node, repeat)
@@ -290,7 +292,7 @@ def test_parameters_are_set_before_it_is_configured(start: Callable[..., Stage])
     def set_policy(policy: str) -> bool:
         value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=policy)
         request = SetParameters.Request(parameters=[Parameter(name="policy", value=value)])
-        return bool(stage.call(client, request).results[0].successful)
+        return bool(stage.peer.ask(client, request, LIMIT_S, stage.node).results[0].successful)
 
     assert not stage.change("configure")
     assert set_policy("fair")

@@ -216,8 +216,23 @@ class Peer:
             self._asking = self.node.create_client(GetParameters, f"/{name}/get_parameters")
             self.spin_until(self._asking.service_is_ready, limit_s, "the node's parameters", process)
         for _ in range(2):
-            future = self._asking.call_async(GetParameters.Request(names=["period"]))
-            self.spin_until(future.done, limit_s, "an answer of the node", process)
+            self.ask(self._asking, GetParameters.Request(names=["period"]), limit_s, process)
+
+    def ask(self, client: Any, question: Any, limit_s: float, process: RosProcess | None = None) -> Any:
+        """The answer to a question that may be asked again, and is: a server may lose the first answers.
+
+        It has nobody to give them to until it has found the client, which the client cannot tell.
+        """
+        futures: list[Any] = []
+        self.spin_until(
+            lambda: any(future.done() for future in futures),
+            limit_s,
+            "an answer of the node",
+            process,
+            lambda: futures.append(client.call_async(question)),
+            repeat_every_s=1.0,
+        )
+        return next(future.result() for future in futures if future.done())
 
     def spin_for(self, duration_s: float) -> None:
         """Handle messages for a while: to show that nothing happens."""

@@ -20,19 +20,19 @@ help:
 
 environment: $(READY) ## make .venv from the lock
 
-$(READY): requirements.lock pyproject.toml deploy/make_environment.sh
+$(READY): requirements.lock deploy/requirements-build.txt pyproject.toml deploy/make_environment.sh deploy/install_lock.sh
 	sh deploy/make_environment.sh $(VENV)
 	@touch $(READY)
 
 colcon: $(COLCON)/.ready ## make .venv-colcon: builds ROS 2 packages without an installed ROS 2
 
-$(COLCON)/.ready: deploy/requirements-colcon.txt deploy/make_colcon_environment.sh | $(READY)
-	PYTHON=$(BIN)/python sh deploy/make_colcon_environment.sh $(COLCON)
+$(COLCON)/.ready: deploy/requirements-colcon.txt deploy/make_colcon_environment.sh deploy/install_lock.sh | $(READY)
+	BIN=$(BIN) sh deploy/make_colcon_environment.sh $(COLCON)
 
 checkers: $(CHECKERS)/.ready ## make .venv-checkers: linters of container files, Kubernetes, Prometheus
 
-$(CHECKERS)/.ready: deploy/requirements-checkers.txt deploy/make_checkers.sh | $(READY)
-	PYTHON=$(BIN)/python sh deploy/make_checkers.sh $(CHECKERS)
+$(CHECKERS)/.ready: deploy/requirements-checkers.txt deploy/make_checkers.sh deploy/install_lock.sh | $(READY)
+	BIN=$(BIN) sh deploy/make_checkers.sh $(CHECKERS)
 	@touch $@
 
 images: $(WHEELS)/.ready ## fetch what the images are made of, and build them without an engine, for their tests
@@ -51,11 +51,18 @@ WORKERS := $(shell echo $$(( $$(nproc 2>/dev/null || echo 2) + 1 )))
 test: $(READY) ## run every test; TESTS=... chooses, WORKERS=... says how many at a time
 	@PYTHON=$(BIN)/python WORKERS=$(WORKERS) sh tests/run.sh $(TESTS)
 
-# mutmut names what it changes by its path, so the packages must lie where it is started.
-MUTMUT := PYTHONPATH=$(CURDIR)/out/mutmut $(CURDIR)/$(BIN)/python -m mutmut
+# Tools of `mutants` and `fuzz`: some exist for some systems only, so that they are no part of the environment.
+TOOLS := out/tools
 
-mutants: $(READY) ## mutation tests of the bridge's safety layer
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade --target out/mutmut mutmut==3.8.1
+$(TOOLS)/.ready: deploy/requirements-soak.txt | $(READY)
+	rm -rf $(TOOLS)
+	$(BIN)/uv pip install --quiet --python $(BIN)/python --target $(TOOLS) --no-deps --require-hashes --no-build -r $<
+	@touch $@
+
+# mutmut names what it changes by its path, so the packages must lie where it is started.
+MUTMUT := PYTHONPATH=$(CURDIR)/$(TOOLS) $(CURDIR)/$(BIN)/python -m mutmut
+
+mutants: $(TOOLS)/.ready ## mutation tests of the bridge's safety layer
 	rm -rf out/mutation
 	mkdir -p out/mutation/tests/bridge
 	cp -r bridge/robosc_bridge docs pyproject.toml out/mutation
@@ -63,14 +70,12 @@ mutants: $(READY) ## mutation tests of the bridge's safety layer
 	cp -r tests/bridge/safety out/mutation/tests/bridge
 	cd out/mutation && $(MUTMUT) run && $(MUTMUT) results
 
-# atheris exists for some systems only: it is no part of the environment.
 DECODERS := lds01 lds02 lds03 mavlink dynamixel registers
 SECONDS := 60
 
-fuzz: $(READY) ## fuzz the bridge's decoders; DECODERS=... chooses, SECONDS=... says how long each
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade --target out/atheris atheris==3.1.0
+fuzz: $(TOOLS)/.ready ## fuzz the bridge's decoders; DECODERS=... chooses, SECONDS=... says how long each
 	cd out && for decoder in $(DECODERS); do \
-	  PYTHONPATH=$(CURDIR)/out/atheris $(CURDIR)/$(BIN)/python ../tests/fuzz/fuzz_decoders.py $$decoder \
+	  PYTHONPATH=$(CURDIR)/$(TOOLS) $(CURDIR)/$(BIN)/python ../tests/fuzz/fuzz_decoders.py $$decoder \
 	    -max_total_time=$(SECONDS) -max_len=2000 -rss_limit_mb=256 || exit 1; \
 	done
 
@@ -87,18 +92,17 @@ format: $(READY) ## format and mend what can be mended by itself
 bindings: $(READY) ## regenerate the gRPC bindings
 	PYTHON=$(BIN)/python sh proto/generate.sh
 
+# Extras stay where they are asked for: a lock without them is not complete. `lock_images.py` asks the installed packages
+# what they need, so that the new lock has to be installed before.
+COMPILE := $(BIN)/uv pip compile --quiet --upgrade --no-strip-extras --generate-hashes --python-version 3.12
+EXTRAS := server postgresql dask tracing client signing ros2 examples bridge plot simulation view build dev
+
 lock: $(READY) ## choose new versions and write the locks
-	$(BIN)/pip-compile --quiet --upgrade --strip-extras --allow-unsafe --generate-hashes --all-build-deps \
-	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host \
-	  --extra server --extra postgresql --extra dask --extra tracing --extra client --extra ros2 --extra examples \
-	  --extra bridge --extra plot --extra simulation --extra view --extra dev \
-	  --output-file requirements.lock pyproject.toml
-	$(BIN)/pip-compile --quiet --upgrade --strip-extras --allow-unsafe --generate-hashes \
-	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host \
-	  --output-file deploy/requirements-colcon.txt deploy/requirements-colcon.in
-	$(BIN)/pip-compile --quiet --upgrade --strip-extras --allow-unsafe --generate-hashes --no-annotate \
-	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host \
-	  --output-file deploy/requirements-checkers.txt deploy/requirements-checkers.in
+	$(COMPILE) $(EXTRAS:%=--extra %) --output-file requirements.lock pyproject.toml
+	for tools in colcon checkers soak; do \
+	  $(COMPILE) --output-file deploy/requirements-$$tools.txt deploy/requirements-$$tools.in || exit 1; \
+	done
+	sh deploy/make_environment.sh $(VENV)
 	$(BIN)/python deploy/lock_images.py
 
 benchmark: $(READY) ## print the tables of tests/benchmarks

@@ -20,8 +20,8 @@ EXTRAS = {
     "server": ("server", "postgresql", "dask", "tracing", "signing"),
     "bridge": ("bridge", "view"),
 }
-BUILD = ("hatchling", "setuptools", "wheel")
-"""What builds the wheels: ours, and of packages that have none."""
+BUILD = ("editables", "hatchling", "pip", "setuptools", "uv", "wheel")
+"""What installs the locks and builds wheels: ours, and of packages that have none."""
 
 _HEADER = """\
 # What {what}: the lines of requirements.lock that it takes, written by deploy/lock_images.py (make lock).
@@ -51,7 +51,7 @@ def locked(text: str) -> dict[str, str]:
     """By package, its lines in a lock, without comments."""
     entries = {}
     for block in re.split(r"\n(?=[a-z0-9])", text):
-        match = re.match(r"([a-z0-9][a-z0-9._-]*)==", block)
+        match = re.match(r"([a-z0-9][a-z0-9._-]*)(?:\[[^\]]*\])?==", block)
         if match:
             lines = (line.rstrip() for line in block.splitlines())
             kept = [line for line in lines if line and not line.lstrip().startswith("#")]

@@ -1,13 +1,15 @@
 #!/bin/sh
-# Makes the environment of what looks at the files of this folder: sh deploy/make_checkers.sh DIRECTORY
+# Makes the environment of what looks at the files of this folder: sh deploy/make_checkers.sh DIRECTORY. BIN has the
+# python and the uv of the project's environment.
 #
 # An environment of its own, from a lock of its own; promtool and Prometheus come from Debian, unpacked and not installed,
 # since installed they would start a service. What cannot be had is left out, and its tests are skipped.
 set -eu
 venv=$1
 cd "$(dirname "$0")/.."
-"${PYTHON:-python3}" -m venv "$venv"
-"$venv/bin/python" -m pip install --quiet --disable-pip-version-check --require-hashes -r deploy/requirements-checkers.txt
+bin=${BIN:-.venv/bin}
+"$bin/uv" venv --quiet --clear --python "$bin/python" "$venv"
+sh deploy/install_lock.sh "$bin/uv" "$venv/bin/python" deploy/requirements-checkers.txt
 rm -rf "$venv/prometheus"
 if command -v apt-get >/dev/null && command -v dpkg-deb >/dev/null; then
     folder=$(mktemp -d)

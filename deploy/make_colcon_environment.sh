@@ -1,23 +1,22 @@
 #!/bin/sh
 # Makes a virtual environment with colcon and the generators of ROS 2 interfaces: sh deploy/make_colcon_environment.sh DIR
 # For machines without an installed ROS 2: DIR/colcon builds packages there, with a C++ compiler and CMake.
-# PYTHON chooses the interpreter; otherwise that of .venv is taken.
+# BIN has the python and the uv of the project's environment; otherwise those of .venv are taken.
 set -eu
 case $1 in /*) venv=$1 ;; *) venv=$PWD/$1 ;; esac
 cd "$(dirname "$0")/.."
-python=${PYTHON:-.venv/bin/python}
-command -v "$python" >/dev/null || {
-    echo "there is no $python: say \`make environment\`, or PYTHON=/path/to/python3.12" >&2
+bin=${BIN:-.venv/bin}
+command -v "$bin/uv" >/dev/null || {
+    echo "there is no $bin/uv: say \`make environment\`" >&2
     exit 1
 }
 
 # A Python with ROS 2 hands these down, and other programs must not load its libraries.
 unset LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE PYTHONPATH
 
-rm -rf "$venv"
-"$python" -m venv "$venv"
+"$bin/uv" venv --quiet --clear --python "$bin/python" "$venv"
 echo "installing colcon and the ROS 2 generators into $venv (about a minute)"
-"$venv/bin/python" -m pip install --quiet --disable-pip-version-check --require-hashes -r deploy/requirements-colcon.txt
+sh deploy/install_lock.sh "$bin/uv" "$venv/bin/python" deploy/requirements-colcon.txt
 
 # The wheels' CMake files name folders of the machine that the wheels were built on; here they are elsewhere.
 include=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("include"))')

@@ -38,5 +38,8 @@ if [ ! -x "$venv/bin/python" ] || ! usable "$venv/bin/python"; then
     "$python" -m venv "$venv"
 fi
 echo "make: installing the locked packages into $venv (about a minute the first time)"
-"$venv/bin/python" -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
-"$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+# The pip of the interpreter installs uv and a pip of the locked version, and nothing more.
+"$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-deps --require-hashes --only-binary :all: \
+    -r deploy/requirements-build.txt
+sh deploy/install_lock.sh "$venv/bin/uv" "$venv/bin/python" requirements.lock
+"$venv/bin/uv" pip install --quiet --python "$venv/bin/python" --no-deps --no-build-isolation --editable .

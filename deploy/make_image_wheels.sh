@@ -6,7 +6,7 @@ directory=$1
 cd "$(dirname "$0")/.."
 for image in server bridge; do
     for lock in build "$image"; do
-        "${PYTHON:?}" -m pip download --quiet --disable-pip-version-check --no-build-isolation --require-hashes \
+        "${PYTHON:?}" -m pip download --quiet --disable-pip-version-check --no-deps --no-build-isolation --require-hashes \
             --dest "$directory/$image" -r "deploy/requirements-$lock.txt"
     done
 done

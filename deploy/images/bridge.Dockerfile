@@ -9,12 +9,13 @@ FROM ${PYTHON_IMAGE} AS build
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1 PIP_NO_INPUT=1
 WORKDIR /build
 COPY deploy/requirements-build.txt deploy/requirements-bridge.txt ./
-# Everything that is installed is locked by its hash, what builds it, too.
+# Everything that is installed is locked by its hash, what builds it, too; no requirement of a package is followed.
 RUN python -m venv /build/venv \
-    && /build/venv/bin/pip install --require-hashes -r requirements-build.txt \
-    && /build/venv/bin/pip wheel --no-build-isolation --require-hashes -r requirements-bridge.txt -w wheels \
+    && /build/venv/bin/pip install --no-deps --require-hashes --only-binary :all: -r requirements-build.txt \
+    && /build/venv/bin/pip wheel --no-deps --require-hashes --no-build-isolation -r requirements-bridge.txt -w wheels \
     && python -m venv --without-pip /opt/robosc \
-    && /build/venv/bin/pip --python /opt/robosc/bin/python install --no-index --no-deps wheels/*.whl
+    && /build/venv/bin/pip --python /opt/robosc/bin/python install --no-index --no-deps wheels/*.whl \
+    && /build/venv/bin/pip --python /opt/robosc/bin/python check
 COPY pyproject.toml README.md LICENSE ./
 COPY robosc robosc
 COPY proto/robosc_api proto/robosc_api

@@ -1,7 +1,7 @@
 # Two commands do everything on a machine with git, make, Python 3.12 and pip:
 #   make demo    the main job: model -> gRPC server -> bridge -> serial lines -> simulated robot, out of a maze
-#   make test    every test
-# Both make .venv from the lock if it is not there. PYTHON=... chooses the interpreter.
+#   make test    the tests that need nothing else; `make acceptance` tries the real parts, `make soak` goes on for long
+# Each makes .venv from the lock if it is not there. PYTHON=... chooses the interpreter.
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -13,7 +13,7 @@ COLCON := .venv-colcon
 CHECKERS := .venv-checkers
 WHEELS := out/wheels
 
-.PHONY: demo test mutants fuzz lint format bindings lock benchmark environment colcon checkers images clean help
+.PHONY: demo test acceptance smoke soak mutants fuzz lint format bindings lock benchmark environment colcon checkers images clean help
 
 help:
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -45,11 +45,28 @@ $(WHEELS)/.ready: deploy/requirements-build.txt deploy/requirements-server.txt d
 demo: $(READY) ## lead a simulated robot out of a maze, from model to serial bytes; DEMO='--scene maze-spiral' and so on
 	$(BIN)/python deploy/demo/demo.py $(DEMO)
 
-# One worker more than cores: many tests wait for real middleware.
-WORKERS := $(shell echo $$(( $$(nproc 2>/dev/null || echo 2) + 1 )))
+WORKERS := $(shell nproc 2>/dev/null || echo 2)
+PYTEST := $(BIN)/python -m pytest
 
-test: $(READY) ## run every test; TESTS=... chooses, WORKERS=... says how many at a time
-	@PYTHON=$(BIN)/python WORKERS=$(WORKERS) sh tests/run.sh $(TESTS)
+TESTS := tests
+
+test: $(READY) ## the suite that says the same on every machine; TESTS=... chooses, WORKERS=... says how many at a time
+	$(PYTEST) -n $(WORKERS) --dist worksteal --durations 20 -r fE $(TESTS)
+
+# One worker more than cores: these tests wait for real middleware.
+acceptance: $(READY) ## real parts and real time: ROS, compilers, browser, databases, clusters; TESTS=acceptance/... chooses
+	@PYTHON=$(BIN)/python WORKERS=$$(( $(WORKERS) + 1 )) sh acceptance/run.sh $(filter-out tests,$(TESTS))
+
+smoke: $(READY) demo ## one of each real part; SMOKE=--no-skips wants all of them to be there
+	$(PYTEST) -n $(WORKERS) --dist loadfile --durations 0 --durations-min 1 -r fEsR -m smoke $(SMOKE) acceptance
+
+EFFORT := 20
+SEED := $(shell date +%s)
+
+soak: $(READY) ## random tests with EFFORT times the examples, drawn from SEED
+	@echo "random tests, $(EFFORT) times the examples: make soak EFFORT=$(EFFORT) SEED=$(SEED)"
+	ROBOSC_EFFORT=$(EFFORT) ROBOSC_SEED=$(SEED) $(PYTEST) -n $(WORKERS) --dist worksteal --timeout 7200 -r fE \
+	  --hypothesis-seed=$(SEED) -m "hypothesis or random" $(TESTS)
 
 # Tools of `mutants` and `fuzz`: some exist for some systems only, so that they are no part of the environment.
 TOOLS := out/tools
@@ -75,7 +92,7 @@ SECONDS := 60
 
 fuzz: $(TOOLS)/.ready ## fuzz the bridge's decoders; DECODERS=... chooses, SECONDS=... says how long each
 	cd out && for decoder in $(DECODERS); do \
-	  PYTHONPATH=$(CURDIR)/$(TOOLS) $(CURDIR)/$(BIN)/python ../tests/fuzz/fuzz_decoders.py $$decoder \
+	  PYTHONPATH=$(CURDIR)/$(TOOLS) $(CURDIR)/$(BIN)/python ../soak/fuzz_decoders.py $$decoder \
 	    -max_total_time=$(SECONDS) -max_len=2000 -rss_limit_mb=256 || exit 1; \
 	done
 

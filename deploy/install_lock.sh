@@ -1,5 +1,5 @@
 #!/bin/sh
-# Installs a lock into an environment, and removes all else from there: sh deploy/install_lock.sh UV PYTHON LOCK
+# Installs a lock into an environment: sh deploy/install_lock.sh UV PYTHON LOCK
 #
 # A lock holds every package with its version and hashes, so that no release of any package changes what is installed:
 # requirements of packages are not followed, and what has no wheel is built by the tools of requirements-build.txt. In
@@ -12,5 +12,5 @@ install() {
 }
 
 install --no-build -r "$(dirname "$0")/requirements-build.txt"
-install --exact --no-build-isolation -r "$lock"
+install --no-build-isolation -r "$lock"
 "$uv" pip check --quiet --python "$python"

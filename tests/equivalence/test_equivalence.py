@@ -14,6 +14,7 @@ from robosc.model.structure import Deployment
 from robosc.supervisor.structure import Supervisor
 from robosc.targets import generate
 from support.c99 import GCC
+from support.effort import examples
 from support.equivalence.c99_target import C99Target, c99_target
 from support.equivalence.python_targets import PythonTarget, generated_python, observe, reference
 from support.equivalence.random_scenarios import random_scenario
@@ -85,7 +86,7 @@ def test_an_example_in_python(robot: str) -> None:
         compare(python_target(supervisor), scenario, observe(supervisor, scenario))
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=examples(60))
 @given(st.integers(0, 2**32 - 1))
 def test_random_robots_in_python(seed: int) -> None:
     supervisor = _some_supervisor(seed)
@@ -93,7 +94,7 @@ def test_random_robots_in_python(seed: int) -> None:
     compare(python_target(supervisor), scenario, observe(supervisor, scenario))
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=examples(60))
 @given(st.integers(0, 2**32 - 1))
 def test_without_a_log_whole_messages_are_taken_with_the_same_effect(seed: int) -> None:
     supervisor = _some_supervisor(seed)
@@ -119,7 +120,7 @@ def test_an_example_in_c(robot: str, tmp_path: Path) -> None:
 
 
 @needs_gcc
-@settings(deadline=None, max_examples=6)
+@settings(max_examples=examples(6))
 @given(st.integers(0, 2**32 - 1))
 def test_random_robots_in_c(tmp_path_factory: pytest.TempPathFactory, seed: int) -> None:
     supervisor = _some_supervisor(seed)

@@ -17,6 +17,7 @@ from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.failures import RefusedError
 from robosc_server.tasks.requests import NOT_A_MESSAGE, RecentRequests, RequestLimits, accepted
 from robosc_server.tasks.task import Reason, Task, TaskKind
+from support.effort import examples
 from support.models import EXAMPLES
 from support.requests import MESSAGES, bundle_at, small_request
 
@@ -241,7 +242,7 @@ class TestHostileBytes:
         library = pb.CheckRequest(bundle=pb.Bundle(libraries=[pb.SourceFile(name="a")])).SerializeToString()
         assert "two files" in refusal(TaskKind.CHECK, first + library + library).message
 
-    @settings(max_examples=150, deadline=None)
+    @settings(max_examples=examples(100))
     @given(st.sampled_from(list(TaskKind)), st.binary(max_size=200), st.integers(0, 2**32))
     def test_any_bytes_are_accepted_or_refused(self, kind: TaskKind, noise: bytes, seed: int) -> None:
         broken = bytearray(small_request(kind, "robot R {}").SerializeToString())
@@ -390,7 +391,7 @@ def pairs(draw: Any) -> tuple[Any, Any]:
 
 
 class TestKeys:
-    @settings(max_examples=150, deadline=None)
+    @settings(max_examples=examples(100))
     @given(st.sampled_from(list(TaskKind)), pairs(), st.integers(0, 1000))
     def test_equal_exactly_where_requests_mean_the_same(
         self, kind: TaskKind, both: tuple[dict[str, Any], dict[str, Any]], seed: int

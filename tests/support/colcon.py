@@ -52,7 +52,7 @@ def _is_ready() -> bool:
 def _make() -> None:
     made = subprocess.run(
         ["sh", str(INPUTS[1]), str(ENVIRONMENT)],
-        env={**os.environ, "PYTHON": sys.executable},
+        env={**os.environ, "BIN": str(Path(sys.executable).parent)},
         capture_output=True,
         text=True,
         timeout=MAKE_LIMIT_S,

@@ -25,6 +25,7 @@ from robosc_bridge.daemon.programs import (
 )
 from robosc_bridge.daemon.states import Command, State
 from support.daemons import Connected, Scene
+from support.effort import examples
 
 MODEL = """
 robot Helped {
@@ -362,7 +363,7 @@ SAYINGS = st.one_of(
 )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40))
 @given(st.lists(st.tuples(st.booleans(), SAYINGS), max_size=20))
 def test_whatever_programs_say_the_bridge_goes_on(sayings: list[tuple[bool, tuple[Any, ...]]]) -> None:
     scene = helped()

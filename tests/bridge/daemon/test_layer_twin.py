@@ -35,6 +35,7 @@ from robosc_bridge.daemon.programs import (
 )
 from robosc_bridge.daemon.states import State
 from support.daemons import Connected, Scene, supervisor_of
+from support.effort import examples
 from support.layers import LayerBench
 
 MODEL = """
@@ -226,7 +227,7 @@ STEPS = st.one_of(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(100))
 @given(st.lists(st.tuples(st.sampled_from([0.021, 0.021, 0.33]), STEPS), max_size=25))
 def test_the_layer_in_the_daemon_is_the_layer_by_itself(steps: list[tuple[float, tuple[Any, ...]]]) -> None:
     twins = Twins()

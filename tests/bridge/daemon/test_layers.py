@@ -34,6 +34,7 @@ from robosc_bridge.daemon.reports import Device, DeviceDown
 from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.devices.interface import STANDSTILL, Velocity
 from support.daemons import Connected, Scene
+from support.effort import examples
 
 MODEL = """
 robot Driven {
@@ -533,7 +534,7 @@ EVERYTHING = [
 ]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40))
 @given(
     st.lists(
         st.tuples(

@@ -1,6 +1,5 @@
 """Requests and answers over a real pseudo-terminal, and every way in which an answer can be wrong."""
 
-import itertools
 import resource
 import threading
 import time
@@ -136,29 +135,6 @@ def test_a_request_is_made_again_once(first: Answers, is_damaged: bool) -> None:
         assert (bus.counters.damaged > 0) == is_damaged
 
 
-@pytest.mark.real_time
-def test_silence_is_told_in_time_and_names_who_answers_instead() -> None:
-    with Peer(lambda request: [status(7, b"1234")]) as peer, _bus(peer) as bus:
-        begin_s = time.monotonic()
-        with pytest.raises(DeviceSilentError, match="device 1 does not answer, but device 7 does"):
-            bus.read(1, 132, 4)
-        assert LIMIT_S < time.monotonic() - begin_s < 5 * LIMIT_S
-        # The next device is not held up: the port is not busy, and nothing waits.
-        assert bus.read(7, 132, 4).data == b"1234"
-
-
-@pytest.mark.real_time
-def test_all_requests_of_a_cycle_end_with_it() -> None:
-    with Peer(lambda request: []) as peer, _bus(peer) as bus:
-        begin_s = time.monotonic()
-        bus.begin(1.5 * LIMIT_S, repeats=5)
-        with pytest.raises(DeviceSilentError):
-            bus.read(1, 132, 4)
-        with pytest.raises(DeviceSilentError, match="no time is left"):
-            bus.write(1, 64, b"\1")
-        assert 1.4 * LIMIT_S < time.monotonic() - begin_s < 3 * LIMIT_S
-
-
 def test_a_synchronised_read_that_came_damaged_is_made_again() -> None:
     reads = iter((status(1, b"", 3) + status(2, b"", 3), status(1, b"a") + status(2, b"b")))
 
@@ -169,17 +145,6 @@ def test_a_synchronised_read_that_came_damaged_is_made_again() -> None:
         found = bus.sync_read(64, 1, (1, 2))
         assert [found[device].data for device in (1, 2)] == [b"a", b"b"]
         assert bus.counters.repeated == 1
-
-
-@pytest.mark.real_time
-def test_a_clock_that_is_set_back_prolongs_no_wait(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(time, "time", itertools.count(1e9, -1.0).__next__)
-    with Peer(lambda request: []) as peer, _bus(peer) as bus:
-        bus.begin(1.0, repeats=0)
-        begin_s = time.monotonic()
-        with pytest.raises(DeviceSilentError):
-            bus.ping(1)
-        assert time.monotonic() - begin_s < 3 * LIMIT_S
 
 
 def test_waiting_costs_nothing() -> None:

@@ -17,13 +17,21 @@ from support.peer import Answers, Peer, asked, status
 from support.wire import Host, wait_until
 
 PING = "ff ff fd 00 c8 03 00 01 3b fa"
+
 STATUS = "ff ff fd 00 c8 07 00 02 12 00 01 00 ba 21"
+
 BLOCK = "ff ff fd 00 c8 07 00 02 0a 00 ac 00 b6 2f"
+
 ZERO = "ff ff fd 00 c8 1d 00 03 96 00" + 24 * " 00" + " 06 a0"
+
 WORKED = "ff ff fd 00 c8 1d 00 03 96 00 0a 00 00 00" + 16 * " 00" + " 32 00 00 00 4d 37"
+
 TORQUE_ON = "ff ff fd 00 c8 06 00 03 95 00 01 4c 2d"
+
 CALIBRATE = "ff ff fd 00 c8 06 00 03 3b 00 01 17 a5"
+
 HEARTBEATS = ("ff ff fd 00 c8 06 00 03 13 00 00 32 27", "ff ff fd 00 c8 06 00 03 13 00 01 37 a7")
+
 _HEARTBEAT = "ff ff fd 00 c8 06 00 03 13 00 "
 
 
@@ -237,27 +245,6 @@ def test_motors_that_restart_in_a_pause_have_not_jumped(bench: Rig) -> None:
     reading = bench.base.exchange(Velocity())
     assert MotorFault.TORQUE_LOST in reading.faults
     assert (reading.pose.x_m, reading.pose.heading_rad) == (0.0, 0.0)
-
-
-@pytest.mark.real_time
-def test_torque_that_is_gone_is_a_fault_that_stays_until_torque_is_switched_on_anew(bench: Rig) -> None:
-    bench.start()
-    bench.drive(Velocity(0.1), 0.2)
-    bench.robot.left.overload()
-    begin_s = time.monotonic()
-    reading = bench.drive_until(lambda reading: MotorFault.TORQUE_LOST in reading.faults, Velocity(0.1))
-    assert time.monotonic() - begin_s < 0.2
-    assert not reading.is_torque_on
-    assert bench.stops_within(0.1)
-    # Whatever is wanted then, nothing moves.
-    reading = bench.drive(Velocity(0.1), 0.2)
-    assert reading.faults == {MotorFault.TORQUE_LOST}
-    assert bench.goals_rad_s() == (0.0, 0.0)
-    with pytest.raises(DeviceFaultError, match="a wheel motor does not hold; switch the robot off and on"):
-        bench.base.set_torque(True)
-    assert not bench.robot.right.table["torque enable"]
-    with pytest.raises(DeviceFaultError, match="does not hold"):
-        bench.base.reset()
 
 
 def test_motors_that_were_without_power_can_be_used_again_and_have_not_jumped(bench: Rig) -> None:

@@ -8,7 +8,7 @@ from random import Random
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robosc_bridge.protocol import lds01, lds02, lds03
@@ -297,7 +297,6 @@ def _cut(data: bytes, dice: Random) -> list[bytes]:
 
 
 @each_kind
-@settings(deadline=None)
 @given(seed=st.integers(0, 2**32), faults=st.integers(0, 12))
 def test_pieces_are_decoded_as_the_twin_decodes_the_whole(kind: Kind, seed: int, faults: int) -> None:
     dice = Random(seed)
@@ -313,7 +312,6 @@ def test_pieces_are_decoded_as_the_twin_decodes_the_whole(kind: Kind, seed: int,
 
 
 @each_kind
-@settings(deadline=None)
 @given(data=st.binary(max_size=400), seed=st.integers(0, 2**32))
 def test_any_bytes_are_decoded_as_the_twin_decodes_them(kind: Kind, data: bytes, seed: int) -> None:
     data = data.replace(b"\0", kind.header)
@@ -322,7 +320,6 @@ def test_any_bytes_are_decoded_as_the_twin_decodes_them(kind: Kind, data: bytes,
 
 
 @each_kind
-@settings(deadline=None)
 @given(seed=st.integers(0, 2**32), garbage=st.binary(max_size=300), is_header=st.booleans())
 def test_two_frames_after_garbage_it_goes_on(kind: Kind, seed: int, garbage: bytes, is_header: bool) -> None:
     frames = _stream(kind, seed, 8)

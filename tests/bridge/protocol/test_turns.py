@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robosc_bridge.protocol import lds01, lds02, lds03
@@ -141,7 +141,6 @@ def test_a_device_that_stays_where_it_is_fills_no_memory() -> None:
     assert _turns(builder, [_points(11, 359, 1), _points(0, 359, 2), _points(0, 9, 3)])[0].ranges_m == (2,) * 360
 
 
-@settings(deadline=None)
 @given(
     st.lists(st.integers(1, 40), min_size=1, max_size=120),
     st.sets(st.integers(0, 119), max_size=60),
@@ -237,7 +236,6 @@ def test_a_bin_is_half_a_degree_to_both_sides(angle_deg: float, found: int) -> N
     assert [k for k, range_m in enumerate(nearest) if not math.isnan(range_m)] == [found]
 
 
-@settings(deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 359_999), st.floats(0, 20) | st.just(math.nan)), max_size=80))
 def test_a_bin_has_the_smallest_of_its_ranges(points: list[tuple[int, float]]) -> None:
     """Angles are in thousandths of a degree here, in which the edges of bins are whole numbers."""

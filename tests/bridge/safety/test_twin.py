@@ -10,6 +10,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition,
 
 from robosc_bridge.devices.interface import STANDSTILL, MotorFault, Velocity
 from robosc_bridge.safety import LATCHING, Output, Reason, SafetyLayer
+from support.effort import examples
 from support.safety import LIMITS, STEP_S, reading
 from support.safety_twin import SafetyTwin
 
@@ -192,5 +193,5 @@ class Sequence(RuleBasedStateMachine):
         assert abs(w) <= abs(before.angular_rad_s) + self.limits.angular_acceleration_rad_s2 * step_s + 1e-12
 
 
-Sequence.TestCase.settings = settings(max_examples=80, stateful_step_count=40, deadline=None)
+Sequence.TestCase.settings = settings(max_examples=examples(80), stateful_step_count=40)
 test_random_sequences = Sequence.TestCase

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from robosc.execution.clock import ManualClock
 from robosc_bridge.simulated import BODIES, OpenCr, ServoBus, Timebase, Walls, World, wheel_servos
 from robosc_bridge.simulated.packets import Request, RequestParser, crc16, status
+from support.effort import examples
 
 SDK = PacketHandler(2.0)
 # Bytes that make headers and stuffing likely.
@@ -48,19 +49,16 @@ def test_the_check_value_of_the_crc() -> None:
     assert crc16(b"123456789") == 0xFEE8
 
 
-@settings(deadline=None)
 @given(TRICKY)
 def test_the_crc_is_the_sdks(data: bytes) -> None:
     assert crc16(data) == SDK.updateCRC(0, data, len(data))
 
 
-@settings(deadline=None)
 @given(st.integers(0, 252), st.integers(0, 255), TRICKY)
 def test_a_status_packet_is_what_the_sdk_reads(device_id: int, error: int, parameters: bytes) -> None:
     assert well_formed(status(device_id, error, parameters)) == (device_id, error, parameters)
 
 
-@settings(deadline=None)
 @given(
     st.lists(st.tuples(st.integers(0, 254), INSTRUCTIONS, TRICKY), max_size=4),
     st.lists(st.integers(1, 30), min_size=1, max_size=20),
@@ -77,7 +75,6 @@ def test_packets_are_found_however_they_are_cut(packets: list[tuple[int, int, by
     assert found == [Request(*packet) for packet in packets]
 
 
-@settings(deadline=None)
 @given(st.lists(TRICKY, max_size=20))
 def test_noise_is_survived_and_a_packet_after_a_pause_is_heard(pieces: list[bytes]) -> None:
     parser = RequestParser()
@@ -105,7 +102,7 @@ def bus() -> ServoBus:
     return ServoBus(wheel_servos(world))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(100))
 @given(st.lists(st.tuples(st.sampled_from([1, 2]), INSTRUCTIONS, PARAMETERS), max_size=12), st.integers(0, 200))
 def test_a_servo_answers_whatever_it_is_asked(requests: list[tuple[int, int, bytes]], pause_ms: int) -> None:
     servos = bus()
@@ -131,7 +128,7 @@ def test_a_servo_answers_whatever_it_is_asked(requests: list[tuple[int, int, byt
         assert servo.read(0, 2) == (0, b"\x06\x04")
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(100))
 @given(st.lists(st.integers(0, 150), max_size=60), st.lists(TRICKY, max_size=20))
 def test_random_writes_never_leave_a_register_beyond_its_bounds(addresses: list[int], data: list[bytes]) -> None:
     servo = bus().servos[0]
@@ -142,7 +139,7 @@ def test_random_writes_never_leave_a_register_beyond_its_bounds(addresses: list[
                 assert item.lowest <= servo.table[item.name] <= item.highest, item.name
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(100))
 @given(st.lists(st.tuples(st.sampled_from([200, 1, 254]), INSTRUCTIONS, PARAMETERS), max_size=12), st.integers(0, 200))
 def test_opencr_answers_three_instructions_and_no_others(requests: list[tuple[int, int, bytes]], pause_ms: int) -> None:
     world = World(BODIES["burger"], Walls(()), Timebase(ManualClock()))

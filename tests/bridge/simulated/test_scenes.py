@@ -33,6 +33,7 @@ from robosc_bridge.simulated.scene_file import (
     WallsPart,
 )
 from robosc_bridge.simulated.textures import Texture
+from support.effort import examples
 
 WHOLE = """\
 walls:
@@ -113,7 +114,7 @@ def test_who_turns_round_the_mouth_of_the_spiral_is_at_its_goal() -> None:
     assert not goal.is_reached(2.0, 2.5)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=examples(25))
 @given(st.integers(1, 6), st.integers(1, 6), st.integers(0, 1000))
 def test_a_maze_has_one_exit_and_its_goal_is_outside(columns: int, rows: int, seed: int) -> None:
     scene = maze_scene(columns, rows, seed=seed)

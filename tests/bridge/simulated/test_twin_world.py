@@ -31,6 +31,7 @@ from robosc_bridge.simulated.rounds import Rounds
 from robosc_bridge.simulated.world import STEP_S, Happening
 from robosc_bridge.skills.line import line_offset
 from robosc_bridge.skills.settings import LineSettings
+from support.effort import examples
 
 SIZES = st.floats(-5, 5, allow_nan=False)
 DISCS = st.lists(st.tuples(SIZES, SIZES, st.floats(0.01, 2.0)), max_size=5)
@@ -52,7 +53,6 @@ def drive(world: World, left_rad_s: float, right_rad_s: float, seconds: float) -
 MILLIMETRES = SIZES.map(lambda size: round(size, 3))
 
 
-@settings(deadline=None)
 @given(
     st.lists(st.tuples(MILLIMETRES, MILLIMETRES, MILLIMETRES, MILLIMETRES), max_size=40),
     MILLIMETRES,
@@ -97,7 +97,7 @@ def slow_disc(disc: tuple[float, float, float], x_m: float, y_m: float, angle: f
     return low
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=examples(15))
 @given(st.lists(st.tuples(SIZES, SIZES, st.floats(0.1, 2.0)), max_size=2), SIZES, SIZES, st.floats(-7, 7))
 def test_rays_meet_discs_as_a_slow_twin_does(
     discs: list[tuple[float, float, float]], x_m: float, y_m: float, angle: float
@@ -109,7 +109,6 @@ def test_rays_meet_discs_as_a_slow_twin_does(
     assert found == pytest.approx(expected, abs=1e-3) or any(abs(by) < 1e-3 for by in missed)
 
 
-@settings(deadline=None)
 @given(DISCS, SIZES, SIZES, st.floats(0.1, 3.0))
 def test_discs_do_not_mind_how_long_a_direction_is(
     discs: list[tuple[float, float, float]], x_m: float, y_m: float, length: float
@@ -124,7 +123,7 @@ def test_discs_do_not_mind_how_long_a_direction_is(
     assert (np.isclose(many * length, one, rtol=1e-6, atol=1e-6) | grazes).all()
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=examples(15))
 @given(st.integers(0, 100), st.lists(st.tuples(st.floats(-8, 8), st.floats(-8, 8)), min_size=1, max_size=6))
 def test_a_world_that_measures_seldom_goes_where_one_goes_that_always_does(
     seed: int, speeds: list[tuple[float, float]]

@@ -5,7 +5,7 @@ from collections import deque
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robosc.execution.clock import ManualClock, SystemClock
@@ -55,7 +55,6 @@ def slow_range(walls: Walls, x: float, y: float, angle: float) -> float:
     return best
 
 
-@settings(deadline=None)
 @given(st.lists(st.tuples(*[MILLIMETRES] * 4), max_size=6), MILLIMETRES, MILLIMETRES, ANGLES)
 def test_rays_agree_with_a_slow_twin(segments: list[tuple[float, float, float, float]], x: float, y: float,
                                      angle: float) -> None:  # fmt: skip
@@ -67,7 +66,6 @@ def test_rays_agree_with_a_slow_twin(segments: list[tuple[float, float, float, f
     assert any(found == pytest.approx(value, rel=1e-3, abs=1e-3) for value in (expected, *ends))
 
 
-@settings(deadline=None)
 @given(SEGMENTS, SIZES, SIZES)
 def test_no_point_of_a_wall_is_nearer_than_told(
     segments: list[tuple[float, float, float, float]], x: float, y: float
@@ -231,7 +229,6 @@ def test_only_a_manual_clock_is_advanced() -> None:
         Timebase(ManualClock()).advance(-1.0)
 
 
-@settings(deadline=None)
 @given(st.integers(1, 6), st.integers(1, 6), st.integers(0, 50))
 def test_in_a_maze_there_is_one_way_between_any_two_cells(columns: int, rows: int, seed: int) -> None:
     walls = maze(columns, rows, 1.0, seed)

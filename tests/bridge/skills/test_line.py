@@ -1,7 +1,7 @@
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -89,7 +89,6 @@ def test_what_is_no_picture_shows_no_line(picture: Picture) -> None:
     assert line_offset(picture, WHOLE) is None
 
 
-@settings(deadline=None)
 @given(
     arrays(np.uint8, st.tuples(st.integers(1, 12), st.integers(1, 12))),
     st.floats(0, 1),
@@ -105,7 +104,6 @@ def test_every_picture_has_an_answer(picture: Picture, top: float, bottom: float
     assert aside is None or -0.5 < aside < 0.5
 
 
-@settings(deadline=None)
 @given(arrays(np.uint8, st.tuples(st.integers(1, 8), st.integers(1, 8)), elements=st.sampled_from([0, 255])))
 def test_it_agrees_with_a_search_by_hand(picture: Picture) -> None:
     patches = sorted(_patches(picture), key=len, reverse=True)

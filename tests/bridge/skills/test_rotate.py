@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from robosc_bridge.devices.interface import STANDSTILL
 from robosc_bridge.skills import Rotate, RotateSettings, RotateState
 from robosc_bridge.skills.rotate import MAXIMUM_ANGLE_RAD
+from support.effort import examples
 
 USUAL = RotateSettings()
 PERIOD_S = 0.02
@@ -78,7 +79,7 @@ def test_a_body_that_obeys_turns_by_the_angle(start_deg: int, angle_deg: int) ->
     assert taken_s < abs(angle_rad) / USUAL.speed_rad_s + 3
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(100))
 @given(
     start_rad=st.floats(-math.pi, math.pi),
     angle_rad=st.floats(-5 * math.pi, 5 * math.pi),
@@ -108,7 +109,7 @@ def test_any_turn_ends_within_the_tolerance(
     assert abs(body.heading_rad - start_rad - angle_rad) <= USUAL.tolerance_rad + 2 * noise_rad + 1e-9
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100))
 @given(
     angle_rad=st.floats(-3 * math.pi, 3 * math.pi),
     delay=st.integers(0, 60),

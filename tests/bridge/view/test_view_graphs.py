@@ -19,6 +19,7 @@ from robosc_bridge.view.graphs import (
     layers_of,
     shortened,
 )
+from support.effort import examples
 
 
 def automaton(seed: int) -> tuple[list[Node], list[Arrow]]:
@@ -54,7 +55,7 @@ def boxes(graph: dict[str, Any]) -> list[tuple[float, float, float, float]]:
 
 
 @given(st.integers(0, 10**6))
-@settings(max_examples=150)
+@settings(max_examples=examples(100))
 def test_states_and_labels_lie_inside_and_apart(seed: int) -> None:
     nodes, arrows = automaton(seed)
     graph = drawn(nodes, arrows)
@@ -68,7 +69,7 @@ def test_states_and_labels_lie_inside_and_apart(seed: int) -> None:
 
 
 @given(st.integers(0, 10**6))
-@settings(max_examples=100)
+@settings(max_examples=examples(100))
 def test_edges_go_from_border_to_border_over_their_label(seed: int) -> None:
     nodes, arrows = automaton(seed)
     graph = drawn(nodes, arrows)

@@ -18,6 +18,7 @@ from robosc_bridge.view.hub import Viewer
 from robosc_bridge.view.replay import HISTORY, MAXIMUM_STOPS, Player, Recording, Replay
 from robosc_bridge.view.sources import Pause, Play, Seek
 from robosc_bridge.view.telling import events_text
+from support.effort import examples
 from support.live import LiveRobot, large_model, supervisor_without_synthesis
 from support.pages_open import opened
 from support.view_servers import served
@@ -167,7 +168,7 @@ def _stands_at(time_s: float) -> Any:
         max_size=30,
     )
 )
-@settings(max_examples=100)
+@settings(max_examples=examples(100))
 def test_a_player_stays_within_the_log(wishes: list[Any]) -> None:
     player = Player(RECORDING)
     expected_s = BEGIN_S
@@ -253,7 +254,7 @@ def test_what_is_back_ends_its_own_stop_alone(tmp_path: Path) -> None:
 
 
 @given(st.integers(0, 1000), st.lists(st.sampled_from([True, True, True, True, False]), min_size=1, max_size=60))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40))
 def test_the_last_transitions_are_those_of_a_run_from_the_beginning(seed: int, happens: list[bool]) -> None:
     robot = LiveRobot(SUPERVISOR, seed)
     subscription = robot.feed.subscribe(lambda: None, len(happens))

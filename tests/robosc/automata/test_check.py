@@ -33,6 +33,7 @@ from robosc.expressions import (
     VariableRead,
 )
 from robosc.model.structure import Deployment
+from support.effort import examples
 from support.models import EXAMPLE_NAMES, example_model
 from support.random_systems import wide_system
 from support.systems import automaton, edge, system
@@ -141,6 +142,6 @@ def test_lowered_models_fit(name: str, deployment: Deployment) -> None:
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=examples(30))
 def test_random_systems_fit(seed: int) -> None:
     check_system(wide_system(seed))

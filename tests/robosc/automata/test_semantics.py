@@ -27,6 +27,7 @@ from robosc.expressions import (
     domain,
 )
 from robosc.expressions.evaluate import evaluate
+from support.effort import examples
 from support.random_systems import any_systems
 from support.systems import automaton, edge, operation, read, received, state, system
 
@@ -330,7 +331,7 @@ def _some_states(subject: Semantics, count: int) -> list[State]:
     return list(found)[:count]
 
 
-@settings(deadline=None, max_examples=120)
+@settings(max_examples=examples(100))
 @given(any_systems())
 def test_agrees_with_the_naive_reading_of_the_definition(drawn: System) -> None:
     subject, naive = Semantics(drawn), _Naive(drawn)
@@ -352,7 +353,7 @@ def test_agrees_with_the_naive_reading_of_the_definition(drawn: System) -> None:
         assert subject.bad(at) is is_bad
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=examples(60))
 @given(any_systems())
 def test_compiled_expressions_mean_the_same_as_evaluated_ones(drawn: System) -> None:
     places = {subject: place for place, subject in enumerate(subjects(drawn))}

@@ -17,6 +17,7 @@ from robosc.model import check
 from robosc.model.structure import Behaviour, Model, Variable
 from robosc.source import Location, visible
 from support.corpus import bundle_of_case, cases
+from support.effort import examples
 from support.models import EXAMPLE_NAMES, EXAMPLES, example_model, model_of
 from support.pages import Diagram, Section, read_page, read_text
 from support.random_pages import TEXTS, models
@@ -143,7 +144,7 @@ def test_every_sound_model_of_the_corpus_has_a_page(case: str) -> None:
         agrees(found.model, page(found.model, found.diagnostics))
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=examples(100))
 @given(models())
 def test_hostile_names_and_texts_break_neither_table_nor_diagram(model: Model) -> None:
     text = page(model)

@@ -1,4 +1,4 @@
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robosc.execution.decision import FairPolicy, Policy, make_policy
@@ -60,7 +60,6 @@ def test_what_could_not_be_issued_has_not_used_its_favour() -> None:
     assert run(policy, (0, 1)) == [0]
 
 
-@settings(deadline=None)
 @given(
     st.integers(2, 5).flatmap(lambda n: st.tuples(st.just(n), st.lists(st.sets(st.integers(0, n - 1)), max_size=120)))
 )
@@ -80,7 +79,6 @@ def test_no_request_starves(case: tuple[int, list[set[int]]]) -> None:
         assert waiting[0] <= count * count
 
 
-@settings(deadline=None)
 @given(st.lists(st.sets(st.integers(0, 3)), max_size=60))
 def test_fair_agrees_with_the_words(enabled_sets: list[set[int]]) -> None:
     count = 4

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robosc.execution.event_log import JsonLinesLog, MemoryLog, NullLog, json_line, open_event_log
@@ -183,7 +183,6 @@ def test_a_value_that_contains_itself_is_cut() -> None:
     strictly(json_line({"data": value}))
 
 
-@settings(deadline=None)
 @given(
     st.recursive(
         st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(), st.binary()),

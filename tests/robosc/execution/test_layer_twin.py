@@ -17,6 +17,7 @@ from robosc.expressions import BooleanType, EnumType
 from robosc.expressions.evaluate import evaluate
 from robosc.model.structure import Communication, CommunicationKind
 from robosc.supervisor.structure import Supervisor
+from support.effort import examples
 from support.generated import load_system
 from support.layer_twin import LayerTwin, TwinCall, TwinGoal
 from support.layers import LayerBench
@@ -211,7 +212,7 @@ class Pair:
         return "wait", bench.wait(0.25)
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=examples(100))
 @given(st.integers(0, 2**32))
 def test_the_layer_does_what_its_twin_does(seed: int) -> None:
     Pair(seed).run(STEPS)

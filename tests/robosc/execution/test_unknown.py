@@ -12,6 +12,7 @@ from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runner import Status
 from robosc.expressions import Binary, EnumValue, Received
 from robosc.model.structure import EnumRule
+from support.effort import examples
 from support.execution import Bench, bench, example_system, supervisor_of, system_of
 from support.models import model_of
 
@@ -362,7 +363,7 @@ def hostile() -> st.SearchStrategy[Any]:
     )
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=examples(100))
 @given(st.lists(st.tuples(st.sampled_from(["/scan", "level", "speed", "label"]), hostile()), max_size=6))
 def test_no_data_ever_raises_or_gets_through(messages: list[tuple[str, Any]]) -> None:
     b = Bench(RADAR_SYSTEM)
@@ -385,7 +386,7 @@ RADAR_SYSTEM = system_of(RADAR)
 
 
 @pytest.mark.parametrize("name", ["line_follower/line_follower", "maze_solver/maze_solver", "navigation/navigation"])
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=examples(60))
 @given(data=hostile())
 def test_the_examples_stand_hostile_data(name: str, data: Any) -> None:
     b = Bench(SYSTEMS[name])

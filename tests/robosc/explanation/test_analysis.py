@@ -1,6 +1,5 @@
 """Why events cannot happen in the states of random systems, against their explicit meaning."""
 
-import os
 from collections import Counter
 
 import pytest
@@ -15,9 +14,10 @@ from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
 from robosc.synthesis.watch import Watch
 from robosc.verification import synthesize_explicit
+from support.effort import seeds
 from support.random_systems import random_system
 
-EXAMPLES = int(os.environ.get("ROBOSC_RANDOM_SYSTEMS", "40"))
+EXAMPLES = 40
 STATES = 6
 """States of a system that are looked at."""
 
@@ -113,9 +113,10 @@ def _cause(item: Hindrance) -> str | Obstacle | int | None:
     }[item.kind]
 
 
+@pytest.mark.random
 def test_hindrances_in_reachable_states() -> None:
     met: Counter[str] = Counter()
-    for seed in range(EXAMPLES):
+    for seed in seeds(EXAMPLES):
         twin = Twin(seed)
         for state in sorted(twin.supervisor.reachable)[:STATES]:
             for event in twin.system.events:
@@ -123,10 +124,11 @@ def test_hindrances_in_reachable_states() -> None:
     assert all(met[name] for name in (*map(str, HindranceKind), "can happen")), met
 
 
+@pytest.mark.random
 def test_what_would_follow_runs_into_trouble() -> None:
     """Of every event that the supervisor forbids: the states that it would lead to, and that they are lost."""
     met: Counter[str] = Counter()
-    for seed in range(EXAMPLES):
+    for seed in seeds(EXAMPLES):
         twin = Twin(seed)
         for state in sorted(twin.supervisor.reachable)[:STATES]:
             here = twin.analysis.predicate(state)

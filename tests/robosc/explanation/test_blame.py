@@ -1,6 +1,5 @@
 """What is to blame and how trouble comes about, against explicit synthesis and search on random systems."""
 
-import os
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
@@ -21,10 +20,11 @@ from robosc.synthesis.engines import make_manager
 from robosc.synthesis.fixed_point import initial_states
 from robosc.synthesis.watch import Watch
 from robosc.verification import synthesize_explicit
+from support.effort import seeds
 from support.empty_systems import empty_system
 
 ENGINES = ("cudd", "autoref")
-EXAMPLES = int(os.environ.get("ROBOSC_RANDOM_SYSTEMS", "30"))
+EXAMPLES = 30
 LIMIT = 50_000
 
 
@@ -54,10 +54,11 @@ def is_empty(system: System) -> bool:
     return supervisor.is_empty
 
 
+@pytest.mark.random
 def test_the_blamed_set_is_minimal_and_the_removal_too() -> None:
     """By explicit synthesis of what is left: alone it leaves no supervisor, and with any one less there is one."""
     met: Counter[object] = Counter()
-    for seed in range(EXAMPLES):
+    for seed in seeds(EXAMPLES):
         system = empty_system(seed)
         symbolic = [Symbolic(system, engine) for engine in ENGINES]
         blames = [find_blame(item.problems, item.obstacles, item.manager.false, item.watch) for item in symbolic]
@@ -174,9 +175,10 @@ class Search:
         return None
 
 
+@pytest.mark.random
 def test_trouble_is_real_and_the_run_is_shortest() -> None:
     met: Counter[str] = Counter()
-    for seed in range(2 * EXAMPLES):
+    for seed in seeds(2 * EXAMPLES):
         system = empty_system(seed)
         trouble, other = (Symbolic(system, engine).trouble() for engine in ENGINES)
         assert trouble.run == other.run
@@ -202,10 +204,11 @@ def test_trouble_is_real_and_the_run_is_shortest() -> None:
     assert all(met[name] for name in ("condition", "no way", *map(str, HindranceKind))), met
 
 
+@pytest.mark.random
 def test_trouble_without_some_obstacles_speaks_of_the_others_alone() -> None:
     """Of what is blamed alone: the run is one of the system that is left, and whole in what it names."""
     met: Counter[str] = Counter()
-    for seed in range(3 * EXAMPLES):
+    for seed in seeds(3 * EXAMPLES):
         system = empty_system(seed)
         symbolic = [Symbolic(system, engine) for engine in ENGINES]
         blame = find_blame(symbolic[0].problems, symbolic[0].obstacles, symbolic[0].manager.false, symbolic[0].watch)

@@ -13,6 +13,7 @@ from robosc.explanation.blocked import MAXIMUM_REASONS, Requests, StateError, re
 from robosc.expressions import BooleanType, DoubleType, EnumType, IntegerType, StringType
 from robosc.model.structure import CommunicationKind
 from robosc.supervisor import Supervisor
+from support.effort import examples
 from support.generated import example_supervisor
 from support.random_supervisors import random_data, random_supervisor
 
@@ -55,7 +56,7 @@ def as_texts(components: Any) -> Any:
 
 
 @given(st.integers(0, 10**6))
-@settings(max_examples=150)
+@settings(max_examples=examples(100))
 def test_a_request_has_a_reason_if_and_only_if_it_is_not_enabled(seed: int) -> None:
     supervisor, dice = random_supervisor(seed), Random(seed)
     requests = Requests(supervisor.model, supervisor.added)
@@ -74,7 +75,7 @@ def test_a_request_has_a_reason_if_and_only_if_it_is_not_enabled(seed: int) -> N
 
 
 @given(st.integers(0, 10**6))
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 def test_what_is_told_without_locations_holds_with_them(seed: int) -> None:
     supervisor, dice = random_supervisor(seed), Random(seed)
     requests = Requests(supervisor.model, supervisor.added)

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robosc.explanation.conflict import minimal_conflict, minimal_removal
+from support.effort import examples
 
 SETS = st.lists(st.frozensets(st.integers(0, 6), min_size=1, max_size=4), min_size=1, max_size=5)
 
@@ -20,7 +21,7 @@ def subsets(things: range) -> list[frozenset[int]]:
 
 
 @given(SETS)
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(100))
 def test_against_all_subsets(conflicts: list[frozenset[int]]) -> None:
     is_empty, things = is_empty_by(conflicts), range(7)
     everything = subsets(things)

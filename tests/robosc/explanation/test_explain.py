@@ -1,6 +1,5 @@
 """Explanations on models made for them, and on random models against enumerated states."""
 
-import os
 import re
 from collections import Counter, deque
 from typing import Any
@@ -19,11 +18,12 @@ from robosc.model import Places
 from robosc.model.structure import Deployment, Model, is_tau
 from robosc.source import Location
 from robosc.verification import ExplicitSupervisor, synthesize_explicit
+from support.effort import seeds
 from support.models import checked, marked_place
 from support.random_supervisors import random_supervisor
 
 LIMIT = 2_000
-EXAMPLES = int(os.environ.get("ROBOSC_RANDOM_SYSTEMS", "40"))
+EXAMPLES = 40
 
 DOOR = """component Door {
     incoming message open with type: none
@@ -534,9 +534,10 @@ class Enumerated:
         assert report.stopped is None or not wanted
 
 
+@pytest.mark.random
 def test_random_models() -> None:
     met: Counter[str] = Counter()
-    for seed in range(EXAMPLES):
+    for seed in seeds(EXAMPLES):
         model = random_supervisor(seed).model
         components = [
             msgspec.structs.replace(

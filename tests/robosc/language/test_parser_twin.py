@@ -19,6 +19,7 @@ from robosc.language.tokens import tokenize
 from robosc.source import SourceFile
 from support import textx_parser
 from support.corpus import CORPUS
+from support.effort import examples
 from support.grammar_texts import WORDS, damaged_text, damaged_tokens, grammar_tokens, joined
 from support.models import EXAMPLES
 
@@ -138,14 +139,14 @@ def test_random_texts() -> None:
     assert found >= ALL_KINDS
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(100))
 @given(st.randoms(use_true_random=False))
 def test_texts_with_damaged_tokens(random: Random) -> None:
     tokens = grammar_tokens(random, 60)
     compare(joined(damaged_tokens(tokens, random), random))
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(100))
 @given(st.randoms(use_true_random=False))
 def test_texts_with_damaged_characters(random: Random) -> None:
     compare(damaged_text(joined(grammar_tokens(random, 60), random), random))

@@ -12,6 +12,7 @@ from robosc.errors import Severity
 from robosc.language import parse
 from robosc.model import check
 from robosc.source import Bundle, SourceFile
+from support.effort import examples
 from support.models import EXAMPLE_NAMES, EXAMPLES
 from support.mutate import mutated
 from support.random_models import models, random_bundle, relaid
@@ -21,19 +22,19 @@ LIMIT_S = 2.0
 """Of a processor: a busy machine says nothing about the text."""
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100))
 @given(models())
 def test_models_of_the_whole_language_have_no_errors(bundle: Bundle) -> None:
     assert [item for item in check(bundle).diagnostics if item.severity is Severity.ERROR] == []
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60))
 @given(models(part_b=False))
 def test_models_of_part_a_have_no_errors(bundle: Bundle) -> None:
     assert [item for item in check(bundle).diagnostics if item.severity is Severity.ERROR] == []
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60))
 @given(st.integers(0, 2**32 - 1))
 def test_blanks_and_comments_mean_nothing(seed: int) -> None:
     text = random_bundle(seed).main.text
@@ -66,14 +67,14 @@ def assert_told_well(bundle: Bundle) -> None:
         assert item.render(bundle)
 
 
-@settings(max_examples=250, deadline=None)
+@settings(max_examples=examples(100))
 @given(st.sampled_from(TEXTS), st.integers(0, 2**32 - 1))
 def test_damaged_examples(text: str, seed: int) -> None:
     damaged = mutated(text, TEXTS, Random(seed))
     assert_told_well(Bundle(SourceFile("model.rscd", damaged)))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(100))
 @given(st.integers(0, 2**32 - 1))
 def test_damaged_random_models(seed: int) -> None:
     bundle, dice = random_bundle(seed), Random(seed)

@@ -25,6 +25,7 @@ from robosc.expressions.text import expression_text
 from robosc.expressions.tree import children, leaves
 from robosc.language.words import RESERVED_WORDS
 from robosc.model.structure import ObjectValue, RequirementForm, Update
+from support.effort import examples
 from support.models import EXAMPLE_NAMES, checked, example_bundle, example_model, model_of
 from support.random_expressions import language_conditions
 
@@ -411,7 +412,7 @@ def kind_of(token: str) -> str:
     return "name" if token.isidentifier() and token not in RESERVED_WORDS else token
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60))
 @given(st.sampled_from(EXAMPLE_NAMES), st.randoms(use_true_random=False))
 def test_models_with_swapped_words_never_raise(name: str, random: Random) -> None:
     tokens = TOKENS.findall(example_bundle(name).main.text)
@@ -504,7 +505,7 @@ def writable(expression: Expression) -> bool:
     return all(writable(child) for child in children(expression))
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=examples(80))
 @given(language_conditions)
 def test_a_printed_expression_reads_back_as_itself(condition: Expression) -> None:
     if not writable(condition):

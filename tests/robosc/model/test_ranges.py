@@ -5,6 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robosc.expressions.evaluate import evaluate
+from support.effort import examples
 from support.models import checked
 
 LOW, HIGH = 0, 5
@@ -134,7 +135,7 @@ _UPDATE = st.recursive(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(100))
 @given(update=_UPDATE)
 def test_no_update_that_can_leave_the_range_goes_without_a_warning(update: str) -> None:
     if leaves_range(update):
@@ -145,7 +146,7 @@ def _n_compares(operator: str, constant: int) -> str:
     return f"n {operator} {constant}"
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(100))
 @given(
     conditions=st.lists(st.builds(_n_compares, _OPERATOR, st.integers(-1, 6)), min_size=1, max_size=3),
     then=st.integers(-6, 6),

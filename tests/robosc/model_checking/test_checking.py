@@ -1,6 +1,5 @@
 """The symbolic model checker agrees with the explicit one, and its runs show what they claim."""
 
-import os
 from random import Random
 
 import pytest
@@ -28,13 +27,13 @@ from robosc.source import Location
 from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.structure import AddedCondition
 from robosc.synthesis import SynthesisStatus, synthesize
+from support.effort import examples
 from support.explicit_ctl import ExplicitChecker
 from support.families import dining_philosophers
 from support.random_formulas import random_formula
 from support.random_systems import random_system
 from support.systems import automaton, system
 
-EXAMPLES = int(os.environ.get("ROBOSC_RANDOM_SYSTEMS", "300"))
 FORMULAS = 6
 
 
@@ -53,7 +52,7 @@ def verdict(given_system: System, formula: Formula, engine: str = "auto") -> Ver
     return found
 
 
-@settings(max_examples=EXAMPLES // 5, deadline=None)
+@settings(max_examples=examples(60))
 @given(st.integers(0, 2**32 - 1))
 def test_it_agrees_with_the_explicit_checker(seed: int) -> None:
     drawn = random_system(seed)
@@ -71,7 +70,7 @@ def test_it_agrees_with_the_explicit_checker(seed: int) -> None:
             assert explicit.replay(found.run).shows(formula, found.holds), formula_text(formula, ())
 
 
-@settings(max_examples=EXAMPLES // 30, deadline=None)
+@settings(max_examples=examples(10))
 @given(st.integers(0, 2**32 - 1))
 def test_both_engines_give_the_same(seed: int) -> None:
     drawn = random_system(seed)
@@ -82,7 +81,7 @@ def test_both_engines_give_the_same(seed: int) -> None:
     assert first == second
 
 
-@settings(max_examples=EXAMPLES // 10, deadline=None)
+@settings(max_examples=examples(30))
 @given(st.integers(0, 2**32 - 1))
 def test_runs_to_a_state_are_shortest(seed: int) -> None:
     drawn = random_system(seed)

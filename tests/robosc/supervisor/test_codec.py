@@ -17,6 +17,7 @@ from robosc.model.structure import Deployment, Requirement, RequirementForm
 from robosc.supervisor.codec import MAXIMUM_BYTES, MAXIMUM_EXPRESSION_DEPTH, decode, encode
 from robosc.supervisor.make import make_supervisor
 from robosc.supervisor.structure import Supervisor
+from support.effort import examples
 from support.models import EXAMPLE_DEPLOYMENTS, example_bundle
 from support.supervisors import supervisor
 
@@ -340,7 +341,7 @@ def survives(data: bytes) -> bool:
     return True
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=examples(100))
 @given(seed=st.integers(0, 2**64))
 def test_mutated_bytes(seed: Any) -> None:
     chance = random.Random(seed)
@@ -359,7 +360,7 @@ def test_mutated_bytes(seed: Any) -> None:
     survives(bytes(data))
 
 
-@settings(deadline=None, max_examples=600)
+@settings(max_examples=examples(100))
 @given(seed=st.integers(0, 2**64))
 def test_mutated_values(seed: Any) -> None:
     chance = random.Random(seed)

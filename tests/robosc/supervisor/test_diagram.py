@@ -15,6 +15,7 @@ from robosc.synthesis.diagrams import extract
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
 from robosc.synthesis.symbolic import Symbols
+from support.effort import examples
 from support.random_expressions import SYSTEM, conditions
 
 DOMAINS = diagram_domains(SYSTEM)
@@ -36,7 +37,7 @@ def plain(expression: Expression, state: tuple[Any, ...]) -> Any:
     return evaluate_expression(expression, lambda a, v: values[Subject(a, v)], lambda a: str(values[Subject(a)]))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60))
 @given(conditions.filter(lambda condition: not any(isinstance(leaf, Received) for leaf in leaves(condition))))
 def test_a_diagram_means_the_predicate(condition: Expression) -> None:
     encoding = Encoding(SYSTEM, make_manager("autoref"))

@@ -20,6 +20,7 @@ from robosc.supervisor.differences import MAXIMUM_DIFFERENCES, model_differences
 from robosc.supervisor.recheck import PROPERTIES, Recheck, recheck
 from robosc.synthesis import SynthesisStatus, synthesize
 from robosc.verification import Limits, Outcome, judge, synthesize_explicit
+from support.effort import examples
 from support.models import EXAMPLE_DEPLOYMENTS, bundle_of, example_bundle
 from support.mutants import (
     Mutant,
@@ -145,7 +146,7 @@ def test_every_mutant_of_a_counter_is_judged_rightly() -> None:
     assert wrong >= 20
 
 
-@settings(deadline=None, max_examples=10)
+@settings(max_examples=examples(10))
 @given(st.integers(0, 10**6))
 def test_mutants_of_random_models_are_judged_rightly(seed: int) -> None:
     bundle = random_bundle(seed)
@@ -176,7 +177,7 @@ def _judged_rightly(system: System, seed: int, most: int) -> None:
         assert symbolic.states == found.verification.states
 
 
-@settings(deadline=None, max_examples=10)
+@settings(max_examples=examples(10))
 @given(systems(), st.integers(0, 10**6))
 def test_mutants_of_random_supervisors_are_judged_rightly(system: System, seed: int) -> None:
     _judged_rightly(system, seed, 4)

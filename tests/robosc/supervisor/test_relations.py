@@ -18,6 +18,7 @@ from robosc.supervisor.multivalued import Effort, Space
 from robosc.supervisor.relations import MAXIMUM_PLACES, Description, Relation, Relations
 from robosc.supervisor.structure import DecisionDiagram, DecisionNode
 from robosc.supervisor.words import in_words
+from support.effort import examples
 
 Predicate = Callable[..., bool]
 
@@ -156,7 +157,7 @@ def shapes(draw: st.DrawFn, count: int, depth: int = 2) -> Predicate:
     return holds
 
 
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=examples(100))
 @given(st.data(), st.integers(2, 3))
 def test_predicates_with_relations_in_them(data: st.DataObject, count: int) -> None:
     ranges = {f"{name}n": data.draw(RANGES) for name in "ABC"[:count]}
@@ -198,7 +199,7 @@ def modes(draw: st.DrawFn) -> Predicate:
     return holds
 
 
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=examples(100))
 @given(st.data())
 def test_descriptions_between_what_must_be_and_what_must_not(data: st.DataObject) -> None:
     """With states that do not matter: true where wanted, false where forbidden, for merged values and single ones."""

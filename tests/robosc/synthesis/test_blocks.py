@@ -15,6 +15,7 @@ from robosc.synthesis.blocks import blocks_of
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
 from robosc.verification import Outcome, synthesize_explicit, verify
+from support.effort import examples
 from support.random_systems import MAXIMUM_STATES, systems
 from support.systems import automaton, edge, operation, read, received, system
 
@@ -175,7 +176,7 @@ def test_a_relation_that_no_list_of_values_can_tell_is_refused() -> None:
         synthesize(sensors(10**6, operation(a, "<=", b), is_late=True), engine="cudd")
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=examples(60))
 @given(systems())
 def test_among_each_other_or_not_the_supervisor_is_right(made: System) -> None:
     """Even the narrowest integers together: what comes out is the supervisor that is worked out state by state."""

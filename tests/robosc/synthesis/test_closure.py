@@ -16,6 +16,7 @@ from robosc.synthesis.engines import Manager, make_manager
 from robosc.synthesis.saturation import Saturation
 from robosc.synthesis.step import Step
 from robosc.synthesis.watch import Watch
+from support.effort import examples
 
 ORDER = ("a", "b", "c", "d", "e")
 LEVELS = {name: level for level, name in enumerate(ORDER)}
@@ -88,7 +89,7 @@ def swept(moves: Sequence[Move], begin: set[State], within: set[State]) -> set[S
 
 
 @pytest.mark.parametrize("engine", ["cudd", "autoref"])
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=examples(80))
 @given(seed=st.integers(0, 2**32))
 def test_both_find_what_sweeps_find(engine: str, seed: int) -> None:
     if engine == "cudd":

@@ -17,6 +17,7 @@ from robosc.synthesis.diagrams import extract
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
 from robosc.synthesis.symbolic import Symbols
+from support.effort import examples
 from support.random_expressions import SYSTEM, conditions
 from support.systems import automaton, operation, read, system
 
@@ -35,7 +36,7 @@ def diagram_of(condition: Expression, engine: str) -> DecisionDiagram:
     return extract(encoding, Symbols(encoding).holds(condition))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60))
 @given(condition=_without_data)
 def test_diagrams_are_reduced_and_independent_of_the_engine(condition: Expression) -> None:
     pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
@@ -51,7 +52,7 @@ def test_diagrams_are_reduced_and_independent_of_the_engine(condition: Expressio
     assert met >= set(range(2, len(diagram.nodes) + 2))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40))
 @given(condition=_without_data)
 def test_bits_among_each_other_give_the_same_values(condition: Expression) -> None:
     """All integers in one block: the diagram is reduced, in an order, and true where the condition is."""

@@ -13,6 +13,7 @@ from robosc.errors import NodeLimitError, SynthesisCancelled
 from robosc.expressions import Binary, Constant, IntegerType, VariableRead
 from robosc.synthesis import EngineOptions, UnknownEngineError, register, synthesize
 from robosc.synthesis.engines import _FACTORIES, Manager, limited, make_manager, reordering
+from support.effort import examples
 from support.families import FAMILIES
 from support.random_systems import wide_system
 from support.systems import automaton, edge, system
@@ -98,7 +99,7 @@ def test_other_errors_pass_the_limit(engine: str) -> None:
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=examples(20))
 def test_reordering_changes_nothing(engine: str, seed: int) -> None:
     made = wide_system(seed)
     plain, reordered = (synthesize(made, engine=EngineOptions(engine, is_reordering=flag)) for flag in (False, True))

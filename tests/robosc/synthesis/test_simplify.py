@@ -24,6 +24,7 @@ from robosc.synthesis import SynthesisStatus, simplify, synthesize
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.nodes import restrict
 from robosc.verification import synthesize_explicit
+from support.effort import examples
 from support.families import FAMILIES
 from support.random_systems import random_system
 from support.systems import automaton, edge, operation, read, system
@@ -60,7 +61,7 @@ def check_conditions(system: System, added: tuple[AddedCondition, ...]) -> None:
                 assert plain(system, formula, state) is predicates[item.event](state), (item.event, state)
 
 
-@settings(max_examples=15, deadline=None, derandomize=True)
+@settings(max_examples=examples(15))
 @given(st.integers(0, 2**32 - 1))
 def test_random_systems(seed: int) -> None:
     system = random_system(seed)
@@ -128,7 +129,7 @@ def length(system: System, added: tuple[AddedCondition, ...]) -> int:
     return sum(len(str(formula)) for formula in found)
 
 
-@settings(max_examples=15, deadline=None, derandomize=True)
+@settings(max_examples=examples(15))
 @given(st.integers(0, 2**32 - 1))
 def test_formulas_are_never_longer_than_after_restricting_alone(seed: int) -> None:
     """The candidate that restricting gives is always among those that are compared."""

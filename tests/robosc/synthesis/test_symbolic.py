@@ -13,6 +13,7 @@ from robosc.expressions.evaluate import evaluate
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
 from robosc.synthesis.symbolic import Number, Partition, Symbols, Truth
+from support.effort import examples
 from support.random_expressions import SYSTEM, conditions, numbers
 
 PLACES = subjects(SYSTEM)
@@ -72,7 +73,7 @@ def valuations(request: pytest.FixtureRequest) -> Valuations:
     return Valuations(request.param)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100))
 @given(condition=conditions)
 def test_conditions(valuations: Valuations, condition: Expression) -> None:
     translated = valuations.symbols.translate(condition)
@@ -84,7 +85,7 @@ def test_conditions(valuations: Valuations, condition: Expression) -> None:
         assert valuations.holds(translated.false, assignment) == (value is False), valuation
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100))
 @given(number=numbers)
 def test_numbers(valuations: Valuations, number: Expression) -> None:
     translated = valuations.symbols.translate(number)

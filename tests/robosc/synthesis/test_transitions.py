@@ -16,6 +16,7 @@ from robosc.expressions import IntegerType
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
 from robosc.synthesis.transitions import Steps, transition_of
+from support.effort import examples
 from support.random_systems import any_system
 from support.systems import automaton, edge, operation, read, system
 
@@ -36,7 +37,7 @@ def states_of(encoding: Encoding, states: Iterable[State]) -> Any:
     )
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=examples(25))
 @given(seed=st.integers(0, 2**32 - 1))
 def test_steps_of_random_systems(engine: str, seed: int) -> None:
     """From single states and into single states, reachable or not."""
@@ -66,7 +67,7 @@ def test_steps_of_random_systems(engine: str, seed: int) -> None:
             ), where
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40))
 @given(seed=st.integers(0, 2**32 - 1))
 def test_bad_states_of_random_systems(engine: str, seed: int) -> None:
     # Invariants are no event's business.

@@ -1,6 +1,5 @@
 """Spin and our own model checkers agree on what the target `promela` writes."""
 
-import os
 from pathlib import Path
 from random import Random
 
@@ -34,6 +33,7 @@ from robosc.targets import GenerateOptions, available_targets, generate
 from robosc.targets.promela import promela_model
 from robosc.targets.promela.expressions import Translator
 from robosc.targets.promela.names import Names
+from support.effort import SEED, examples
 from support.explicit_ctl import ExplicitChecker
 from support.families import dining_philosophers
 from support.models import EXAMPLE_DEPLOYMENTS, bundle_of, example_bundle
@@ -41,8 +41,6 @@ from support.random_formulas import random_formula
 from support.random_systems import random_system
 from support.spin import IS_INSTALLED, ask_spin
 from support.systems import automaton, edge, operation, read, system
-
-RANDOM_SYSTEMS = int(os.environ.get("ROBOSC_RANDOM_SYSTEMS", "300")) // 100
 
 needs_spin = pytest.mark.skipif(not IS_INSTALLED, reason="spin and gcc are not installed")
 
@@ -113,11 +111,12 @@ def test_examples(name: str, deployment: Deployment, tmp_path: Path) -> None:
     assert False in agrees(given, supervisor.added, Random(name), tmp_path)
 
 
+@pytest.mark.random
 @needs_spin
 def test_random_systems(tmp_path: Path) -> None:
     found: list[set[bool]] = []
-    seed = 0
-    while len(found) < RANDOM_SYSTEMS:
+    seed = SEED
+    while len(found) < examples(3):
         seed += 1
         given = random_system(seed)
         result = synthesize(given)

@@ -38,6 +38,7 @@ from robosc.supervisor.structure import Supervisor
 from robosc.targets import GenerateOptions, generate, write_files
 from robosc.targets.events import events, is_controllable
 from robosc.targets.python import changes
+from support.effort import examples
 from support.generated import example_supervisor, imported, load_system, python_text, same
 from support.layers import BothSides
 from support.models import EXAMPLE_DEPLOYMENTS, EXAMPLE_NAMES, model_of
@@ -152,14 +153,14 @@ class Twins:
         self.compare()
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=examples(100))
 @given(st.integers(0, 2**32))
 def test_a_random_supervisor_behaves_as_interpreted(seed: int) -> None:
     twins = Twins(random_supervisor(seed))
     twins.run(Random(seed), STEPS)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=examples(50))
 @given(st.integers(0, 2**32 - 1))
 def test_the_supervisor_of_a_random_text_behaves_as_interpreted(seed: int) -> None:
     made = make_supervisor(random_bundle(seed)).supervisor
@@ -168,7 +169,7 @@ def test_the_supervisor_of_a_random_text_behaves_as_interpreted(seed: int) -> No
         Twins(made).run(Random(seed), 10)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=examples(50))
 @given(st.integers(0, 2**32))
 def test_a_random_supervisor_that_asks_one_by_one_behaves_as_interpreted(seed: int) -> None:
     """As a model with many requests does."""

@@ -1,5 +1,6 @@
 """The explicit synthesizer, on systems worked out by hand and against the definition itself."""
 
+from collections.abc import Callable
 from itertools import chain, combinations
 
 import pytest
@@ -10,7 +11,8 @@ from robosc.automata.compile import State
 from robosc.errors import SynthesisCancelled
 from robosc.expressions import FALSE, BooleanType, IntegerType, StateTest
 from robosc.verification import ExplicitSupervisor, synthesize_explicit
-from support.random_systems import any_systems, random_system, shares
+from support.effort import examples
+from support.random_systems import any_systems, random_system, shares, wide_system
 from support.systems import automaton, edge, operation, read, received, state, system
 
 
@@ -163,7 +165,7 @@ def _supports(semantics: Semantics, kept: frozenset[State]) -> bool:
         reach |= more
 
 
-@settings(deadline=None, max_examples=400)
+@settings(max_examples=examples(100))
 @given(any_systems())
 def test_agrees_with_the_largest_subset_that_meets_the_definition(drawn: System) -> None:
     supervisor = _synthesize(drawn)
@@ -179,8 +181,8 @@ def test_agrees_with_the_largest_subset_that_meets_the_definition(drawn: System)
     assert supervisor.is_empty == (semantics.initial not in largest)
 
 
-def test_random_systems_are_worth_comparing() -> None:
-    found = shares([random_system(seed) for seed in range(150)])
-    print("shares of random systems:", found)
+@pytest.mark.parametrize("make", [random_system, wide_system])
+def test_random_systems_are_worth_comparing(make: Callable[[int], System]) -> None:
+    found = shares([make(seed) for seed in range(150)])
     assert found["disables"] >= 0.5
     assert 0.1 <= found["empty"] <= 0.34

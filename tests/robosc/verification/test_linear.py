@@ -18,6 +18,7 @@ from robosc.verification.symbolic.linear import Form, Linear
 from robosc.verification.symbolic.relations import Relations
 from robosc.verification.symbolic.variables import Digits, Variables
 from robosc.verification.symbolic.work import TooMuchWorkError, Work
+from support.effort import examples
 from support.systems import automaton, edge, operation, read, received, system
 
 RANGES = {"x": (0, 1_000_000), "y": (-70_000, 90_000), "z": (2**31 - 1_000_000, 2**31 - 1), "t": (-3, 4)}
@@ -125,7 +126,7 @@ def no_tables(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(expressions, "MAXIMUM_VALUATIONS", 0)
 
 
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=examples(80))
 @given(st.integers(0, 2**32))
 def test_comparisons_are_true_false_and_unknown_where_they_are(seed: int) -> None:
     dice = Dice(seed)
@@ -142,7 +143,7 @@ def test_comparisons_are_true_false_and_unknown_where_they_are(seed: int) -> Non
         assert is_true(variables, truth.false, held) == (expected is False), (condition, state, datum)
 
 
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=examples(80))
 @given(st.integers(0, 2**32))
 def test_updates_write_what_they_should_or_leave_the_range(seed: int) -> None:
     dice = Dice(seed)

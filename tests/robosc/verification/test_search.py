@@ -19,6 +19,7 @@ from robosc.verification import synthesize_explicit, verify
 from robosc.verification.packing import Packing
 from robosc.verification.permissive import Allowed, allowed
 from robosc.verification.search import Effort, Reached, blocking_state, search
+from support.effort import examples
 from support.families import FAMILIES
 from support.random_supervisors import random_diagram
 from support.random_systems import any_systems, systems
@@ -51,7 +52,7 @@ def _allowed(made: System) -> tuple[Packing, Allowed]:
     return packing, found
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=examples(25))
 @given(systems(), st.integers(0, 10**6))
 def test_the_search_finds_the_graph(made: System, seed: int) -> None:
     added = random_conditions(made, seed)
@@ -65,7 +66,7 @@ def test_the_search_finds_the_graph(made: System, seed: int) -> None:
         assert len(found.trace(number)) == distances[found.packing.decode(code)]
 
 
-@settings(deadline=None, max_examples=12)
+@settings(max_examples=examples(12))
 @given(systems(), st.integers(0, 10**6))
 def test_functions_are_conditions_as_well(made: System, seed: int) -> None:
     added = random_conditions(made, seed)
@@ -73,7 +74,7 @@ def test_functions_are_conditions_as_well(made: System, seed: int) -> None:
     assert searched(made, functions).codes == searched(made, added).codes
 
 
-@settings(deadline=None, max_examples=12)
+@settings(max_examples=examples(12))
 @given(systems(), st.integers(0, 10**6))
 def test_blocking_states_are_those_from_which_no_marked_one_is_reachable(made: System, seed: int) -> None:
     found = searched(made, random_conditions(made, seed))
@@ -91,7 +92,7 @@ def test_blocking_states_are_those_from_which_no_marked_one_is_reachable(made: S
     assert blocking_state(found) == min({*range(len(found.codes))} - reaching, default=None)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=examples(25))
 @given(systems())
 def test_the_recomputed_supervisor_is_the_explicit_one(made: System) -> None:
     explicit = synthesize_explicit(made, limit=20_000)
@@ -134,7 +135,7 @@ def test_what_is_forgotten_is_worked_out_again(monkeypatch: pytest.MonkeyPatch) 
     assert verify(made, {}) == whole
 
 
-@settings(deadline=None, max_examples=10)
+@settings(max_examples=examples(10))
 @given(any_systems())
 def test_packing_and_back(made: System) -> None:
     packing = Packing(Semantics(made))

@@ -32,6 +32,7 @@ from robosc.verification.symbolic import expressions, order, verify_symbolically
 from robosc.verification.symbolic.order import cuthill_mckee, place_order
 from robosc.verification.symbolic.reach import Reachability
 from robosc.verification.symbolic.work import TooMuchWorkError, Work
+from support.effort import examples
 from support.families import FAMILIES
 from support.random_supervisors import random_diagram
 from support.random_systems import systems
@@ -82,14 +83,14 @@ def _conditions(made: System, seed: int) -> dict[str, Decision]:
     )
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=examples(40))
 @given(systems(), st.integers(0, 10**6))
 def test_on_any_supervisor_it_agrees_with_the_explicit_search(made: System, seed: int) -> None:
     _agrees(made, {})
     _agrees(made, _conditions(made, seed))
 
 
-@settings(deadline=None, max_examples=8)
+@settings(max_examples=examples(8))
 @given(systems(), st.integers(0, 10**6))
 def test_both_engines_find_the_same_with_the_same_work(made: System, seed: int) -> None:
     added = _conditions(made, seed)
@@ -100,7 +101,7 @@ def test_both_engines_find_the_same_with_the_same_work(made: System, seed: int) 
         assert ends[0] == ends[1]
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=examples(15))
 @given(systems())
 def test_right_supervisors_pass_and_freed_ones_fail(made: System) -> None:
     result = synthesize(made)
@@ -142,7 +143,7 @@ def test_a_large_robot_without_its_supervisor_is_told_from_one_with_it() -> None
     assert failure.state in replay(made, {}, failure.trace)
 
 
-@settings(deadline=None, max_examples=12)
+@settings(max_examples=examples(12))
 @given(systems(), st.integers(0, 10**6))
 def test_a_run_is_found_even_where_a_shortest_one_is_too_much_work(made: System, seed: int) -> None:
     added = _conditions(made, seed)
@@ -210,7 +211,7 @@ def test_a_million_values_are_copied_compared_and_computed_with() -> None:
     assert verify_symbolically(_measured(update=product), {}).safe is NOT_CHECKED
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=examples(60))
 @given(systems(), st.integers(0, 10**6))
 def test_linear_forms_agree_with_the_explicit_search(made: System, seed: int) -> None:
     """The same with the smallest integers as with wide ones, whose values cannot be gone through."""

@@ -14,6 +14,7 @@ from robosc.errors import SynthesisCancelled
 from robosc.expressions import IntegerType, StateTest
 from robosc.model.structure import Deployment
 from robosc.verification import ExplicitSupervisor, Failure, Outcome, Verification, synthesize_explicit, verify
+from support.effort import examples
 from support.models import EXAMPLE_NAMES, example_model
 from support.random_systems import disables_something, systems
 from support.systems import automaton, edge, operation, read, system
@@ -171,7 +172,7 @@ def _added(made: System, supervisor: ExplicitSupervisor) -> dict[str, Callable[[
     return {event.name: condition(event.name) for event in made.events if event.is_controllable}
 
 
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=examples(80))
 @given(systems())
 def test_what_is_synthesized_passes(drawn: System) -> None:
     supervisor = synthesize_explicit(drawn, limit=20_000)
@@ -195,7 +196,7 @@ def _mutant(
     return added
 
 
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=examples(80))
 @given(systems(), st.data())
 def test_every_mutant_is_caught_with_a_trace_that_replays(drawn: System, data: st.DataObject) -> None:
     supervisor = synthesize_explicit(drawn, limit=20_000)

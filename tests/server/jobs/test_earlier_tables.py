@@ -1,78 +1,13 @@
 """Databases of earlier versions are brought up to this one, with what is in them."""
 
-import asyncio
 import sqlite3
 from pathlib import Path
 
-import psycopg
-import sqlalchemy
-from sqlalchemy import inspect, make_url
+from sqlalchemy import inspect
 
-from robosc_server.store import JobState, Store, open_store
-from robosc_server.store.looking import look_at_postgresql, look_at_sqlite
-from robosc_server.tasks.task import Result, TaskKind
-
-# As the first version made them.
-_TABLES = """
-CREATE TABLE robosc_schema (version INTEGER NOT NULL);
-CREATE TABLE replicas (id TEXT NOT NULL, beats BIGINT NOT NULL, PRIMARY KEY (id));
-CREATE TABLE results (
-    key TEXT NOT NULL, kind TEXT NOT NULL, size BIGINT NOT NULL, used_us BIGINT NOT NULL, PRIMARY KEY (key)
-);
-CREATE INDEX results_used ON results (used_us);
-CREATE TABLE result_blocks (
-    key TEXT NOT NULL, number INTEGER NOT NULL, content BLOB NOT NULL, PRIMARY KEY (key, number),
-    FOREIGN KEY (key) REFERENCES results (key) ON DELETE CASCADE
-);
-CREATE TABLE jobs (
-    id TEXT NOT NULL, owner TEXT NOT NULL, kind TEXT NOT NULL, state TEXT NOT NULL, revision BIGINT NOT NULL,
-    key TEXT NOT NULL, main_file TEXT NOT NULL, label TEXT NOT NULL, idempotency_key TEXT, retention_us BIGINT NOT NULL,
-    created_us BIGINT NOT NULL, started_us BIGINT, ended_us BIGINT, expires_us BIGINT, attempts INTEGER NOT NULL,
-    stage TEXT, progress TEXT, reason TEXT, message TEXT, is_from_store BOOLEAN NOT NULL, replica TEXT, result_key TEXT,
-    PRIMARY KEY (id), CONSTRAINT jobs_idempotency UNIQUE (owner, idempotency_key),
-    FOREIGN KEY (result_key) REFERENCES results (key)
-);
-CREATE INDEX jobs_all_listed ON jobs (created_us, id);
-CREATE INDEX jobs_listed ON jobs (owner, created_us, id);
-CREATE INDEX jobs_active ON jobs (state, replica);
-CREATE INDEX jobs_expiring ON jobs (expires_us);
-CREATE INDEX jobs_results ON jobs (result_key);
-CREATE TABLE job_requests (
-    job TEXT NOT NULL, content BLOB NOT NULL, PRIMARY KEY (job),
-    FOREIGN KEY (job) REFERENCES jobs (id) ON DELETE CASCADE
-);
-INSERT INTO robosc_schema VALUES (1);
-INSERT INTO results VALUES ('k', 'check', 5, 1), ('l', 'check', 3, 2);
-INSERT INTO result_blocks VALUES ('k', 0, 'BLOCK');
-INSERT INTO jobs VALUES ('done', 'me', 'check', 'succeeded', 7, 'k', 'main', '', NULL, 1000, 1, 2, 3,
-    9000000000000000, 1, NULL, NULL, NULL, NULL, false, NULL, 'k');
-INSERT INTO jobs VALUES ('waits', 'me', 'check', 'queued', 1, 'm', 'main', '', 'i', 1000, 2, NULL, NULL, NULL, 0, NULL,
-    NULL, NULL, NULL, false, 'somebody', NULL);
-"""
-
-
-def check(store: Store) -> None:
-    """See that all is there, and that what is new works."""
-
-    async def test() -> None:
-        done = await store.find("done")
-        assert done is not None and (done.state, done.result_key, done.losses) == (JobState.SUCCEEDED, "k", 0)
-        assert await store.find_result("k") == (TaskKind.CHECK, Result((b"",)))
-        waits = await store.find_by_key("me", "i")
-        assert waits is not None and waits.id == "waits"
-        owners = await store._database.read(lambda connection: connection.execute(_OWNERS).all())
-        assert {row.key: row.owner for row in owners} == {"k": "me", "l": ""}
-        await store.keep_results([("new", TaskKind.CHECK, Result((b"x",)), "you")])
-        # A server of the first version may go on for a while.
-        await store._database.write(lambda connection: connection.execute(_OLD_INSERT) and None)
-        await store.sweep(6)
-        assert await store.find_result("k") is not None
-
-    asyncio.run(test())
-
-
-_OWNERS = sqlalchemy.text("SELECT key, owner FROM results")
-_OLD_INSERT = sqlalchemy.text("INSERT INTO results (key, kind, size, used_us) VALUES ('old', 'check', 1, 1)")
+from robosc_server.store import Store, open_store
+from robosc_server.store.looking import look_at_sqlite
+from support.first_tables import TABLES, check
 
 
 def structure_of(store: Store) -> object:
@@ -91,7 +26,7 @@ def test_tables_of_the_first_version_in_sqlite(tmp_path: Path) -> None:
     for folder in ("old", "new"):
         (tmp_path / folder).mkdir()
     with sqlite3.connect(tmp_path / "old" / "jobs.sqlite") as connection:
-        connection.executescript(_TABLES.replace("'BLOCK'", "x'00000000'"))
+        connection.executescript(TABLES.replace("'BLOCK'", "x'00000000'"))
     connection.close()
     # Who only looks changes nothing.
     before = (tmp_path / "old" / "jobs.sqlite").read_bytes()
@@ -105,15 +40,3 @@ def test_tables_of_the_first_version_in_sqlite(tmp_path: Path) -> None:
     old = open_store(tmp_path / "old")
     check(old)
     old.close()
-
-
-def test_tables_of_the_first_version_in_postgresql(database_url: str, tmp_path: Path) -> None:
-    with psycopg.connect(database_url) as connection:
-        connection.execute(_TABLES.replace("BLOB", "BYTEA").replace("'BLOCK'", r"'\x00000000'").encode())
-    with psycopg.connect(database_url) as reader:
-        # Who only looks waits for nobody, as a change of these tables would have to.
-        reader.execute("SELECT * FROM results")
-        look_at_postgresql(make_url(database_url).update_query_dict({"options": "-c statement_timeout=5000"}), 10.0)
-    store = open_store(tmp_path, database_url)
-    check(store)
-    store.close()

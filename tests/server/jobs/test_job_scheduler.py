@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from robosc_server.failures import RefusedError
 from robosc_server.jobs.scheduler import Place, QueueLimits, Scheduler
 from robosc_server.tasks.task import Failure, Reason, Report, Result, TaskLimits
+from support.effort import examples
 from support.job_workers import ScriptedWorkers, task_of
 
 
@@ -278,7 +279,7 @@ _STEP = st.one_of(
 )
 
 
-@settings(max_examples=100)
+@settings(max_examples=examples(100))
 @given(st.lists(_STEP, max_size=60), st.integers(1, 3), st.integers(1, 8), st.integers(1, 4), st.integers(0, 2))
 def test_whatever_happens_it_does_as_the_twin(
     steps: list[tuple[str, str | int]], capacity: int, waiting: int, per_caller: int, reserved: int

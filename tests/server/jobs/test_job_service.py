@@ -23,6 +23,7 @@ from robosc_server.jobs.manager import JobManager
 from robosc_server.jobs.service import Context, JobService
 from robosc_server.store import JobFilter, JobRecord, JobState, StoreUnavailableError
 from robosc_server.tasks.task import Reason, TaskKind
+from support.effort import examples
 from support.job_parts import Choices, Parts, in_loop, offered, parts
 from support.job_workers import messages_for, task_message
 
@@ -238,7 +239,7 @@ def test_others_have_their_turn_while_a_long_list_is_made(size: int) -> None:
     asyncio.run(test())
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(st.one_of(st.text(max_size=60), st.binary(max_size=40).map(lambda raw: base64.urlsafe_b64encode(raw).decode())))
 def test_no_page_token_is_taken_that_was_not_given(token: str) -> None:
     if token:

@@ -2,27 +2,25 @@
 
 import asyncio
 import contextlib
-from collections import defaultdict
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import hypothesis.strategies as st
 import pytest
 from hypothesis import given, settings
-from sqlalchemy import func, select
 
 from robosc_server.failures import RefusedError
 from robosc_server.jobs import Caller, JobLimits, retention
-from robosc_server.store import JobRecord, JobState, Store, open_store, result_rows
-from robosc_server.store import store as store_module
+from robosc_server.store import JobState, open_store
 from robosc_server.store.fairness import given_back
-from robosc_server.tasks.task import Reason, Result, TaskKind
+from robosc_server.tasks.task import Reason, Result
+from support.effort import examples
 from support.job_parts import ME, Choices, Times, ended, in_loop, is_in, parts, sweep_by_hand, until
 from support.job_workers import task_of
+from support.sweep_twin import KIND, check_against_twin
 
-_KIND = TaskKind.SYNTHESIZE
 _NEVER = "until /nowhere/never"
+
 _THINGS = st.dictionaries(st.sampled_from("abcd"), st.lists(st.integers(0, 5), max_size=8))
 
 
@@ -61,99 +59,14 @@ def test_whoever_holds_most_gives_first(
         )
 
 
-@dataclass(frozen=True)
-class Kept:
-    """A result, as a test makes it."""
-
-    key: str
-    owner: str
-    size: int
-    used_s: float
-
-
-@dataclass(frozen=True)
-class Done:
-    """A job that has succeeded."""
-
-    id: str
-    owner: str
-    key: str
-
-
-def twin_of_sweep(results: list[Kept], jobs: list[Done], bound: int) -> tuple[list[Kept], list[Done]]:
-    """What is left, of jobs in the order of their ends: one thing goes at a time, and everything is counted anew."""
-
-    def referred(owner: str, among: list[Done]) -> int:
-        keys = {job.key for job in among if job.owner == owner}
-        return sum(result.size for result in results if result.key in keys)
-
-    results, jobs = list(results), list(jobs)
-    owners = sorted({job.owner for job in jobs})
-    if sum(referred(owner, jobs) for owner in owners) >= bound:
-        while jobs and sum(referred(owner, jobs) for owner in owners) > bound * 9 // 10:
-            holders = [owner for owner in owners if any(job.owner == owner for job in jobs)]
-            most = min(holders, key=lambda name: (-referred(name, jobs), name))
-            jobs.remove(next(job for job in jobs if job.owner == most))
-    while sum(result.size for result in results) > bound:
-        held: dict[str, int] = defaultdict(int)
-        for result in results:
-            held[result.owner] += result.size
-        free = [result for result in results if all(job.key != result.key for job in jobs)]
-        if not free:
-            break
-        most = min({result.owner for result in free}, key=lambda name: (-held[name], name))
-        results.remove(min((one for one in free if one.owner == most), key=lambda one: (one.used_s, one.key)))
-    return results, jobs
-
-
-async def fill(store: Store, times: Times, results: list[Kept], jobs: list[Done]) -> None:
-    for result in results:
-        times.wall_s = result.used_s
-        await store.keep_results([(result.key, _KIND, Result((bytes(result.size),)), result.owner)])
-    for number, job in enumerate(jobs):
-        times.wall_s = 1000.0 + number
-        record = JobRecord(
-            id=job.id,
-            owner=job.owner,
-            kind=_KIND,
-            state=JobState.QUEUED,
-            revision=1,
-            key=job.key,
-            main_file="main",
-            label="",
-            idempotency_key=None,
-            retention_us=10**15,
-            created_us=store.now_us(),
-        )
-        answer = await store.accept(record, b"", None, 10**6)
-        assert answer is not None and answer[0].state is JobState.SUCCEEDED
-
-
 _OWNERS = st.sampled_from(["", "a", "b", "c"])
+
 _RESULTS = st.lists(st.tuples(_OWNERS, st.integers(1, 9), st.integers(1, 5)), min_size=1, max_size=14)
+
 _JOBS = st.lists(st.tuples(_OWNERS, st.integers(0, 13)), max_size=14)
 
 
-async def check_against_twin(
-    store: Store,
-    times: Times,
-    some_results: list[tuple[str, int, int]],
-    some_jobs: list[tuple[str, int]],
-    bound: int,
-) -> None:
-    results = [
-        Kept(f"{number:02}", owner, size, float(used_s)) for number, (owner, size, used_s) in enumerate(some_results)
-    ]
-    jobs = [Done(f"{number:02}", owner, results[at % len(results)].key) for number, (owner, at) in enumerate(some_jobs)]
-    await fill(store, times, results, jobs)
-    await store.sweep(bound)
-    expected_results, expected_jobs = twin_of_sweep(results, jobs, bound)
-    left = [result for result in results if await store.find_result(result.key) is not None]
-    assert left == expected_results
-    assert [job for job in jobs if await store.find(job.id) is not None] == expected_jobs
-
-
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=examples(30))
 @given(_RESULTS, _JOBS, st.integers(1, 40), st.integers(1, 4))
 def test_what_is_swept_is_what_the_twin_sweeps(
     tmp_path_factory: pytest.TempPathFactory,
@@ -172,57 +85,6 @@ def test_what_is_swept_is_what_the_twin_sweeps(
         store.close()
 
 
-def test_it_is_the_same_in_postgresql(database_url: str) -> None:
-    times = Times()
-    results = [("a", 9, 1), ("a", 9, 2), ("b", 3, 1), ("b", 3, 3), ("", 1, 1), ("c", 9, 1), ("a", 5, 1)]
-    jobs = [("c", 5), ("a", 0), ("a", 0), ("c", 5), ("b", 0), ("c", 2)]
-    store = open_store(Path("/nowhere"), database_url, times.wall)
-    try:
-        asyncio.run(check_against_twin(store, times, results, jobs, 20))
-    finally:
-        store.close()
-
-
-def test_two_servers_that_sweep_at_once_give_back_no_more_than_one(
-    database_url: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The second one has seen how much there is before the first one sweeps."""
-    monkeypatch.setattr("robosc_server.store.store._THINNED_AT_ONCE", 2)
-    times = Times()
-    results = [Kept(f"{number:02}", "ab"[number % 2], 10, float(number)) for number in range(12)]
-    first, second = (open_store(Path("/nowhere"), database_url, times.wall) for _ in range(2))
-
-    async def test() -> None:
-        await fill(first, times, results, [])
-        read = second._database.read
-
-        async def read_before_it_sweeps(work: Any) -> Any:
-            seen = await read(work)
-            if work is result_rows.sizes_by_owner:
-                await first.sweep(70)
-            return seen
-
-        monkeypatch.setattr(second._database, "read", read_before_it_sweeps)
-        await second.sweep(70)
-        monkeypatch.undo()
-        left = [result for result in results if await first.find_result(result.key) is not None]
-        assert left == results[5:]
-
-        # While one has the lock the other leaves the work to it.
-        with first._database._engine.connect() as connection, connection.begin():
-            connection.execute(select(func.pg_advisory_xact_lock(store_module._SWEEPING)))
-            await second.sweep(0)
-        assert [await first.find_result(result.key) is not None for result in left] == [True] * 7
-        await second.sweep(0)
-        assert [await first.find_result(result.key) is not None for result in left] == [False] * 7
-
-    try:
-        asyncio.run(test())
-    finally:
-        first.close()
-        second.close()
-
-
 def test_room_is_made_as_soon_as_somebody_needs_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(retention, "_SHORTEST_PAUSE_S", 0.01)
 
@@ -234,7 +96,7 @@ def test_room_is_made_as_soon_as_somebody_needs_it(tmp_path: Path, monkeypatch: 
                 for part in range(2):
                     choices.times.wall_s += 1.0
                     with contextlib.suppress(RefusedError):
-                        job, _ = await made.manager.submit(task_of(f"big 100000\n{number} {part}", _KIND), ME)
+                        job, _ = await made.manager.submit(task_of(f"big 100000\n{number} {part}", KIND), ME)
                         await ended(made.manager, job.id)
 
                 async def is_accepted(number: int = number) -> bool:
@@ -256,15 +118,15 @@ def test_a_greedy_caller_pushes_out_nothing_of_others(tmp_path: Path, monkeypatc
         choices = Choices(limits=limits)
         async with parts(tmp_path, choices) as made:
             you = Caller("you")
-            theirs, _ = await made.manager.submit(task_of("big 100000", _KIND), you)
+            theirs, _ = await made.manager.submit(task_of("big 100000", KIND), you)
             await ended(made.manager, theirs.id, you)
-            made.results.keep("of a call", _KIND, Result((bytes(50_000),)), "you")
+            made.results.keep("of a call", KIND, Result((bytes(50_000),)), "you")
             greedy = []
             for number in range(4):
                 choices.times.wall_s += 1.0
-                job, _ = await made.manager.submit(task_of(f"big 100000\n{number}", _KIND), ME)
+                job, _ = await made.manager.submit(task_of(f"big 100000\n{number}", KIND), ME)
                 greedy.append(await ended(made.manager, job.id))
-                made.results.keep(f"greedy {number}", _KIND, Result((bytes(100_000),)), "me")
+                made.results.keep(f"greedy {number}", KIND, Result((bytes(100_000),)), "me")
 
             async def is_written() -> bool:
                 return await made.store.find_result("greedy 3") is not None
@@ -328,8 +190,8 @@ def test_a_result_is_the_owners_who_asked_first(tmp_path: Path) -> None:
     async def test() -> None:
         store = open_store(tmp_path)
         result = Result((bytes(10),))
-        await store.keep_results([("k", _KIND, result, "first")])
-        await store.keep_results([("k", _KIND, replace(result), "second"), ("l", _KIND, Result((b"abc",)), "second")])
+        await store.keep_results([("k", KIND, result, "first")])
+        await store.keep_results([("k", KIND, replace(result), "second"), ("l", KIND, Result((b"abc",)), "second")])
         await store.sweep(12)
         assert await store.find_result("k") is None
         assert await store.find_result("l") is not None

@@ -1,81 +1,21 @@
 """Processes of this machine: they do what they are told, die of what they may not, and are killed in time."""
 
-import asyncio
 import contextlib
 import os
 import signal
 import socket
-import subprocess
-import sys
-import threading
 import time
-from collections.abc import Awaitable, Callable, Iterator
-from concurrent.futures import CancelledError, Future
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, TaskKind, TaskLimits
-from robosc_server.workers import WorkerLostError, Workers, WorkersError
+from robosc_server.tasks.task import Failure, Reason, Report, Result, TaskKind
+from robosc_server.workers import WorkerLostError, WorkersError
 from robosc_server.workers.local import LocalWorkers
-from robosc_server.workers.supply import Supply
-from support.background import BackgroundLoop, cpu_ticks, eventually, is_running, is_stopped, parent_of
-from support.descriptors import open_descriptors
-from support.fake_tasks import TASK_FUNCTION, fake_task, said
-
-LIMITS = TaskLimits(seconds=60, cpu_seconds=20, memory_bytes=512 * 2**20, result_bytes=10**6)
-KILLED_WITHIN_S = 0.2
-
-
-class Running:
-    """Workers that run in the background, and what their tasks report."""
-
-    def __init__(self, loop: BackgroundLoop, workers: LocalWorkers) -> None:
-        self.workers: Workers = workers
-        self.local = workers
-        self._loop = loop
-        self.spent: list[float] = []
-
-    def start(
-        self,
-        text: str,
-        limits: TaskLimits = LIMITS,
-        on_report: Callable[[Report], Awaitable[None]] | None = None,
-        kind: TaskKind = TaskKind.CHECK,
-    ) -> tuple[Future[Outcome], "list[Report]"]:
-        reports: list[Report] = []
-
-        async def note(report: Report) -> None:
-            reports.append(report)
-
-        run = self.workers.run(fake_task(text, kind), limits, on_report or note, self.spent.append)
-        return self._loop.start(run), reports
-
-    def run(self, text: str, limits: TaskLimits = LIMITS) -> Outcome:
-        return self.start(text, limits)[0].result(60)
-
-    def failure(self, text: str, limits: TaskLimits = LIMITS) -> Failure:
-        outcome = self.run(text, limits)
-        assert isinstance(outcome, Failure), outcome
-        return outcome
-
-    def begun(self, text: str, limits: TaskLimits = LIMITS) -> tuple[Future[Outcome], int]:
-        """A task under way, and the number of its process."""
-        future, reports = self.start(f"pid\n{text}", limits)
-        assert eventually(lambda: bool(reports)), future
-        return future, int(reports[0].message)
-
-
-@pytest.fixture(scope="module")
-def running() -> Iterator[Running]:
-    with BackgroundLoop() as loop, pytest.MonkeyPatch.context() as environment:
-        environment.setenv("A_PASSWORD_OF_SOMETHING", "secret")
-        workers = LocalWorkers(2, TASK_FUNCTION)
-        loop.run(workers.__aenter__())
-        yield Running(loop, workers)
-        loop.run(workers.__aexit__())
+from support.background import BackgroundLoop, eventually, is_running, is_stopped, parent_of
+from support.fake_tasks import TASK_FUNCTION, said
+from support.worker_runs import LIMITS, Running
 
 
 class TestAnswers:
@@ -264,141 +204,3 @@ class TestDeaths:
                 future.result(60)
             with pytest.raises(WorkersError, match="have ended"):
                 running.run("echo")
-
-
-class TestSpending:
-    """What a task takes of processors is told, however it ends."""
-
-    @staticmethod
-    def spent(running: Running, count: int = 1) -> list[float]:
-        assert eventually(lambda: len(running.spent) >= count)
-        spent, running.spent = running.spent, []
-        assert len(spent) == count
-        return spent
-
-    @pytest.fixture(autouse=True)
-    def nothing_spent(self, running: Running) -> None:
-        # Those of earlier tests are told when their processes are gone.
-        assert eventually(lambda: len(running.local.pids) == 2)
-        running.spent = []
-
-    def test_work_counts_and_waiting_does_not(self, running: Running) -> None:
-        running.run("work 0.4")
-        assert 0.4 <= self.spent(running)[0] < 5.0
-        begun_s = time.monotonic()
-        running.run("sleep 1")
-        assert self.spent(running)[0] < time.monotonic() - begun_s - 0.5
-
-    @pytest.mark.parametrize(
-        "text", ["raise", "die 9", "exit 3", "refuse it", "claim 18446744073709551615", "garbage", "stop", "spin"]
-    )
-    def test_work_counts_also_when_it_was_in_vain(self, running: Running, text: str) -> None:
-        limits = replace(LIMITS, seconds=2.0) if text == "stop" else replace(LIMITS, cpu_seconds=1.0)
-        running.failure(f"work 0.3\n{text}", limits)
-        assert 0.3 <= self.spent(running)[0] < 5.0
-
-    def test_work_counts_that_was_cancelled(self, running: Running) -> None:
-        future, reports = running.start("work 0.3\npid\nsleep 600")
-        assert eventually(lambda: bool(reports))
-        future.cancel()
-        assert 0.3 <= self.spent(running)[0] < 5.0
-
-    def test_work_that_nobody_could_measure_counts_by_the_clock(self, running: Running) -> None:
-        future, reports = running.start("pid\nsleep 0.4\npid\nsleep 0.3\necho twice")
-        assert eventually(lambda: len(reports) == 2)
-        os.kill(parent_of(int(reports[0].message)), signal.SIGKILL)
-        assert said(future.result(60)) == "twice"
-        first, second = self.spent(running, 2)
-        assert first >= 0.4 > second
-
-
-class TestKills:
-    @pytest.mark.real_time
-    @pytest.mark.parametrize("text", ["spin", "stuck", "stop", "sleep 600", "allocate\nstuck"])
-    def test_a_cancelled_task_is_gone_in_time(self, running: Running, text: str) -> None:
-        future, pid = running.begun(text)
-        begin = time.monotonic()
-        future.cancel()
-        assert eventually(lambda: not is_running(pid))
-        assert time.monotonic() - begin < KILLED_WITHIN_S
-        with pytest.raises(CancelledError):
-            future.result(60)
-
-    def test_nothing_outlives_a_server_that_is_killed(self, tmp_path: Path) -> None:
-        program = tmp_path / "program.py"
-        program.write_text(
-            "import asyncio\n"
-            "from robosc_server.tasks.task import TaskLimits\n"
-            "from robosc_server.workers.local import LocalWorkers\n"
-            "from support.fake_tasks import TASK_FUNCTION, fake_task\n"
-            "async def tell(report):\n"
-            "    print(report.message, flush=True)\n"
-            "async def main():\n"
-            "    async with LocalWorkers(2, TASK_FUNCTION) as workers:\n"
-            "        tasks = map(fake_task, ('pid\\nstuck', 'pid\\nstop'))\n"
-            "        await asyncio.gather(*(workers.run(task, TaskLimits(), tell) for task in tasks))\n"
-            "asyncio.run(main())\n"
-        )
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-        with subprocess.Popen([sys.executable, program], stdout=subprocess.PIPE, text=True, env=environment) as server:
-            assert server.stdout is not None
-            pids = [int(server.stdout.readline()) for _ in range(2)]
-            template = parent_of(pids[0])
-            children = Path(f"/proc/{template}/task/{template}/children")
-            pids += [template, *map(int, children.read_text().split())]
-            server.kill()
-        assert len(set(pids)) >= 3
-        assert eventually(lambda: not any(map(is_running, pids)))
-
-    def test_nothing_is_left_after_many_tasks(self, running: Running) -> None:
-        def is_at_rest() -> bool:
-            # Also of the last one, whose descriptors are closed when it is gone.
-            return len(running.local.pids) == 2 and not running.local._supply._burials
-
-        running.run("echo")
-        assert eventually(is_at_rest)
-        before = open_descriptors()
-        for text in ("echo", "exit 1", "die 11", "garbage", "raise") * 4:
-            running.run(text)
-        assert eventually(is_at_rest)
-        assert eventually(lambda: open_descriptors() == before)
-
-    @pytest.mark.timeout(20)
-    def test_workers_end_also_where_a_burial_ends_that_very_moment(self) -> None:
-        async def run() -> None:
-            supply = Supply(TASK_FUNCTION, 1, must_be_confined=False)
-            burial = supply._begin(asyncio.sleep(0))
-            while not burial.done():
-                await asyncio.sleep(0)
-            # It is done, and what follows from that is at its turn only when this here waits.
-            assert supply._burials == {burial}
-            await supply.__aexit__()
-            assert not supply._burials
-
-        asyncio.run(run())
-
-    def test_a_worker_that_reports_too_much_has_to_wait(self, running: Running) -> None:
-        reports: list[Report] = []
-        may_go_on = threading.Event()
-
-        async def slow(report: Report) -> None:
-            reports.append(report)
-            while len(reports) > 1 and not may_go_on.is_set():
-                await asyncio.sleep(0.01)
-
-        future, _ = running.start("pid\nlong reports 900", on_report=slow)
-        assert eventually(lambda: len(reports) == 2)
-        pid = int(reports[0].message)
-        seen: list[int] = []
-
-        def rests() -> bool:
-            time.sleep(0.02)
-            seen.append(cpu_ticks(pid))
-            return len(seen) > 15 and len(set(seen[-15:])) == 1
-
-        assert eventually(rests)
-        assert is_running(pid)
-        assert len(reports) == 2
-        may_go_on.set()
-        assert said(future.result(60)) == "done"
-        assert len(reports) == 901

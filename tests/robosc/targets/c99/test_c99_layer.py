@@ -19,6 +19,7 @@ from robosc.targets import generate
 from support.c99 import GCC, SANITIZERS, WARNINGS, lonely_end, replay
 from support.c99_layer import LayerReference, compare_layer, compiled_layer
 from support.c99_main import events_back
+from support.effort import examples
 from support.generated import example_supervisor
 from support.models import model_of
 from support.random_layers import random_layer
@@ -147,7 +148,7 @@ def test_requests_of_every_kind_behave_as_the_reference(everything: Path) -> Non
 
 
 @needs_gcc
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=examples(20))
 @given(st.integers(0, 2**32))
 def test_any_sequence_behaves_as_the_reference(everything: Path, seed: int) -> None:
     compare_layer(layer_of_text(EVERYTHING), everything, Random(seed), 2, 100)

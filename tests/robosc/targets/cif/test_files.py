@@ -22,6 +22,7 @@ from robosc.targets.cif import supervisor as supervisor_module
 from support.cif_parser import CifError
 from support.cif_system import CifSystem
 from support.cif_twin import assert_same_control, assert_same_problem
+from support.effort import examples
 from support.generated import example_supervisor
 from support.models import EXAMPLE_DEPLOYMENTS, EXAMPLE_NAMES, EXAMPLES, bundle_of, example_bundle, model_of
 from support.random_models import models
@@ -72,7 +73,7 @@ def test_relations_between_integers(name: str, test: str) -> None:
     assert assert_same_control(supervisor, reachable=100, others=50) >= 100
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=examples(25))
 @given(st.integers(0, 2**32 - 1), st.booleans())
 def test_random_supervisors(seed: int, is_layer: bool) -> None:
     supervisor = layered(random_supervisor(seed)) if is_layer else random_supervisor(seed)
@@ -85,7 +86,7 @@ def test_random_supervisors(seed: int, is_layer: bool) -> None:
     assert_same_control(supervisor, reachable=20, others=10)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=examples(10))
 @given(st.integers(0, 2**32 - 1))
 def test_random_supervisors_as_diagrams(seed: int) -> None:
     supervisor = random_supervisor(seed)
@@ -109,7 +110,7 @@ def test_a_condition_that_is_too_large_for_a_formula_is_a_diagram(monkeypatch: p
     assert len(set(nodes)) == len(nodes)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=examples(8))
 @given(models(), st.sampled_from(Deployment))
 def test_random_models(bundle: Bundle, deployment: Deployment) -> None:
     supervisor = make_supervisor(bundle, deployment=deployment).supervisor

@@ -1,0 +1,500 @@
+"""Every fault of a robot and its lines, on a whole bridge: within the stated time its wheels are told to stand still.
+
+The bridge is the real one with all its threads; the devices are simulated at the other end of real pseudo-terminals,
+and what counts is what the simulated motors are told, when they hear it. The supervisor always wants to move. The times
+stand in docs/bridge-safety.md ("Every fault, measured at the motors"), whose table is read here.
+"""
+
+import errno
+import os
+import re
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from _pytest.mark import ParameterSet
+
+from robosc.execution.requests import Decisions
+from robosc_bridge.daemon.loop import Key
+from robosc_bridge.daemon.motion import Motion
+from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.simulated import SimulatedTurtleBot3
+from robosc_bridge.transport.serial_line import SerialLine
+from support.driven import LIMIT_S, PATIENT, Driven, driven
+
+pytestmark = pytest.mark.real_time
+
+PAGE = (Path(__file__).parents[3] / "docs" / "bridge-safety.md").read_text(encoding="utf-8")
+TABLE = PAGE.partition("## Every fault, measured at the motors")[2]
+STATED_S = {name: float(time_s) for name, time_s in re.findall(r"^\| ([^|]+?) \| ([0-9.]+) s \|", TABLE, re.MULTILINE)}
+BASES = ("opencr", "dynamixel")
+SCAN_TIMEOUTS_S = {"lds01": 0.6, "lds02": 0.5, "lds03": 0.3}
+# A section `remote`; nothing listens there, the test itself is who can be told.
+REACHABLE = "{grpc_address: '127.0.0.1:1'}"
+# Enough for anything that goes on by itself to show.
+WHILE_S = 0.3
+
+
+class Bug(Exception):
+    """In a part of the bridge."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Something that goes wrong with a robot that moves.
+
+    Attributes:
+        row: Of the table on the page.
+        cause: Lets it happen.
+        problem: What the run ends with.
+        bases: Where it can happen.
+        is_line: Whether the base itself is lost with it, which the model is told.
+    """
+
+    row: str
+    cause: Callable[[Driven], object]
+    problem: str
+    bases: tuple[str, ...] = BASES
+    is_line: bool = False
+
+
+def _wires(bridge: Driven, **faults: object) -> None:
+    for name, value in faults.items():
+        setattr(bridge.robot.base_faults, name, value)
+
+
+def _speak(bridge: Driven, code: int) -> None:
+    with bridge.robot.time.lock:
+        for servo in (bridge.robot.left, bridge.robot.right):
+            servo.table["baud rate"] = code
+
+
+def _answer_as(robot: SimulatedTurtleBot3, device_id: int | None) -> None:
+    device = robot.opencr or robot.bus
+    assert device is not None
+    device.answers_as = device_id
+
+
+def _empty(bridge: Driven) -> None:
+    for servo in (bridge.robot.left, bridge.robot.right):
+        servo.brown_out(11.05)
+    if bridge.robot.opencr is not None:
+        bridge.robot.opencr.set_battery(11.05)
+
+
+# What a person must see to.
+GRAVE = (
+    Fault("a motor is overloaded", lambda bridge: bridge.robot.left.overload(), "A motor tells of a fault."),
+    Fault("a motor is too hot", lambda bridge: bridge.robot.right.overheat(), "A motor tells of a fault."),
+    Fault(
+        "a motor has lost its power",
+        lambda bridge: bridge.robot.right.brown_out(0.0),
+        "motor 2 (right) does not answer",
+        ("dynamixel",),
+        is_line=True,
+    ),
+    Fault(
+        "a motor has lost its power",
+        lambda bridge: bridge.robot.right.brown_out(0.0),
+        "A motor tells of a fault.",
+        ("opencr",),
+    ),
+    Fault("a wheel is held", lambda bridge: bridge.robot.left.block_wheel(), "A motor tells of a fault."),
+    Fault("the battery is empty", _empty, "The battery is empty."),
+    Fault("the base is unplugged", lambda bridge: bridge.robot.base_line.disconnect(), "the drive base is lost: /",
+          is_line=True),
+    Fault("the base hears nothing", lambda bridge: _wires(bridge, is_deaf=True), " not answer", is_line=True),
+    Fault("its answers are lost", lambda bridge: _wires(bridge, drop_share=1.0), " not answer", is_line=True),
+    Fault("its answers are damaged", lambda bridge: _wires(bridge, corrupt_share=1.0), " not answer", is_line=True),
+    Fault("its answers are cut", lambda bridge: _wires(bridge, cut_next=10**9), " not answer", is_line=True),
+    Fault("another id answers", lambda bridge: _answer_as(bridge.robot, 7), " not answer, but device 7 does",
+          is_line=True),
+    Fault("it speaks at another baud", lambda bridge: _speak(bridge, 1), " not answer", ("dynamixel",), is_line=True),
+)  # fmt: skip
+# What a line may do without any harm.
+HARMLESS = (
+    {"split_s": 0.0},
+    {"garbage": b"\xff\xff\xfd\x00\x01"},
+    {"delay_s": 0.004},
+    {"cut_next": 1},
+    {"corrupt_next": 1},
+    {"drop_next": 1},
+)
+
+
+def _cases(faults: tuple[Fault, ...]) -> list[ParameterSet]:
+    return [
+        pytest.param(base, fault, id=f"{base}-{fault.row.replace(' ', '-')}")
+        for fault in faults
+        for base in fault.bases
+    ]
+
+
+@pytest.mark.parametrize(("base", "fault"), _cases(GRAVE))
+def test_a_grave_fault_stops_the_wheels_in_time_and_ends_the_run(base: str, fault: Fault) -> None:
+    with driven(base, options="{}" if fault.is_line else PATIENT) as bridge:
+        bridge.stopped_after(lambda: fault.cause(bridge), STATED_S[fault.row])
+        problem = bridge.ended()
+        assert fault.problem in problem
+        assert problem in bridge.messages
+        assert bridge.log.events().count("lost.response") == int(fault.is_line)
+        bridge.stays(WHILE_S)
+
+
+def test_which_fault_a_motor_tells_is_told() -> None:
+    with driven("dynamixel") as bridge:
+        bridge.steady()
+        bridge.robot.left.overload()
+        bridge.ended()
+        bridge.was_told("the motors tell: overload")
+
+
+def test_a_voltage_that_is_out_of_range_is_told_and_stops_nothing() -> None:
+    with driven("dynamixel") as bridge:
+        bridge.steady()
+        bridge.robot.left.brown_out(14.5)
+        bridge.was_told("the motors tell: input voltage")
+        before = len(bridge.trace.told)
+        bridge.until(lambda: len(bridge.trace.heard_s) > 100, "a hundred exchanges")
+        assert (bridge.state, bridge.trace.told[before:]) == (State.RUNNING, [])
+
+
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize("wire", HARMLESS, ids=lambda wire: next(iter(wire)))
+def test_a_disturbed_line_does_not_stop_the_wheels_for_good(base: str, wire: dict[str, object]) -> None:
+    with driven(base) as bridge:
+        bridge.steady()
+        _wires(bridge, **wire)
+        heard = len(bridge.trace.heard_s)
+        bridge.until(lambda: len(bridge.trace.heard_s) > heard + 50, "fifty requests")
+        bridge.steady()
+        assert (bridge.state, bridge.log.events().count("lost.response")) == (State.RUNNING, 0)
+
+
+# What the supervisor asks for.
+
+
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize("velocity", [(5.0, 0.0), (-5.0, 0.0), (0.0, 50.0), (5.0, -50.0)])
+def test_no_wheel_is_told_more_than_its_limit_nor_at_once(base: str, velocity: tuple[float, float]) -> None:
+    linear_m_s2, angular_rad_s2, reach_s = 0.25, 2.0, 0.1
+    safety = (
+        f"{{linear_m_s: 0.1, angular_rad_s: 0.8, linear_acceleration_m_s2: {linear_m_s2}, "
+        f"angular_acceleration_rad_s2: {angular_rad_s2}}}"
+    )
+    with driven(base, velocity=velocity, safety=safety) as bridge:
+        bridge.steady()
+        half_m = bridge.limits.separation_m / 2
+        told = bridge.trace.told[1:]
+        for at_s, left_m_s, right_m_s in told:
+            linear_m_s, angular_rad_s = (left_m_s + right_m_s) / 2, (right_m_s - left_m_s) / 2 / half_m
+            # Servos and OpenCR take whole steps: 0.8 mm/s of a wheel, and 0.01 m/s and 0.01 rad/s.
+            assert abs(linear_m_s) <= 0.1 + 1e-3
+            assert abs(angular_rad_s) <= 0.8 + 1e-2
+            # Of what happened at the same speed before, the device hears a little later.
+            since_s = at_s - told[0][0] + reach_s
+            assert abs(linear_m_s) <= linear_m_s2 * since_s
+            assert abs(angular_rad_s) <= angular_rad_s2 * since_s
+        fastest_m_s = max(abs(speed) for _, *wheels in told for speed in wheels)
+        assert fastest_m_s > 0.06
+
+
+# The loop and the supervisor.
+
+
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize(
+    ("row", "safety", "message"),
+    [
+        ("the loop hangs", "{}", "The supervisor's loop has not turned for too long."),
+        ("no command comes", "{command_timeout_s: 0.2, overrun_s: 1.0}", ""),
+    ],
+)
+def test_a_loop_that_hangs_stops_the_wheels_until_it_turns_again(
+    base: str, row: str, safety: str, message: str
+) -> None:
+    with driven(base, safety=safety) as bridge:
+        bridge.stopped_after(bridge.log.released.clear, STATED_S[row])
+        bridge.stays(WHILE_S)
+        bridge.log.released.set()
+        bridge.moves()
+        if message:
+            bridge.was_told(message)
+
+
+@pytest.mark.parametrize("base", BASES)
+def test_an_exception_in_the_executor_stops_the_wheels_and_ends_the_run(
+    base: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: object) -> bool:
+        raise Bug("in a decision")
+
+    with driven(base) as bridge:
+        bridge.stopped_after(lambda: monkeypatch.setattr(Decisions, "decide", fails), STATED_S["the executor fails"])
+        assert "Bug: in a decision" in bridge.ended()
+        bridge.stays(WHILE_S)
+
+
+@pytest.mark.parametrize("base", BASES)
+def test_an_exception_in_the_loop_stops_the_wheels(base: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object) -> None:
+        raise Bug("in the loop")
+
+    with driven(base) as bridge:
+        bridge.stopped_after(lambda: monkeypatch.setattr(Motion, "refresh", fails), STATED_S["the loop fails"])
+        bridge.thread.join(LIMIT_S)
+        assert isinstance(bridge.error, Bug)
+        bridge.stays(WHILE_S)
+
+
+# The operator.
+
+
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize("how", [Command.STOP, Key("space")], ids=["command", "key"])
+def test_an_operators_stop_holds_until_somebody_lets_it_go_on(base: str, how: Command | Key) -> None:
+    with driven(base) as bridge:
+        bridge.stopped_after(lambda: bridge.machine.daemon.post(how), STATED_S["an operator stops it"])
+        bridge.stays(WHILE_S)
+        assert _ordered(bridge, Command.RESET) == ""
+        assert bridge.state is State.STANDBY
+        bridge.stays(WHILE_S)
+        assert _ordered(bridge, Command.START) == ""
+        bridge.moves()
+
+
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize("is_off", [False, True], ids=["hold", "let go"])
+def test_a_resume_lets_it_go_on_also_where_the_motors_have_let_go(base: str, is_off: bool) -> None:
+    with driven(base, safety=f"{{torque_off_on_operator_stop: {str(is_off).lower()}}}") as bridge:
+
+        def has_torque() -> bool:
+            return any(wheel.table["torque enable"] for wheel in (bridge.robot.left, bridge.robot.right))
+
+        bridge.stopped_after(lambda: bridge.machine.daemon.post(Command.STOP), STATED_S["an operator stops it"])
+        if is_off:
+            bridge.until(lambda: not has_torque(), "the motors to let go")
+        bridge.stays(WHILE_S)
+        assert has_torque() is not is_off
+        assert bridge.state is State.RUNNING
+        assert _ordered(bridge, Command.RESUME) == ""
+        bridge.moves()
+
+
+def test_an_operator_who_is_lost_stops_the_wheels_until_he_is_back() -> None:
+    with driven("opencr", remote=REACHABLE, safety="{operator_link_timeout_s: 0.3}") as bridge:
+        is_there = threading.Event()
+        is_there.set()
+
+        def sees() -> None:
+            while bridge.state is not State.OVER:
+                if is_there.is_set():
+                    bridge.machine.operations.operator_seen()
+                time.sleep(0.02)
+
+        operator = threading.Thread(target=sees)
+        operator.start()
+        try:
+            bridge.stopped_after(is_there.clear, STATED_S["the operator is lost"])
+            bridge.was_told("The link to the operator is lost.")
+            bridge.stays(WHILE_S)
+            assert bridge.state is State.RUNNING
+            is_there.set()
+            bridge.moves()
+        finally:
+            bridge.machine.quit()
+            operator.join(LIMIT_S)
+
+
+# Where somebody can be told of it, the bridge stays; nothing moves before somebody says so.
+
+
+def _ordered(bridge: Driven, command: Command) -> str:
+    """Why it cannot be, or nothing."""
+    return bridge.machine.operations.order(command, "test").result(2 * LIMIT_S)
+
+
+@pytest.mark.parametrize("base", BASES)
+def test_a_base_that_is_plugged_in_again_moves_when_somebody_says_so(base: str) -> None:
+    with driven(base, remote=REACHABLE) as bridge:
+        line = bridge.robot.base_line
+        bridge.stopped_after(line.disconnect, STATED_S["the base is unplugged"])
+        bridge.until(lambda: bridge.state is State.FAULT, "the fault")
+        assert "the drive base is lost" in bridge.machine.daemon.problem
+        line.reconnect()
+        bridge.until(lambda: bridge.state is State.STANDBY, "the standby with the base back")
+        bridge.stays(2 * WHILE_S)
+        assert _ordered(bridge, Command.START) == ""
+        bridge.moves()
+
+
+@pytest.mark.parametrize("fault", [fault for fault in GRAVE if fault.is_line], ids=lambda fault: fault.row)
+def test_a_line_that_is_sound_again_moves_nothing_by_itself(fault: Fault) -> None:
+    with driven(fault.bases[0], remote=REACHABLE, options="{}") as bridge:
+        bridge.steady()
+        fault.cause(bridge)
+        bridge.until(lambda: bridge.state is State.FAULT, "the fault")
+        bridge.robot.base_line.reconnect()
+        bridge.robot.base_faults.clear()
+        _answer_as(bridge.robot, None)
+        for servo in (bridge.robot.left, bridge.robot.right):
+            servo.brown_out(12.0)
+        if bridge.robot.bus is not None:
+            _speak(bridge, 3)
+        bridge.until(lambda: bridge.state is State.STANDBY, "the standby with the base back")
+        bridge.stays(WHILE_S)
+
+
+def test_a_motor_that_is_overloaded_is_restarted_by_a_reset_and_moves_after_a_start() -> None:
+    with driven("dynamixel", remote=REACHABLE) as bridge:
+        bridge.stopped_after(bridge.robot.left.overload, STATED_S["a motor is overloaded"])
+        bridge.until(lambda: bridge.state is State.FAULT, "the fault")
+        assert _ordered(bridge, Command.START) != ""
+        bridge.stays(WHILE_S)
+        assert _ordered(bridge, Command.RESET) == ""
+        assert bridge.state is State.STANDBY
+        bridge.stays(WHILE_S)
+        assert _ordered(bridge, Command.START) == ""
+        bridge.moves()
+
+
+# The LiDAR.
+
+
+def _scan_timeout(lidar: str) -> str:
+    return f"{{scan_timeout_s: {SCAN_TIMEOUTS_S[lidar]}}}"
+
+
+@pytest.mark.parametrize(
+    ("base", "lidar"), [("opencr", "lds01"), ("dynamixel", "lds02"), ("opencr", "lds03"), ("dynamixel", "lds03")]
+)
+@pytest.mark.parametrize("how", ["is_stalled", "is_covered"])
+def test_a_lidar_that_shows_nothing_stops_the_wheels_until_it_does(base: str, lidar: str, how: str) -> None:
+    with driven(base, lidar, safety=_scan_timeout(lidar)) as bridge:
+        row = f"{lidar} is silent" if how == "is_stalled" else f"{lidar} is covered"
+        bridge.stopped_after(lambda: setattr(bridge.robot.scanner, how, True), STATED_S[row])
+        bridge.was_told(f"scanner: no full turn with valid ranges for {SCAN_TIMEOUTS_S[lidar]:g} s")
+        bridge.was_told("The scanner has made no full turn for too long.")
+        bridge.stays(WHILE_S)
+        assert (bridge.state, bridge.log.events().count("lost.response")) == (State.RUNNING, 1)
+        setattr(bridge.robot.scanner, how, False)
+        bridge.moves()
+        assert bridge.log.events().count("back.response") == 1
+
+
+@pytest.mark.parametrize("base", BASES)
+def test_a_lidar_that_is_unplugged_stops_the_wheels_until_it_is_back(base: str) -> None:
+    with driven(base, safety=_scan_timeout("lds03")) as bridge:
+        line = bridge.robot.scanner_line
+        bridge.stopped_after(line.disconnect, STATED_S["lds03 is silent"])
+        bridge.was_told(f"scanner: {line.path}: the ")
+        bridge.stays(WHILE_S)
+        assert bridge.state is State.RUNNING
+        line.reconnect()
+        bridge.moves()
+        assert [event for event in bridge.log.events() if event != "drive.request"] == [
+            "lost.response",
+            "back.response",
+        ]
+
+
+@pytest.mark.parametrize("base", BASES)
+def test_noise_from_a_lidar_is_no_scan(base: str) -> None:
+    with driven(base, safety=_scan_timeout("lds03")) as bridge:
+        faults = bridge.robot.scanner_faults
+        bridge.stopped_after(lambda: setattr(faults, "corrupt_share", 1.0), STATED_S["lds03 is covered"])
+        bridge.stays(WHILE_S)
+        faults.clear()
+        bridge.moves()
+
+
+# Faults at the start.
+
+
+def _busy(robot: SimulatedTurtleBot3) -> Callable[[], object]:
+    line = SerialLine(robot.base_path, 1_000_000)
+    return line.close
+
+
+def _missing(robot: SimulatedTurtleBot3) -> Callable[[], object]:
+    robot.base_line.disconnect()
+    return robot.base_line.reconnect
+
+
+def _deaf(robot: SimulatedTurtleBot3) -> Callable[[], object]:
+    robot.base_faults.is_deaf = True
+    return robot.base_faults.clear
+
+
+def _foreign(robot: SimulatedTurtleBot3) -> Callable[[], object]:
+    _answer_as(robot, 7)
+    return lambda: _answer_as(robot, None)
+
+
+def _forbidden(robot: SimulatedTurtleBot3) -> Callable[[], object]:
+    # Root may open everything: the system's answer is what is played.
+    patch = pytest.MonkeyPatch()
+    opened = os.open
+
+    def refused(path: str, *arguments: int) -> int:
+        if str(path) == robot.base_path:
+            raise PermissionError(errno.EACCES, "Permission denied", path)
+        return opened(path, *arguments)
+
+    patch.setattr("serial.serialposix.os.open", refused)
+    return patch.undo
+
+
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize(
+    ("happens", "message"),
+    [
+        (_busy, "another program uses this port"),
+        (_missing, "there is no such port; is the device plugged in?"),
+        (_deaf, "does not answer"),
+        (_foreign, "does not answer"),
+        (_forbidden, "no permission; is this user in the group dialout?"),
+    ],
+    ids=["busy", "missing", "silent", "another id", "denied"],
+)
+def test_a_base_that_cannot_be_opened_is_told_once_and_tried_until_it_can(
+    base: str, happens: Callable[[SimulatedTurtleBot3], Callable[[], object]], message: str
+) -> None:
+    mended: list[Callable[[], object]] = []
+    with driven(base, before=lambda robot: mended.append(happens(robot))) as bridge:
+        try:
+            bridge.was_told(message)
+            # Two attempts more, at least, which nobody is told of.
+            bridge.stays(2.5 * WHILE_S)
+            bridge.was_told(message)
+            assert bridge.state is State.STARTING
+        finally:
+            mended[0]()
+        bridge.moves()
+
+
+def test_another_baud_is_told_with_what_to_do() -> None:
+    def slow(robot: SimulatedTurtleBot3) -> None:
+        for servo in (robot.left, robot.right):
+            servo.table["baud rate"] = 1
+
+    with driven("dynamixel", before=slow) as bridge:
+        bridge.was_told("does not answer at 1000000 baud; has it power? A motor fresh from the factory speaks 57600")
+        bridge.stays(WHILE_S)
+        assert bridge.state is State.STARTING
+
+
+# The page.
+
+
+def test_every_row_of_the_page_is_shown_here() -> None:
+    text = Path(__file__).read_text(encoding="utf-8")
+    shown = {fault.row for fault in GRAVE} | {
+        f"{lidar} is {how}" for lidar in SCAN_TIMEOUTS_S for how in ("silent", "covered")
+    }
+    assert {row for row in STATED_S if row not in shown and f'"{row}"' not in text} == set()
+    assert shown <= set(STATED_S)
+    assert set(re.findall(r"`(test_\w+)`", TABLE)) <= set(re.findall(r"^def (test_\w+)", text, re.MULTILINE))

@@ -1,0 +1,138 @@
+"""A MAVLink rover as a source of obstacles, over a real pseudo-terminal and real UDP."""
+
+import math
+import threading
+import time
+
+import pytest
+
+from robosc_bridge.devices.interface import (
+    RangeScanner,
+    Scan,
+    Velocity,
+)
+from robosc_bridge.devices.registry import make_range_scanner
+from robosc_bridge.errors import (
+    LineError,
+    LineLostError,
+)
+from robosc_bridge.simulated import SimulatedLine, Walls
+from support.rovers import FORWARD, Bench, rig
+from support.wire import wait_until
+
+pytestmark = pytest.mark.real_time
+
+
+def _next(scanner: RangeScanner, limit_s: float = 3.0) -> Scan:
+    scan = scanner.receive(limit_s)
+    assert scan is not None
+    return scan
+
+
+def _check(bench: Bench, scan: Scan, width_deg: float) -> None:
+    """Every bin is as near as the nearest in its sector: not nearer than anything there, not farther than the wall."""
+    assert len(scan.ranges_m) == 360
+    for k, range_m in enumerate(scan.ranges_m):
+        around = [math.radians(k + part * width_deg / 20) for part in range(-20, 21)]
+        assert min(bench.world.ranges(around)) - 0.02 <= range_m <= max(bench.world.ranges(around)) + 0.02, k
+
+
+@pytest.mark.parametrize("obstacles", ["ring", "north ring", "sensors"])
+def test_obstacles_are_where_they_are(any_bench: Bench, obstacles: str) -> None:
+    bench = any_bench
+    bench.rover.obstacles = obstacles
+    bench.rover._interval_s[30] = 0.1  # Attitude: which way is north.
+    bench.rover._due_s[30] = 0.0
+    scanner = make_range_scanner("mavlink-rover", path=bench.path)
+    scanner.open()
+    try:
+        begin_s = time.monotonic()
+        scan = _next(scanner)
+        _check(bench, scan, 45.0 if obstacles == "sensors" else 6.0)
+        assert begin_s < scan.time_s <= time.monotonic()
+        assert scanner.counters.scans >= 1
+        # Alone on the line, it is who is there.
+        end_s = time.monotonic() + 3.0
+        while (255, 190) not in bench.rover.heartbeats:
+            assert time.monotonic() < end_s
+            scanner.receive(0.1)
+    finally:
+        scanner.close()
+    with pytest.raises(LineLostError, match="not open"):
+        scanner.receive(0.0)
+
+
+def test_drive_base_and_scanner_share_a_line_and_outlive_each_other(bench: Bench) -> None:
+    scanner = make_range_scanner("mavlink-rover", path=bench.path)
+    bench.base.open()
+    scanner.open()
+    seen: list[Scan] = []
+    ended = threading.Event()
+
+    def look() -> None:
+        while not ended.is_set():
+            if scan := scanner.receive(0.5):
+                seen.append(scan)
+
+    thread = threading.Thread(target=look)
+    thread.start()
+    try:
+        bench.base.set_torque(True)
+        reading = bench.drive(Velocity(0.1, 0.3), 1.5)
+        assert reading.velocity.linear_m_s == pytest.approx(0.1, abs=0.001)
+        assert len(seen) >= 10
+        assert 1 <= len(bench.rover.heartbeats) <= 4
+        # The base no longer lives: its heartbeat ends though the scanner goes on, until the base is closed.
+        before = len(bench.rover.heartbeats)
+        time.sleep(1.3)
+        assert len(bench.rover.heartbeats) == before
+        bench.base.close()
+        count = len(seen)
+        wait_until(lambda: len(seen) > count + 2)
+        bench.base.open()
+    finally:
+        ended.set()
+        scanner.wake()
+        thread.join()
+        scanner.close()
+    assert not bench.drive(FORWARD, 0.1).is_torque_on
+
+
+def test_a_scanner_that_waits_is_woken_and_told_of_a_lost_line(bench: Bench) -> None:
+    assert isinstance(bench.line, SimulatedLine)
+    bench.rover.is_silent = True
+    scanner = make_range_scanner("mavlink-rover", path=bench.path)
+    scanner.open()
+    timer = threading.Timer(0.1, scanner.wake)
+    timer.start()
+    begin_s = time.monotonic()
+    assert scanner.receive(5.0) is None
+    assert time.monotonic() - begin_s < 1.0
+    timer.join()
+    timer = threading.Timer(0.1, bench.line.disconnect)
+    timer.start()
+    with pytest.raises(LineError):
+        scanner.receive(5.0)
+    timer.join()
+    scanner.close()
+
+
+def test_a_scanner_asks_again_when_told_to(bench: Bench) -> None:
+    scanner = make_range_scanner("mavlink-rover", path=bench.path)
+    scanner.open()
+    _next(scanner)
+    bench.rover.restart()
+    while scanner.receive(0.5):
+        pass
+    scanner.restart()
+    _next(scanner)
+    scanner.close()
+
+
+def test_walls_that_are_too_far_are_none() -> None:
+    with rig("udpout") as bench:
+        bench.world.walls = Walls(())
+        scanner = make_range_scanner("mavlink-rover", path=bench.path)
+        scanner.open()
+        assert all(map(math.isnan, _next(scanner).ranges_m))
+        scanner.close()

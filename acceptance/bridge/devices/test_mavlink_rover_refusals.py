@@ -1,0 +1,153 @@
+"""What a MAVLink rover refuses, and what others do with it."""
+
+import time
+
+import pytest
+
+from robosc_bridge.devices.interface import (
+    MotorFault,
+)
+from robosc_bridge.errors import (
+    DeviceFaultError,
+    DeviceSilentError,
+    WrongDeviceError,
+)
+from robosc_bridge.simulated.rover import AUTO, GUIDED, HOLD, MANUAL
+from support.rovers import FORWARD, Bench, rig
+
+pytestmark = pytest.mark.real_time
+
+
+def test_a_refusal_to_arm_tells_the_vehicles_reason(bench: Bench) -> None:
+    bench.rover.refusal = (
+        "GPS 1: Bad fix, and the compass is not calibrated either, so that nothing at all can be known"
+    )
+    bench.base.open()
+    with pytest.raises(
+        DeviceFaultError, match=r"does not arm \(failed\): PreArm: GPS 1: .* nothing at all can be known"
+    ):
+        bench.base.set_torque(True)
+    assert not bench.drive(FORWARD, 0.1).is_torque_on
+    bench.rover.refusal = ""
+    bench.base.set_torque(True)
+    assert bench.drive(FORWARD, 0.1).is_torque_on
+
+
+def test_a_refused_mode_is_told(bench: Bench) -> None:
+    bench.rover.refused_modes = (GUIDED,)
+    bench.base.open()
+    with pytest.raises(DeviceFaultError, match=r"does not go to mode GUIDED \(failed\): it gives no reason"):
+        bench.base.set_torque(True)
+    assert not bench.rover.is_armed
+
+
+@pytest.mark.usefixtures("hasty")
+def test_an_accepted_command_is_not_a_done_one(bench: Bench) -> None:
+    bench.base.open()
+    bench.rover.obeys_commands = False
+    with pytest.raises(DeviceFaultError, match="accepted the command, but does not show mode GUIDED"):
+        bench.base.set_torque(True)
+
+
+@pytest.mark.usefixtures("hasty")
+def test_commands_are_repeated_and_their_silence_is_told(bench: Bench) -> None:
+    bench.base.open()
+    bench.rover.answers_commands = False
+    with pytest.raises(DeviceSilentError, match="does not answer when told to go to mode GUIDED"):
+        bench.base.set_torque(True)
+    assert [number for number, _ in bench.rover.commands if number == 176] == [176] * 3
+
+
+def test_disarming_that_is_refused_is_forced(bench: Bench) -> None:
+    bench.start()
+    bench.rover.refuses_disarming = True
+    bench.base.set_torque(False)
+    assert not bench.rover.is_armed
+    assert bench.rover.commands[-1] == (400, (0.0, 21196.0, 0, 0, 0, 0, 0))
+
+
+@pytest.mark.parametrize("how", ["mode", "disarmed"])
+def test_a_vehicle_that_is_taken_away_is_told_and_left_alone(bench: Bench, how: str) -> None:
+    bench.start()
+    bench.drive(FORWARD, 0.2)
+    if how == "mode":
+        bench.rover.take_over(MANUAL, -0.1)
+    else:
+        bench.rover.disarm()
+    reading = bench.drive_until(lambda reading: not reading.is_torque_on, FORWARD, 1.5)
+    assert reading.faults == {MotorFault.TORQUE_LOST}
+    # It stays lost, also if it is given back: nothing moves until a person says so.
+    bench.rover.take_over(GUIDED)
+    reading = bench.drive(FORWARD, 1.2)
+    assert not reading.is_torque_on
+    assert reading.faults == {MotorFault.TORQUE_LOST}
+    assert bench.speed_m_s == 0.0
+    bench.base.reset()
+    assert not bench.rover.is_armed
+    bench.base.set_torque(True)
+    assert bench.drive(FORWARD, 0.1).is_torque_on
+
+
+def test_closing_leaves_a_vehicle_that_a_person_drives_to_them(bench: Bench) -> None:
+    bench.start()
+    bench.rover.take_over(MANUAL, -0.1)
+    bench.drive_until(lambda reading: not reading.is_torque_on, FORWARD, 1.5)
+    bench.base.set_torque(False)
+    with pytest.raises(DeviceFaultError, match="somebody else drives the rover"):
+        bench.base.set_torque(True)
+    bench.base.close()
+    assert bench.rover.is_armed
+    assert bench.speed_m_s == pytest.approx(-0.1)
+    with pytest.raises(DeviceFaultError, match="somebody else drives the rover: it is armed in mode MANUAL"):
+        bench.base.open()
+    assert bench.speed_m_s == pytest.approx(-0.1)
+
+
+@pytest.mark.real_time
+def test_a_vehicle_that_is_held_is_told(bench: Bench) -> None:
+    bench.start()
+    bench.drive(FORWARD, 0.3)
+    bench.world.left.is_blocked = bench.world.right.is_blocked = True
+    begin_s = time.monotonic()
+    reading = bench.drive_until(lambda reading: bool(reading.faults), FORWARD)
+    assert reading.faults == {MotorFault.BLOCKED}
+    assert 1.9 < time.monotonic() - begin_s < 3.0
+
+
+@pytest.mark.usefixtures("hasty")
+@pytest.mark.parametrize("vehicle", [(2, 3), (10, 12)])
+def test_another_vehicle_is_told(vehicle: tuple[int, int]) -> None:
+    with (
+        rig(vehicle=vehicle) as bench,
+        pytest.raises(WrongDeviceError, match="of type {} with autopilot {}, not ArduPilot Rover".format(*vehicle)),
+    ):
+        bench.base.open()
+
+
+@pytest.mark.usefixtures("hasty")
+def test_a_ground_station_is_no_vehicle() -> None:
+    with rig(vehicle=(6, 8)) as bench, pytest.raises(DeviceSilentError, match="no heartbeat of a rover within 1 s"):
+        bench.base.open()
+
+
+@pytest.mark.usefixtures("hasty")
+def test_another_system_than_was_asked_for_is_told() -> None:
+    with rig(system=2) as bench, pytest.raises(WrongDeviceError, match="or has another system number"):
+        bench.base.open()
+
+
+@pytest.mark.usefixtures("hasty")
+def test_a_vehicle_that_does_not_know_where_it_is_cannot_be_driven(bench: Bench) -> None:
+    bench.rover.has_origin = False
+    with pytest.raises(DeviceFaultError, match="does not tell where it is"):
+        bench.base.open()
+
+
+def test_modes_of_others_have_names(bench: Bench) -> None:
+    bench.rover.is_armed = True
+    bench.rover.take_over(AUTO)
+    with pytest.raises(DeviceFaultError, match="armed in mode AUTO"):
+        bench.base.open()
+    bench.rover.take_over(HOLD)
+    with pytest.raises(DeviceFaultError, match="armed in mode HOLD"):
+        bench.base.open()

@@ -1,0 +1,264 @@
+"""Services and actions of a generated ROS 1 node in C++: every way in which they end, with real servers on rospy."""
+
+import signal
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from robosc.supervisor.structure import Supervisor
+from support.node_logs import Entry, entries_of
+from support.process import Process
+from support.ros1_cpp import Master, Peer, built_once, missing, node_command, supervisor_of, until
+
+pytestmark = [
+    pytest.mark.skipif(missing() is not None, reason=str(missing())),
+]
+
+MODEL = Path(__file__).parents[2] / "tests" / "models" / "carrier" / "carrier.rscd"
+
+
+@pytest.fixture(scope="module")
+def supervisor() -> Supervisor:
+    return supervisor_of(MODEL)
+
+
+@pytest.fixture(scope="module")
+def workspace(supervisor: Supervisor, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return built_once(supervisor, tmp_path_factory)
+
+
+class Carrier:
+    """The test's side of the model: a peer, and the node's log."""
+
+    def __init__(self, workspace: Path, master: Master, peer: Peer, folder: Path) -> None:
+        self._workspace = workspace
+        self._master = master
+        self._folder = folder
+        self.peer = peer
+        self.node: Process
+
+    def start(self, *parameters: str) -> None:
+        """Start the node, deciding every 20 ms."""
+        given = ("period:=0.02", f"log_folder:={self._folder / 'events'}", *parameters)
+        self.node = Process(node_command(self._workspace, *given), self._master.variables, self._folder / "node")
+
+    @property
+    def entries(self) -> list[Entry]:
+        return entries_of(self._folder / "events")
+
+    def events(self, event: str) -> list[Entry]:
+        return [entry for entry in self.entries if entry.get("event") == event and entry["kind"] == "event"]
+
+    def until(self, event: str, count: int = 1, repeat: Callable[[], object] = lambda: None) -> None:
+        """Wait until the node has logged an event so often."""
+
+        def is_there() -> bool:
+            assert self.node.is_running, self.node.stderr
+            return len(self.events(event)) >= count
+
+        until(is_there, f"{event}, {count} times", repeat)
+
+    def say(self, word: str) -> None:
+        self.peer.publish("/word", "std_msgs/String", data=word)
+
+    def scan(self, distance: float) -> None:
+        self.peer.publish("/scan", "sensor_msgs/LaserScan", ranges=[distance] * 360, range_max=10.0)
+
+    def calibrate(self) -> None:
+        """Answer the calibration as it should be."""
+        until(lambda: bool(self.peer.of("called", "/calibrate")), "a call")
+        self.peer.tell("answer", "/calibrate", data={"success": True, "message": "fine"})
+        self.until("calibrate.response")
+
+    def drive(self) -> None:
+        """Get it so far that a goal is under way."""
+        before = len(self.peer.of("goal", "/move_base"))
+        self.until("word.response", repeat=lambda: self.say("go"))
+        until(lambda: len(self.peer.of("goal", "/move_base")) > before, "a goal")
+
+
+@pytest.fixture
+def carrier(workspace: Path, tmp_path: Path) -> Iterator[Carrier]:
+    with Master(tmp_path / "ros1") as master, Peer(master, tmp_path) as peer:
+        made = Carrier(workspace, master, peer, tmp_path)
+        yield made
+        made.node.__exit__(None, None, None)
+
+
+@pytest.fixture
+def ready(carrier: Carrier) -> Carrier:
+    """A node with both servers, calibrated."""
+    carrier.peer.tell("service", "/calibrate", "std_srvs/Trigger")
+    carrier.peer.tell("action", "/move_base", "move_base_msgs/MoveBase")
+    carrier.start()
+    carrier.calibrate()
+    return carrier
+
+
+def test_what_is_sent_is_as_the_model_says_and_stamped(ready: Carrier, supervisor: Supervisor) -> None:
+    peer = ready.peer
+    for topic, type_ in (
+        ("/creep", "geometry_msgs/TwistStamped"),
+        ("/said", "std_msgs/String"),
+        ("/count", "std_msgs/Int16"),
+    ):
+        peer.tell("subscribe", topic, type_)
+    ready.until("level.response", repeat=lambda: peer.publish("/level", "std_msgs/Float32", data=0.25))
+    until(lambda: any(m["twist"]["angular"]["z"] == 0.25 for m in peer.messages("/creep")), "the charge")
+    until(lambda: bool(peer.messages("/said") and peer.messages("/count")), "texts and numbers")
+    message = peer.messages("/creep")[-1]
+    assert message["header"]["frame_id"] == "base_link"
+    assert message["header"]["stamp"] > 1e9
+    assert message["twist"]["linear"] == {"x": 0.1, "y": 0.0, "z": 0.0}
+    assert peer.messages("/said")[0] == {"data": 'known; "and" said'}
+    assert peer.messages("/count")[0] == {"data": 32}
+
+    ready.drive()
+    goal = peer.of("goal", "/move_base")[-1]["target_pose"]
+    assert goal["header"]["frame_id"] == "map"
+    assert goal["header"]["stamp"] > 1e9
+    assert goal["pose"]["position"] == {"x": 2.0, "y": 0.5, "z": 0.0}
+    assert goal["pose"]["orientation"] == {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+    peer.tell("accept", "/move_base")
+    pose = {"base_position": {"pose": {"position": {"x": 1.5}}}}
+    peer.tell("feedback", "/move_base", data=pose)
+    ready.until("carry.feedback")
+    assert ready.events("carry.feedback")[-1]["state"]["Base"]["variables"]["progress"] == "far"
+    peer.tell("succeed", "/move_base", data={})
+    ready.until("carry.response")
+    ready.node.signal(signal.SIGINT)
+    assert ready.node.wait() == 0
+    # Whatever came in whatever order: what followed from it is what the reference executor does.
+    entries = ready.entries
+    kinds = {entry["event"] for entry in entries if entry["kind"] == "event"}
+    assert {"calibrate.response", "carry.feedback", "carry.response", "creep.request", "said.request"} <= kinds
+    _assert_states_follow(supervisor, entries)
+
+
+def _assert_states_follow(supervisor: Supervisor, entries: list[Entry]) -> None:
+    """Every state that the log tells is what the model says comes of its events."""
+    from robosc.execution.interpreter import InterpretedSystem
+
+    system = InterpretedSystem(supervisor)
+    for entry in entries:
+        if entry["kind"] == "event":
+            if entry["controllable"]:
+                assert system.enabled(entry["event"]), entry
+                system.step(entry["event"])
+            else:
+                system.step(entry["event"], system.read(entry["event"], entry["data"]))
+            assert system.state() == entry["state"], entry
+
+
+def test_missing_servers_are_errors_and_never_block(carrier: Carrier) -> None:
+    carrier.peer.tell("subscribe", "/creep", "geometry_msgs/TwistStamped")
+    carrier.start("server_wait:=0.2")
+    carrier.until("calibrate.error", 3)
+    # The wheels go on turning between the failing calls.
+    until(lambda: len(carrier.peer.messages("/creep")) > 5, "commands")
+    assert "starting without a server of /calibrate, /move_base" in carrier.node.stdout + carrier.node.stderr
+    carrier.peer.tell("service", "/calibrate", "std_srvs/Trigger")
+    carrier.calibrate()
+    carrier.until("word.response", repeat=lambda: carrier.say("go"))
+    carrier.until("carry.error", 2)
+
+
+def test_a_service_that_does_not_answer_times_out_and_its_late_answer_changes_nothing(carrier: Carrier) -> None:
+    carrier.peer.tell("service", "/calibrate", "std_srvs/Trigger")
+    carrier.peer.tell("action", "/move_base", "move_base_msgs/MoveBase")
+    carrier.start("service_timeout:=0.3")
+    carrier.until("calibrate.error", 2)
+    until(lambda: len(carrier.peer.of("called", "/calibrate")) >= 2, "another call")
+    carrier.peer.tell("answer", "/calibrate", data="fail")
+    carrier.until("calibrate.error", 3)
+    # It ends at once, although calls wait for their replies.
+    carrier.node.signal(signal.SIGTERM)
+    assert carrier.node.wait() == 0
+
+
+def test_goals_end_in_every_way(ready: Carrier) -> None:
+    peer = ready.peer
+    ready.drive()
+    peer.tell("reject", "/move_base")
+    ready.until("carry.error", 1)
+    until(lambda: len(peer.of("goal", "/move_base")) >= 2, "another goal")
+    peer.tell("accept", "/move_base")
+    peer.tell("abort", "/move_base")
+    ready.until("carry.error", 2)
+    until(lambda: len(peer.of("goal", "/move_base")) >= 3, "another goal")
+    peer.tell("accept", "/move_base")
+    # Something stands in the way: the goal is cancelled.
+    ready.until("carry.cancel", repeat=lambda: ready.scan(0.2))
+    until(lambda: bool(peer.of("cancel", "/move_base")), "the cancel")
+    peer.tell("canceled", "/move_base")
+    ready.until("scan.response", 1)
+    goals = len(peer.of("goal", "/move_base"))
+    ready.until("scan.response", len(ready.events("scan.response")) + 1, repeat=lambda: ready.scan(5.0))
+    until(lambda: len(peer.of("goal", "/move_base")) > goals, "a goal with a clear way")
+
+
+def test_a_goal_is_cancelled_when_the_node_is_stopped(ready: Carrier) -> None:
+    ready.drive()
+    ready.peer.tell("accept", "/move_base")
+    ready.peer.tell("feedback", "/move_base", data={})
+    ready.until("carry.feedback")
+    ready.peer.tell("subscribe", "/creep", "geometry_msgs/TwistStamped")
+    ready.node.signal(signal.SIGINT)
+    until(lambda: bool(ready.peer.of("cancel", "/move_base")), "the cancel")
+    assert ready.node.wait() == 0
+    assert ready.node.stderr == ""
+
+
+def test_a_server_that_vanishes_is_an_error(workspace: Path, tmp_path: Path) -> None:
+    with Master(tmp_path / "ros1") as master, Peer(master, tmp_path) as peer, Peer(master, tmp_path, "mover") as mover:
+        carrier = Carrier(workspace, master, peer, tmp_path)
+        peer.tell("service", "/calibrate", "std_srvs/Trigger")
+        mover.tell("action", "/move_base", "move_base_msgs/MoveBase")
+        carrier.start()
+        with carrier.node:
+            carrier.calibrate()
+            carrier.until("word.response", repeat=lambda: carrier.say("go"))
+            until(lambda: bool(mover.of("goal", "/move_base")), "a goal")
+            mover.tell("accept", "/move_base")
+            mover.tell("feedback", "/move_base", data={})
+            carrier.until("carry.feedback")
+            mover.kill()
+            carrier.until("carry.error")
+            carrier.node.signal(signal.SIGTERM)
+            assert carrier.node.wait() == 0
+
+
+def test_a_cancel_that_is_ignored_is_a_fault(carrier: Carrier) -> None:
+    carrier.peer.tell("service", "/calibrate", "std_srvs/Trigger")
+    carrier.peer.tell("action", "/move_base", "move_base_msgs/MoveBase", data="cancel")
+    carrier.start()
+    carrier.calibrate()
+    carrier.drive()
+    carrier.peer.tell("accept", "/move_base")
+    carrier.peer.tell("feedback", "/move_base", data={})
+    carrier.until("carry.feedback")
+    carrier.until("carry.cancel", repeat=lambda: carrier.scan(0.2))
+    assert carrier.node.wait() == 1
+    assert carrier.node.stderr.splitlines()[-1] == "carrier_controller: the cancel of a running goal was refused"
+    assert carrier.peer.of("cancel", "/move_base")
+
+
+def test_a_goal_that_nothing_is_heard_of_is_an_error(carrier: Carrier) -> None:
+    carrier.peer.tell("service", "/calibrate", "std_srvs/Trigger")
+    carrier.peer.tell("action", "/move_base", "move_base_msgs/MoveBase", data="goal")
+    carrier.start()
+    carrier.calibrate()
+    carrier.until("carry.request", repeat=lambda: carrier.say("go"))
+    until(lambda: bool(carrier.peer.of("goal", "/move_base")), "a goal")
+    carrier.until("carry.error")
+
+
+def test_calls_that_never_end_do_not_keep_others_from_being_made(carrier: Carrier) -> None:
+    carrier.peer.tell("service", "/calibrate", "std_srvs/Trigger")
+    carrier.peer.tell("action", "/move_base", "move_base_msgs/MoveBase")
+    carrier.start("service_timeout:=0.01")
+    # More than may wait, and more than threads of one service may be.
+    until(lambda: len(carrier.peer.of("called", "/calibrate")) > 40, "another call")
+    carrier.node.signal(signal.SIGTERM)
+    assert carrier.node.wait() == 0

@@ -1,0 +1,39 @@
+"""What holds for the tests of all tiers: `tests`, `acceptance` and `soak`.
+
+Programs that they start can be interrupted, random examples are those of the chosen effort, and figures are told at the
+end of the run.
+"""
+
+import importlib
+import os
+import signal
+
+import pytest
+
+from support.effort import load_profile
+
+# Our programs have gRPC's own log off, which is read at its import: in this process, which runs what they run, it would
+# stand among what they tell. Programs that are started hide it themselves.
+_verbosity = os.environ.get("GRPC_VERBOSITY")
+os.environ.setdefault("GRPC_VERBOSITY", "NONE")
+importlib.import_module("grpc")
+if _verbosity is None:
+    del os.environ["GRPC_VERBOSITY"]
+
+# A shell starts what it runs in the background with SIGINT ignored, and programs hand that down: Ctrl-C would not reach
+# the programs of the tests.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+load_profile()
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Print what tests recorded with `record_property`, whichever process measured it."""
+    figures = [
+        f"{name}: {value}" for report in terminalreporter.getreports("passed") for name, value in report.user_properties
+    ]
+    if figures:
+        terminalreporter.section("figures")
+        for figure in figures:
+            terminalreporter.write_line(figure)

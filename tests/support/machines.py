@@ -1,0 +1,50 @@
+"""Machines that a bridge is assembled on, and a face that records what is done with it."""
+
+import sys
+
+from robosc.execution.event_log import NullLog
+from robosc.supervisor import Supervisor, make_supervisor
+from robosc_bridge.configuration import parse, tie
+from robosc_bridge.daemon.assembly import Machine, assemble
+from robosc_bridge.daemon.states import Command
+from robosc_bridge.errors import BridgeError
+from support.daemons import MODEL
+from support.models import bundle_of
+
+
+def controller() -> Supervisor:
+    """Return the supervisor of the model that most tests of the bridge take."""
+    made = make_supervisor(bundle_of(MODEL))
+    assert made.supervisor is not None
+    return made.supervisor
+
+
+def machine(supervisor: Supervisor, text: str, *, starts_itself: bool = True) -> Machine:
+    """Return what is assembled of the text of a configuration."""
+    configuration = parse(text.encode(), "test.yaml").configuration
+    ties = tie(supervisor.model, configuration)
+    return assemble(configuration, ties, supervisor, NullLog(), starts_itself=starts_itself)
+
+
+class RecordedFace:
+    """A remote face that notes when it is started and stopped."""
+
+    name = "recorded face"
+    is_alive = True
+
+    def __init__(self, made: Machine, problem: str = "") -> None:
+        self.made = made
+        self.problem = problem
+        self.told: list[str] = []
+        self.switch_s = 0.0
+
+    def start(self) -> None:
+        if self.problem:
+            raise BridgeError(self.problem)
+        self.told.append(f"start {self.made.drive.is_alive}")
+        self.switch_s = sys.getswitchinterval()
+        self.made.operations.order(Command.QUIT, "a test")
+
+    def stop(self) -> None:
+        snapshot = self.made.operations.feed.snapshot
+        self.told.append(f"stop {self.made.drive.is_alive} {None if snapshot is None else snapshot.state}")

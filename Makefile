@@ -13,7 +13,7 @@ COLCON := .venv-colcon
 CHECKERS := .venv-checkers
 WHEELS := out/wheels
 
-.PHONY: demo test mutants fuzz lint format bindings lock benchmark environment colcon checkers images clean help
+.PHONY: demo test mutants fuzz lint format bindings lock benchmark environment colcon checkers images extension vscode clean help
 
 help:
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -41,6 +41,18 @@ $(WHEELS)/.ready: deploy/requirements-build.txt deploy/requirements-server.txt d
 	PYTHON=$(BIN)/python sh deploy/make_image_wheels.sh $(WHEELS)
 	PYTHONPATH=tests $(BIN)/python -m support.containers
 	@touch $@
+
+NPM := npm --no-audit --no-fund --loglevel=error
+VSCODE := tests/vscode/node_modules/code-server/lib/vscode
+
+extension: ## make the extension for VS Code, out/robosc.vsix
+	$(NPM) ci --prefix editors/vscode --ignore-scripts
+	mkdir -p out
+	cd editors/vscode && $(NPM) run package -- --out $(CURDIR)/out/robosc.vsix
+
+vscode: ## install the VS Code that the extension's tests run in
+	$(NPM) ci --prefix tests/vscode --ignore-scripts
+	cd $(VSCODE) && $(NPM) install --omit=dev --ignore-scripts
 
 demo: $(READY) ## lead a simulated robot out of a maze, from model to serial bytes; DEMO='--scene maze-spiral' and so on
 	$(BIN)/python deploy/demo/demo.py $(DEMO)
@@ -91,7 +103,7 @@ lock: $(READY) ## choose new versions and write the locks
 	$(BIN)/pip-compile --quiet --upgrade --strip-extras --allow-unsafe --generate-hashes --all-build-deps \
 	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host \
 	  --extra server --extra postgresql --extra dask --extra tracing --extra client --extra ros2 --extra examples \
-	  --extra bridge --extra plot --extra simulation --extra view --extra dev \
+	  --extra bridge --extra plot --extra simulation --extra view --extra lsp --extra dev \
 	  --output-file requirements.lock pyproject.toml
 	$(BIN)/pip-compile --quiet --upgrade --strip-extras --allow-unsafe --generate-hashes \
 	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host \

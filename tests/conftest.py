@@ -67,6 +67,7 @@ _IN_REAL_TIME = (
 # Their files build packages, or start servers or a browser, once for all tests of a file.
 _BY_FILE = (
     "tests/bridge/view/test_page_",
+    "tests/editors/test_vscode.py",
     "tests/end_to_end/",
     "tests/robosc/targets/cpp/",
     "tests/server/jobs/test_job_faults.py",

@@ -13,7 +13,7 @@ COLCON := .venv-colcon
 CHECKERS := .venv-checkers
 WHEELS := out/wheels
 
-.PHONY: demo test acceptance smoke soak mutants fuzz lint format bindings lock benchmark environment colcon checkers images clean help
+.PHONY: demo test acceptance smoke soak mutants fuzz lint format bindings lock benchmark environment colcon checkers images extension vscode clean help
 
 help:
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -41,6 +41,18 @@ $(WHEELS)/.ready: deploy/requirements-build.txt deploy/requirements-server.txt d
 	PYTHON=$(BIN)/python sh deploy/make_image_wheels.sh $(WHEELS)
 	PYTHONPATH=tests $(BIN)/python -m support.containers
 	@touch $@
+
+NPM := npm --no-audit --no-fund --loglevel=error
+VSCODE := acceptance/vscode/node_modules/code-server/lib/vscode
+
+extension: ## make the extension for VS Code, out/robosc.vsix
+	$(NPM) ci --prefix editors/vscode --ignore-scripts
+	mkdir -p out
+	cd editors/vscode && $(NPM) run package -- --out $(CURDIR)/out/robosc.vsix
+
+vscode: ## install the VS Code that the extension's tests run in
+	$(NPM) ci --prefix acceptance/vscode --ignore-scripts
+	cd $(VSCODE) && $(NPM) install --omit=dev --ignore-scripts
 
 demo: $(READY) ## lead a simulated robot out of a maze, from model to serial bytes; DEMO='--scene maze-spiral' and so on
 	$(BIN)/python deploy/demo/demo.py $(DEMO)
@@ -112,7 +124,7 @@ bindings: $(READY) ## regenerate the gRPC bindings
 # Extras stay where they are asked for: a lock without them is not complete. `lock_images.py` asks the installed packages
 # what they need, so that the new lock has to be installed before.
 COMPILE := $(BIN)/uv pip compile --quiet --upgrade --no-strip-extras --generate-hashes --python-version 3.12
-EXTRAS := server postgresql dask tracing client signing ros2 examples bridge plot simulation view build dev
+EXTRAS := server postgresql dask tracing client signing ros2 examples bridge plot simulation view lsp build dev
 
 lock: $(READY) ## choose new versions and write the locks
 	$(COMPILE) $(EXTRAS:%=--extra %) --output-file requirements.lock pyproject.toml

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from robosc.targets import generate, write_files
+from support.background import children_of, has_ended
 from support.porter import CARELESS, LIMIT_S, PACKAGE, Porter, porter_robot, porter_supervisor
 from support.ros2_servers import End, HeldAction, HeldService
 
@@ -19,6 +20,8 @@ pytest.importorskip("rclpy", reason="ROS 2 (rclpy) is not installed")
 pytest.importorskip("test_msgs", reason="test_msgs, with the only actions in a package index, is not installed")
 
 pytestmark = pytest.mark.ros2
+
+PATIENCE_S = 60.0
 
 
 @pytest.fixture(scope="module")
@@ -201,12 +204,12 @@ def test_layer_and_controller_end_together(porter: Porter) -> None:
     porter.start_with_careless("server_wait:=0.0", "command_timeout:=0.0")
     porter.allow(True)
     porter.until(lambda: porter.speed == 0.3, "the robot to move")
+    both = children_of(porter.layer.popen.pid)
+    assert len(both) == 2
     porter.end()
     assert porter.speed == 0.0
     # Nobody drives any more: the controller has ended, too.
-    porter.peer.spin_until(
-        lambda: "careless" not in porter.peer.node.get_node_names(), 30.0, "the controller to be gone"
-    )
+    assert all(map(has_ended, both))
 
 
 @pytest.mark.parametrize("number", [signal.SIGQUIT, signal.SIGKILL])
@@ -214,13 +217,12 @@ def test_a_starter_that_is_ended_in_another_way_leaves_nobody_driving(number: si
     porter.start_with_careless("server_wait:=0.0", "command_timeout:=0.0")
     porter.allow(True)
     porter.until(lambda: porter.speed == 0.3, "the robot to move")
+    both = children_of(porter.layer.popen.pid)
+    assert len(both) == 2
     porter.layer.signal(number)
-    porter.peer.spin_until(
-        # DDS takes a participant that has said no farewell for gone after twenty seconds.
-        lambda: porter.speed == 0.0 and "careless" not in porter.peer.node.get_node_names(),
-        90.0,
-        "the end of both",
-    )
+    porter.peer.spin_until(lambda: porter.speed == 0.0, LIMIT_S, "the robot to stand")
+    porter.peer.spin_until(lambda: all(map(has_ended, both)), PATIENCE_S, "the end of both")
+    assert porter.speed == 0.0
 
 
 def test_what_had_come_before_a_request_is_heeded_first(porter: Porter) -> None:

@@ -106,8 +106,11 @@ class Stage:
         self.until(lambda: self.speed == 0.5, "the robot to walk")
 
     def stands(self) -> None:
-        """The last command is zero, and none follows."""
+        """The last command is zero, perhaps told twice, and none follows."""
         self.until(lambda: self.speed == 0.0, "the robot to stand")
+        count = len(self.commands)
+        self.peer.spin_for(0.3)
+        assert not any(command.linear.x for command in self.commands[count:])
         count = len(self.commands)
         self.peer.spin_for(0.3)
         assert len(self.commands) == count

@@ -22,6 +22,7 @@ COPY proto/robosc_api proto/robosc_api
 COPY server server
 COPY client client
 COPY bridge bridge
+COPY editors/robosc_lsp editors/robosc_lsp
 RUN /build/venv/bin/pip wheel --no-build-isolation --no-deps -w own . \
     && /build/venv/bin/pip --python /opt/robosc/bin/python install --no-index --no-deps own/*.whl
 

@@ -132,11 +132,10 @@ def property_file(path: Path) -> SourceFile:
         UsageError: It is not there or cannot be read.
         LanguageError: It is no text.
     """
-    from robosc.language.bundle import MAXIMUM_BYTES, decode_source
+    from robosc.language import read_source
 
     try:
-        with path.open("rb") as file:
-            return SourceFile(str(path), decode_source(file.read(MAXIMUM_BYTES + 1), str(path)))
+        return SourceFile(str(path), read_source(path, str(path)))
     except OSError as error:
         raise UsageError(f"cannot read {path}: {error.strerror or error}") from error
 

@@ -1,12 +1,14 @@
 """Names of a bundle: what stands at a place, where that is defined, and who else names it."""
 
+import re
+from bisect import bisect_right
 from collections.abc import Iterable, Iterator
 from functools import cached_property
 
 from robosc.editing.definitions import Definition, definitions
-from robosc.language.words import RESERVED_WORDS
+from robosc.language.tokens import Kind, tokenize
 from robosc.model.check import Inspected
-from robosc.source import Location
+from robosc.source import Location, SourceFile
 
 
 class Names:
@@ -71,10 +73,33 @@ class Names:
             if found is not None:
                 yield place, found
 
+    def pattern(self) -> list[int]:
+        """Which names of the bundle mean the same: the place of what each means among all places, in their order.
+
+        What only gives a name another spelling leaves it as it is.
+        """
+        places = sorted({*self.definitions, *self._uses})
+        number = {place: index for index, place in enumerate(places)}
+        return [number.get(self._uses.get(place, place), -1) for place in places]
+
+    def not_understood(self, file: SourceFile, name: str) -> list[Location]:
+        """Where a name stands in a file of the bundle without meaning anything there, because of errors.
+
+        Args:
+            file: The file.
+            name: The name, without what keeps it from being a word of the language.
+        """
+        known = {(place.line, place.column) for places in self._lines_of(file.name) for place in places}
+        texts, kinds, starts = tokenize(file.text)
+        line_begins = [0, *(match.end() for match in re.finditer("\n", file.text))]
+        found = []
+        for text, kind, start in zip(texts, kinds, starts, strict=True):
+            if kind == Kind.NAME and text.removeprefix("^") == name:
+                line = bisect_right(line_begins, start)
+                column = start - line_begins[line - 1] + 1
+                if (line, column) not in known:
+                    found.append(Location(file.name, line, column, len(text)))
+        return found
+
     def _lines_of(self, file: str) -> Iterable[list[Location]]:
         return (places for (name, _), places in self._by_line.items() if name == file)
-
-
-def spelled(name: str) -> str:
-    """A name as it is written: `^` keeps it from being a word of the language."""
-    return f"^{name}" if name in RESERVED_WORDS else name

@@ -1,9 +1,10 @@
 """Finds the files of a run: the model, and the libraries that it imports from (language A.4)."""
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 from robosc.errors import Diagnostic, LanguageError, Severity
 from robosc.language.interfaces import find_interfaces
@@ -16,7 +17,12 @@ MAXIMUM_BYTES = 16 * 1024 * 1024
 SUFFIX = ".rscd"
 
 
-def load_bundle(model: Path, library_paths: Sequence[Path] = (), interface_paths: Sequence[Path] = ()) -> Bundle:
+def load_bundle(
+    model: Path,
+    library_paths: Sequence[Path] = (),
+    interface_paths: Sequence[Path] = (),
+    unsaved: Mapping[str, str] = MappingProxyType({}),
+) -> Bundle:
     """Read a model and the libraries that it needs.
 
     Libraries are looked for in the model's folder, its sibling `../shared` and `library_paths`. Only files
@@ -27,15 +33,18 @@ def load_bundle(model: Path, library_paths: Sequence[Path] = (), interface_paths
         model: The model's file.
         library_paths: More folders to look in.
         interface_paths: Folders with ROS packages whose definitions of middleware types are looked up.
+        unsaved: What an editor has of files, by their real path; it is taken instead of what is saved.
 
     Raises:
         LanguageError: The model, or a library that it needs, is too large or not UTF-8.
         OSError: The model's file cannot be read.
     """
-    main = SourceFile(_printable(model.name), _read(model, _printable(model.name)))
+    name = _printable(model.name)
+    main_text = unsaved.get(os.path.realpath(model))
+    main = SourceFile(name, read_source(model, name) if main_text is None else main_text)
     folders = _folders(model, library_paths)
     wanted, seen = list(imported_libraries(main.text)), set[str]()
-    found = _candidates(model, folders) if wanted else ()
+    found = _candidates(model, folders, unsaved) if wanted else ()
     chosen: dict[str, SourceFile] = {}
     while wanted:
         name = wanted.pop(0)
@@ -81,7 +90,13 @@ def _refused(code: str, name: str, message: str, mend: str, *, line: int = 1, co
     return LanguageError([Diagnostic(Severity.ERROR, code, message, Location(name, line, column), mend)])
 
 
-def _read(path: Path, name: str) -> str:
+def read_source(path: Path, name: str) -> str:
+    """The text of a file, of which no more is read than it may have.
+
+    Raises:
+        LanguageError: As `decode_source`.
+        OSError: It cannot be read.
+    """
     with path.open("rb") as file:
         return decode_source(file.read(MAXIMUM_BYTES + 1), name)
 
@@ -108,16 +123,22 @@ class _Candidate:
     fault: LanguageError | None = None
 
 
-def _candidates(model: Path, folders: Iterable[Path]) -> tuple[_Candidate, ...]:
+def _candidates(model: Path, folders: Iterable[Path], unsaved: Mapping[str, str]) -> tuple[_Candidate, ...]:
     """Every other model file of the folders, by name; one that cannot be opened is none."""
     files: dict[str, _Candidate] = {}
     for folder in folders:
-        for path in sorted(folder.iterdir()):
+        here = Path(os.path.realpath(folder))
+        # What is new in an editor is not saved anywhere yet.
+        new = (folder / path.name for path in map(Path, unsaved) if path.parent == here)
+        for path in sorted({*folder.iterdir(), *new}):
             real = os.path.realpath(path)
             if path.suffix != SUFFIX or real == os.path.realpath(model) or real in files:
                 continue
             try:
-                if path.is_file():
+                if real in unsaved:
+                    text = unsaved[real]
+                    files[real] = _Candidate(SourceFile(_shown(path, model), text), declared_libraries(text))
+                elif path.is_file():
                     files[real] = _candidate(path, _shown(path, model))
             except OSError:
                 continue

@@ -57,6 +57,7 @@ class Cursor:
         place: Index of the next token.
         diagnostics: What was found so far.
         extents: The items of lists that were read so far.
+        expected: What could stand at the end of the text, if it ends too early.
     """
 
     def __init__(self, file: SourceFile, tokens: Tokens, places: Places) -> None:
@@ -64,6 +65,7 @@ class Cursor:
         self.place = 0
         self.diagnostics: list[Diagnostic] = []
         self.extents: list[Extent] = []
+        self.expected: tuple[str, ...] = ()
         self._file = file
         self._places = places
         self._lists: list[Mapping[str, object]] = []
@@ -109,6 +111,7 @@ class Cursor:
         token = self.texts[index]
         if self._possible[0] == index:
             expected = (*self._possible[1], *expected)
+        self.expect(*expected)
         shown = token if len(token) <= _MAXIMUM_SHOWN else f"{token[:_MAXIMUM_SHOWN]}..."
         met = f"'{shown}'" if token else "the end of the file"
         message = f"{met} does not fit here; expected {expected_words(expected)}"
@@ -117,6 +120,11 @@ class Cursor:
         mend = mend_syntax(self.texts[index - 1] if index else "", token, expected)
         self.report("syntax-error", message, self.at(index), mend, *related)
         return self.told()
+
+    def expect(self, *words: str) -> None:
+        """Note what could stand here instead of the end of the text, if this is the end; the first note counts."""
+        if self.kinds[self.place] == _END and not self.expected:
+            self.expected = words
 
     def told(self) -> Fault:
         """What to raise behind an error that has been reported with `report`."""

@@ -117,6 +117,7 @@ class ExpressionParser(Cursor):
         return tree
 
     def _unclosed(self, opening: int) -> Fault:
+        self.expect("an operator", "')'")
         self.report("syntax-error", "this '(' is never closed", self.at(opening), "Close it with ')'.")
         return self.told()
 
@@ -256,6 +257,7 @@ class ExpressionParser(Cursor):
         for opening in reversed(openings):
             if self.texts[self.place] != ")":
                 message = "the '(' of this array is never closed"
+                self.expect("')'")
                 self.report("syntax-error", message, self.at(opening), "Close it with ')'.")
                 raise self.told()
             self.place += 1

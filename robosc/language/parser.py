@@ -32,12 +32,14 @@ class Parsed:
         diagnostics: Everything that is wrong with the text, by place.
         sound: The syntax tree of the items that are sound, or None where not even the first words are.
         extents: Where each sound item that stands in a list begins and ends, inner ones first.
+        expected: What could stand at the end of a text that ends too early, such as `'goto'` or `a name`.
     """
 
     tree: syntax.File | None
     diagnostics: tuple[Diagnostic, ...]
     sound: syntax.File | None = None
     extents: tuple[Extent, ...] = ()
+    expected: tuple[str, ...] = ()
 
 
 def parse(file: SourceFile) -> Parsed:
@@ -53,7 +55,7 @@ def parse(file: SourceFile) -> Parsed:
     with suppress(Fault, TooManyFaults):
         tree = parser.file()
     diagnostics = sorted_diagnostics(parser.diagnostics)
-    return Parsed(None if diagnostics else tree, diagnostics, tree, tuple(parser.extents))
+    return Parsed(None if diagnostics else tree, diagnostics, tree, tuple(parser.extents), parser.expected)
 
 
 class _Parser(ExpressionParser):

@@ -65,6 +65,11 @@ _FOREIGN = {
 """What other languages write."""
 
 
+def spelled(name: str) -> str:
+    """A name as it is written: `^` keeps it from being a word of the language."""
+    return f"^{name}" if name in RESERVED_WORDS else name
+
+
 def expected_words(expected: Iterable[str]) -> str:
     """What was expected, at most eight of it, as one phrase."""
     words = dict.fromkeys(expected)

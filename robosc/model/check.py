@@ -91,6 +91,7 @@ class Inspected:
         parts: The components of the robot, imports followed.
         scopes: What names mean in each place of it; None where there is no tree.
         units: The files that were read, the main one first.
+        communications: Those of the robot whose types are sound, by name.
     """
 
     checked: Checked
@@ -98,6 +99,7 @@ class Inspected:
     parts: tuple[Part, ...] = ()
     scopes: Scopes | None = None
     units: tuple[Unit, ...] = ()
+    communications: Mapping[str, Communication] = field(default_factory=dict)
 
 
 def check(bundle: Bundle) -> Checked:
@@ -120,7 +122,7 @@ def inspect(bundle: Bundle) -> Inspected:
         # What is missing has left faults behind that are none: they are not told.
         checker.model()
         checked = Checked(None, parsed.diagnostics, bindings=checker.findings.bindings)
-    return Inspected(checked, parsed, checker.parts, checker.scopes, checker.units)
+    return Inspected(checked, parsed, checker.parts, checker.scopes, checker.units, checker.communications)
 
 
 def _checked(checker: "_RobotChecker", tree: syntax.File) -> Checked:
@@ -147,6 +149,7 @@ class _RobotChecker:
         self.parts = parts_of(self._unit, self._libraries, findings)
         self.places = Places(tree.name.location)
         self.scopes: Scopes | None = None
+        self.communications: Mapping[str, Communication] = {}
 
     @property
     def units(self) -> tuple[Unit, ...]:
@@ -173,6 +176,7 @@ class _RobotChecker:
         requirements, provides = tuple(restrictions.requirements), tuple(restrictions.provides)
         invariants = tuple(restrictions.invariants)
         communications = with_conditions(trees, communications, scopes, self.findings)
+        self.communications = communications
         marked = mark_synthesis_variables(behaviours, requirements, provides, invariants)
         for name, behaviour in marked.items():
             tree = behaviour_trees[name]

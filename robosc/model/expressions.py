@@ -55,6 +55,7 @@ from robosc.model.typed import (
 _BOOLEAN = BooleanType()
 _LOGIC = {"or": "or", "and": "and", "=>": "implies"}
 _ORDER = frozenset({"<", "<=", ">", ">="})
+_WORDS = ("true", "false", "value", "default")
 _FUNCTIONS = (*ARGUMENTS, "length", "any", "all")
 _USES = {
     "abs": "'abs(x)'",
@@ -421,8 +422,8 @@ class ExpressionChecker:
                 "Define it in this file, or rename one of the two.",
             )
         elif name not in self._scope.absent:
-            known = [*self._scope.known_names(), "true", "false", "value", "default"]
-            self._findings.unknown("name", name, tree.root.location, known)
+            known = self._scope.known_names()
+            self._findings.unknown("name", name, tree.root.location, known, words=_WORDS)
         return None
 
     def _component_part(self, tree: syntax.Access, component: ComponentNames) -> Typed | None:

@@ -1,9 +1,10 @@
 """Collects what the checks find."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from robosc.errors import Diagnostic, RelatedPlace, Severity
+from robosc.language.words import spelled
 from robosc.model.bindings import Bindings
 from robosc.source import Location
 
@@ -40,14 +41,32 @@ class Findings:
         """Add a note."""
         self.diagnostics.append(Diagnostic(Severity.NOTE, code, message, location, mend, related))
 
-    def unknown(self, what: str, name: str, location: Location, known: Iterable[str], mend: str = "") -> None:
-        """Add an `unknown-name` error with the nearest known name, if one is near."""
-        near = self._near(name, known)
+    def unknown(
+        self,
+        what: str,
+        name: str,
+        location: Location,
+        known: Iterable[str],
+        mend: str = "",
+        words: Collection[str] = (),
+    ) -> None:
+        """Add an `unknown-name` error with the nearest known name, if one is near.
+
+        Args:
+            what: What it should name.
+            name: As it is written.
+            location: Where.
+            known: The names of such things.
+            mend: What to do instead of writing the nearest one.
+            words: What the language itself has there.
+        """
+        near = self._near(name, [*known, *words])
+        written = near if near is None or near in words else spelled(near)
         self.error(
             "unknown-name",
             f"unknown {what} '{name}'" + (f"; did you mean '{near}'?" if near else ""),
             location,
-            mend or (f"Write '{near}'." if near else f"Define the {what} '{name}' or use one that exists."),
+            mend or (f"Write '{written}'." if near else f"Define the {what} '{name}' or use one that exists."),
         )
 
     def communications_are_broken(self, names: Iterable[str]) -> None:

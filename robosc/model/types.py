@@ -101,7 +101,8 @@ class Types:
         if definition is None:
             meant = _FOREIGN_TYPES.get(name.text)
             mend = f"Write '{meant}'." if meant else ""
-            self._findings.unknown("data type", name.text, name.location, [*unit.types, *syntax.BasicTypeName], mend)
+            words = [*syntax.BasicTypeName]
+            self._findings.unknown("data type", name.text, name.location, unit.types, mend, words)
             return None
         self._findings.bindings.bind(name, definition.name.location)
         key = unit.type_name(name.text)

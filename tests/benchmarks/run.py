@@ -2,8 +2,8 @@
 
 Usage: run.py [NAME...]      (all of them without an argument)
 
-Names: cold-start, conditions, execution, language, synthesis; of the service: service-load, isolation; of the bridge:
-decoders, drive-bases, live-view, live-view-pixels, loop-period, maze, reaction, endurance, twin.
+Names: cold-start, conditions, editor, execution, language, synthesis; of the service: service-load, isolation; of
+the bridge: decoders, drive-bases, live-view, live-view-pixels, loop-period, maze, reaction, endurance, twin.
 """
 
 import sys
@@ -25,6 +25,7 @@ import twin
 
 import cold_start
 import conditions
+import editor
 import execution
 import language
 import synthesis
@@ -35,6 +36,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "conditions": conditions.table,
     "decoders": decoders.table,
     "drive-bases": drive_bases.table,
+    "editor": editor.table,
     "endurance": endurance.table,
     "execution": execution.table,
     "isolation": isolation.table,

@@ -58,6 +58,14 @@ def is_running(pid: int) -> bool:
     return True
 
 
+def has_ended(pid: int) -> bool:
+    """Whether a process has; nobody need have asked for its status, since those whose parent is gone wait for that."""
+    try:
+        return _fields(pid)[0] == "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return True
+
+
 def is_stopped(pid: int) -> bool:
     """Whether a process rests, as after Ctrl-Z."""
     return _fields(pid)[0] == "T"

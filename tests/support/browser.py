@@ -16,6 +16,9 @@ FLAGS = (
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
 )  # fmt: skip
 
+LIMIT_S = 90.0
+"""How long pages and what is in them are waited for."""
+
 WIDE = (1720, 1150)
 SCREENSHOTS = Path(__file__).parents[2] / "out" / "screenshots"
 """Where pictures of pages are kept, for whoever wants to see what the tests saw."""
@@ -60,11 +63,11 @@ class Visit:
 
     def wait(self, condition: str, argument: Any = None) -> None:
         """Until a JavaScript expression, or function of an argument, is true."""
-        self.page.wait_for_function(condition, arg=argument, timeout=20_000)
+        self.page.wait_for_function(condition, arg=argument)
 
     def found(self, question: str, argument: Any = None) -> Any:
         """What a JavaScript function answers, as soon as it answers with anything but nothing, false or zero."""
-        return self.page.wait_for_function(question, arg=argument, timeout=20_000).json_value()
+        return self.page.wait_for_function(question, arg=argument).json_value()
 
     def picture(self, name: str) -> Path:
         """Keeps a picture of the page."""
@@ -85,6 +88,7 @@ def visit(browser: Browser, address: str, size: tuple[int, int] = WIDE, **option
         options: What the browser tells about its user, as `Browser.new_context` takes it.
     """
     context = browser.new_context(viewport={"width": size[0], "height": size[1]}, **options)
+    context.set_default_timeout(LIMIT_S * 1000)
     try:
         opened = Visit(context.new_page())
         opened.page.goto(address)

@@ -1,23 +1,27 @@
-"""What tests have of the npm registry: see tests/node/package.json."""
+"""What tests have of the npm registry: see package.json in tests/node, acceptance/vscode and editors/vscode."""
 
 import shutil
 from pathlib import Path
 
 import pytest
 
-NODE_FOLDER = Path(__file__).parents[1] / "node"
+_TESTS = Path(__file__).parents[1]
+NODE_FOLDER = _TESTS / "node"
 PACKAGES = NODE_FOLDER / "node_modules"
+EXTENSION_FOLDER = _TESTS.parent / "editors" / "vscode"
+VSCODE_FOLDER = _TESTS.parent / "acceptance" / "vscode"
 
 _MISSING = "the npm packages of tests/node are not installed: npm ci --prefix tests/node"
 
 
-def node_tool(name: str) -> Path:
-    """A program of one of the packages, for Node; the test is skipped where it is not installed."""
-    tool = PACKAGES / ".bin" / name
+def node_tool(name: str, folder: Path = NODE_FOLDER) -> Path:
+    """A program of one of a folder's packages, for Node; the test is skipped where it is not installed."""
+    tool = folder / "node_modules" / ".bin" / name
     if shutil.which("node") is None:
         pytest.skip("Node is not installed")
     if not tool.exists():
-        pytest.skip(_MISSING)
+        where = folder.relative_to(_TESTS.parent)
+        pytest.skip(f"the npm packages of {where} are not installed: npm ci --prefix {where}")
     return tool
 
 

@@ -4,6 +4,7 @@ import contextlib
 import itertools
 import os
 import pwd
+import random
 import shutil
 import signal
 import socket
@@ -14,9 +15,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import pytest
+
+from support.background import children_of
 
 PATIENCE_S = 60.0
 _USER = "postgres"
@@ -40,6 +42,16 @@ def skip_without_postgresql() -> None:
             pytest.skip(f"there is no user {_USER}, and PostgreSQL does not run as root")
 
 
+def _lasting_port() -> int:
+    """A free port that the system gives to nobody who asks for any: it is still free when the server comes back."""
+    ports = range(20_000, 30_000)
+    for port in random.SystemRandom().sample(ports, len(ports)):
+        with socket.socket() as listener, contextlib.suppress(OSError):
+            listener.bind(("127.0.0.1", port))
+            return port
+    raise AssertionError("no port is free")
+
+
 class Postgresql:
     """One server, on a port of the loopback interface.
 
@@ -51,14 +63,13 @@ class Postgresql:
         self._folder = folder
         self._process: subprocess.Popen[bytes] | None = None
         self._numbers = itertools.count()
-        with socket.socket() as listener:
-            listener.bind(("127.0.0.1", 0))
-            self._port = listener.getsockname()[1]
-        self._as: dict[str, Any] = {}
+        self._port = _lasting_port()
+        self._as: list[str] = []
         if os.getuid() == 0:
             user = pwd.getpwnam(_USER)
             os.chown(folder, user.pw_uid, user.pw_gid)
-            self._as = {"user": user.pw_uid, "group": user.pw_gid}
+            # `user=` would fork, and of ten forks while gRPC has a call under way one child ends of it (SIGSEGV).
+            self._as = ["setpriv", f"--reuid={user.pw_uid}", f"--regid={user.pw_gid}", "--clear-groups"]
 
     @property
     def url(self) -> str:
@@ -91,17 +102,15 @@ class Postgresql:
         settings = [word for name, value in options.items() for word in ("-c", f"{name}={value}")]
         with (self._folder / "log").open("ab") as log:
             self._process = subprocess.Popen(
-                [programs / "postgres", "-D", self._data, *settings],
+                [*self._as, programs / "postgres", "-D", self._data, *settings],
                 stdout=log,
                 stderr=log,
                 cwd=self._folder,
                 start_new_session=True,
-                user=self._as.get("user"),
-                group=self._as.get("group"),
             )
         end = time.monotonic() + PATIENCE_S
         while self._try("pg_isready", "-q", "-h", "127.0.0.1", "-p", str(self._port)):
-            assert self._process.poll() is None, (self._folder / "log").read_text()
+            assert self._process.poll() is None, f"{self._process.poll()}: {(self._folder / 'log').read_text()}"
             assert time.monotonic() < end, (self._folder / "log").read_text()
             time.sleep(0.02)
 
@@ -130,8 +139,7 @@ class Postgresql:
     def _signal_all(self, number: int) -> None:
         assert self._process is not None
         # Its processes are all children of the first; each has a session of its own.
-        children = Path(f"/proc/{self._process.pid}/task/{self._process.pid}/children").read_text().split()
-        for pid in (self._process.pid, *map(int, children)):
+        for pid in (self._process.pid, *children_of(self._process.pid)):
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, number)
 
@@ -145,12 +153,10 @@ class Postgresql:
         programs = _programs()
         assert programs is not None
         subprocess.run(
-            [programs / program, *arguments],
+            [*self._as, programs / program, *arguments],
             check=True,
             capture_output=True,
             cwd=self._folder,
-            user=self._as.get("user"),
-            group=self._as.get("group"),
         )
 
     def _try(self, program: str, *arguments: str) -> int:

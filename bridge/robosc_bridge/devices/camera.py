@@ -185,7 +185,7 @@ class ProcessCamera(_StreamCamera):
             raise LineMissingError(self._path, MISSING)
         if not os.access(self._path, os.R_OK):
             raise LineDeniedError(self._path, DENIED)
-        command = [sys.executable, "-m", "robosc_bridge.devices.camera_process", self._path]
+        command = [sys.executable, "-P", "-m", "robosc_bridge.devices.camera_process", self._path]
         try:
             # In a session of its own: Ctrl-C in a terminal is for the bridge, which ends it after the wheels.
             self._process = subprocess.Popen(  # noqa: S603 (our own module, and no shell)

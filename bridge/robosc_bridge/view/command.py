@@ -1,9 +1,11 @@
 """`robosc view`: the live view of a bridge, of a ROS 2 node, or of an event log."""
 
 import argparse
+import contextlib
 import os
 import re
 import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +16,7 @@ from robosc.cli.output import CommandError, ExitCode, UsageError
 if TYPE_CHECKING:
     from robosc.supervisor import Supervisor
     from robosc_bridge.view.definition import Robot
+    from robosc_bridge.view.model_alone import ModelAlone
     from robosc_bridge.view.settings import ViewSettings
     from robosc_bridge.view.sources import Source
 
@@ -42,7 +45,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    source = parser.add_argument_group("what is shown").add_mutually_exclusive_group(required=True)
+    source = parser.add_argument_group("what is shown").add_mutually_exclusive_group()
     source.add_argument("--bridge", type=_address, metavar="HOST:PORT", help="a bridge, by its gRPC service")
     source.add_argument("--ros2", action="store_true", help="a generated ROS 2 node, by its topic /state")
     source.add_argument("--log", type=Path, metavar="FILE", help="an event log, which is replayed; needs --model")
@@ -52,7 +55,8 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         type=Path,
         metavar="FILE",
         help="with --log or --ros2: the model (.rscd), which is synthesized, or its supervisor (.rsup); without it the "
-        "page of a node cannot tell which requests are enabled",
+        "page of a node cannot tell which requests are enabled. Alone: what is shown is this model in its initial "
+        "state, and again whenever its files change",
     )
     add_given_supervisor_options(parser, "stands")
     parser.add_argument(
@@ -83,6 +87,20 @@ def _add_serving(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="HOST",
         help="a further name by which browsers reach it (may be repeated)",
+    )
+    group.add_argument(
+        "--framed-by",
+        type=_framing,
+        action="append",
+        default=[],
+        metavar="SOURCE",
+        help="pages that may show this one in a frame: an origin, such as https://site:8443, or vscode-webview: or "
+        "vscode-file:, those of an editor (may be repeated; default: none)",
+    )
+    group.add_argument(
+        "--end-with-input",
+        action="store_true",
+        help="end when standard input ends, too: with the program that has started this one, however that ends",
     )
     group.add_argument("--open", action="store_true", help="open it in a browser")
     group.add_argument("--tls-certificate", type=Path, metavar="FILE", help="certificate chain (PEM): serve with TLS")
@@ -134,6 +152,20 @@ def _address(text: str) -> str:
     return text
 
 
+_ORIGIN = re.compile(r"https?://(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+)(:[0-9]{1,5})?\Z")
+_EDITORS = ("vscode-webview:", "vscode-file:")
+"""Schemes of pages that editors have made. Of others anybody may have pages: `file:` is whatever was downloaded."""
+
+
+def _framing(text: str) -> str:
+    if _ORIGIN.match(text) or text in _EDITORS:
+        return text
+    schemes = " or ".join(_EDITORS)
+    raise argparse.ArgumentTypeError(
+        f"neither an origin, such as https://site:8443, nor a scheme of an editor ({schemes}): '{text}'"
+    )
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Serve the page until a signal comes.
 
@@ -143,16 +175,19 @@ def run(arguments: argparse.Namespace) -> int:
     from robosc_bridge.view.extra import require_view
     from robosc_bridge.view.sources import ViewError
 
+    if not (arguments.bridge or arguments.ros2 or arguments.log or arguments.model):
+        raise UsageError("what is shown? --bridge HOST:PORT, --ros2, --log FILE --model FILE, or --model FILE alone")
     if arguments.log is not None and arguments.model is None:
         raise UsageError("--log needs --model: the model that the log is of")
     if arguments.model is not None and arguments.bridge is not None:
-        raise UsageError("--model goes with --log or --ros2: a bridge tells its model itself")
+        raise UsageError("--model goes with --log or --ros2, or alone: a bridge tells its model itself")
     if arguments.namespace and not arguments.ros2:
         raise UsageError("--namespace goes with --ros2")
     try:
         require_view()
+        input_end = _InputEnd() if arguments.end_with_input else None
         make, is_shared, robot = _source(arguments)
-        return _serve(arguments, make, robot, is_shared=is_shared)
+        return _serve(arguments, make, robot, input_end, is_shared=is_shared)
     except ViewError as error:
         raise CommandError(str(error), ExitCode.USAGE) from error
 
@@ -178,11 +213,44 @@ def _source(arguments: argparse.Namespace) -> "tuple[Callable[[], Source], bool,
 
         _require_ros2()
         return lambda: StateTopic(arguments.namespace, supervisor, scene), True, None
+    if arguments.log is None:
+        alone = _alone(arguments, supervisor, scene)
+        return lambda: alone, True, alone.robot
     from robosc_bridge.view.replay import Recording, Replay
 
     assert supervisor is not None  # noqa: S101  # `run` has seen to that.
     recording = Recording(_log(arguments.log), supervisor, scene)
     return lambda: Replay(recording), False, recording.robot
+
+
+def _alone(arguments: argparse.Namespace, supervisor: "Supervisor | None", scene: Any) -> "ModelAlone":
+    """The source for a model alone, which looks at its files again and again."""
+    from robosc.cli.arguments import read_bundle
+    from robosc.errors import RoboscError
+    from robosc_bridge.view.model_alone import ModelAlone, NoSupervisorError, file_digest, read, synthesized
+
+    assert supervisor is not None  # noqa: S101  # `run` has seen to that.
+    model: Path = arguments.model
+    if model.suffix == ".rsup":
+
+        async def read_again() -> "Supervisor":
+            return read(model)
+
+        return ModelAlone(supervisor, file_digest(model), lambda: file_digest(model), read_again, scene)
+
+    def digest() -> str:
+        try:
+            return read_bundle(arguments).digest
+        except (UsageError, RoboscError) as error:
+            raise NoSupervisorError(str(error)) from error
+
+    words = ["--deployment", arguments.deployment or "controller", "--engine", arguments.engine, "--allow-livelock"]
+    words += [word for folder in arguments.library_path for word in ("--library-path", str(folder))]
+    words += [word for folder in arguments.interface_path for word in ("--interface-path", str(folder))]
+    words += ["--reorder"] if arguments.reorder else []
+    words += [] if arguments.max_nodes is None else ["--max-nodes", str(arguments.max_nodes)]
+    seen = supervisor.certificate.bundle_sha256
+    return ModelAlone(supervisor, seen, digest, lambda: synthesized((*words, "--", str(model))), scene)
 
 
 def _require_ros2() -> None:
@@ -224,11 +292,33 @@ def _settings(arguments: argparse.Namespace) -> "ViewSettings":
         key=arguments.tls_key,
         insecure_beyond_loopback=arguments.insecure_beyond_loopback,
     )
-    return ViewSettings(arguments.address, security, tuple(arguments.name))
+    return ViewSettings(arguments.address, security, tuple(arguments.name), tuple(arguments.framed_by))
+
+
+class _InputEnd:
+    """Ends the page when standard input ends, and before there is one, while a model is synthesized, the process."""
+
+    def __init__(self) -> None:
+        self.end: Callable[[], object] = lambda: os._exit(ExitCode.OK)
+        threading.Thread(target=self._follow, daemon=True).start()
+
+    def _follow(self) -> None:
+        # Not by `sys.stdin`, which nobody may hold when the interpreter ends.
+        with contextlib.suppress(OSError):
+            while os.read(0, 4096):
+                pass
+        # The loop may have ended before.
+        with contextlib.suppress(RuntimeError):
+            self.end()
 
 
 def _serve(
-    arguments: argparse.Namespace, make: "Callable[[], Source]", robot: "Robot | None", *, is_shared: bool
+    arguments: argparse.Namespace,
+    make: "Callable[[], Source]",
+    robot: "Robot | None",
+    input_end: _InputEnd | None,
+    *,
+    is_shared: bool,
 ) -> int:
     import asyncio
     import signal
@@ -240,6 +330,8 @@ def _serve(
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             loop.add_signal_handler(number, end.set)
+        if input_end is not None:
+            input_end.end = lambda: loop.call_soon_threadsafe(end.set)
         server = ViewServer(_settings(arguments), make, is_shared=is_shared, robot=robot)
         await server.start()
         try:

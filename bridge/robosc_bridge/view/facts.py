@@ -14,6 +14,7 @@ class SourceKind(StrEnum):
     BRIDGE = "bridge"
     ROS2 = "ros2"
     LOG = "log"
+    MODEL = "model"
 
 
 @dataclass(frozen=True, slots=True)

@@ -141,7 +141,7 @@ def _frames(run: LoggedRun, model: Model) -> list[Frame]:
         for edge in communication_plant(item).edges
     }
     names = {component.name for component in model.components if component.behaviour}
-    first = Frame(_initial(model), {item.name: "idle" for item in model.communications if item.kind in _CALLED})
+    first = first_frame(model)
     frames, frame = [first], first
     for entry in run.entries:
         match entry.kind:
@@ -170,8 +170,9 @@ def _frames(run: LoggedRun, model: Model) -> list[Frame]:
     return frames
 
 
-def _initial(model: Model) -> Mapping[str, Any]:
-    return {
+def first_frame(model: Model) -> Frame:
+    """The state before anything has happened."""
+    components = {
         component.name: {
             "state": component.behaviour.initial,
             "variables": {variable.name: variable.initial for variable in component.behaviour.variables},
@@ -179,6 +180,7 @@ def _initial(model: Model) -> Mapping[str, Any]:
         for component in model.components
         if component.behaviour
     }
+    return Frame(components, {item.name: "idle" for item in model.communications if item.kind in _CALLED})
 
 
 class Player:

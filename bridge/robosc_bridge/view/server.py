@@ -10,7 +10,7 @@ import contextlib
 import logging
 import os
 import ssl
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from typing import Any
 
 from aiohttp import WSCloseCode, WSMsgType, web
@@ -54,20 +54,31 @@ BATCH_S = 0.02
 """Least time between two batches of messages to a page."""
 
 HEADERS = {
-    "Content-Security-Policy": "default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; "
-    "object-src 'none'",
     "Cache-Control": "no-store",
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
     "Permissions-Policy": "camera=(), geolocation=(), microphone=()",
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
-    "X-Frame-Options": "DENY",
 }
 
 _BACKLOG = 16
 _SWEEP_S = 1.0
 _CLOSE_LIMIT_S = 2.0
+
+
+def answer_headers(framed_by: Sequence[str] = ()) -> dict[str, str]:
+    """Headers of every answer.
+
+    Args:
+        framed_by: Origins, or schemes with their colon, whose pages may show this one in a frame.
+    """
+    around = " ".join(framed_by) or "'none'"
+    policy = f"default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors {around}; object-src 'none'"
+    # Beside some it could not be said who may: the newer header says it then, alone.
+    older = {} if framed_by else {"X-Frame-Options": "DENY"}
+    return {**HEADERS, "Content-Security-Policy": policy, **older}
+
 
 _Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
@@ -91,6 +102,7 @@ class ViewServer:
     ) -> None:
         self.address = self.url = ""
         self._settings = settings
+        self._headers = answer_headers(settings.framed_by)
         self._source = source
         self._studio = Studio(robot)
         self._shared = Hub(source(), self._studio) if is_shared else None
@@ -202,7 +214,7 @@ class ViewServer:
         except web.HTTPException as error:
             response = error
         if not response.prepared:
-            response.headers.update(HEADERS)
+            response.headers.update(self._headers)
             response.headers["Server"] = "RoboSC"
             # One request a connection: none can be held without asking for something.
             response.force_close()
@@ -244,7 +256,7 @@ class ViewServer:
 
     async def _serve(self, request: web.Request, hub: Hub) -> web.StreamResponse:
         page = web.WebSocketResponse(max_msg_size=MAXIMUM_BYTES, compress=False, heartbeat=PING_S, autoping=True)
-        page.headers.update(HEADERS)
+        page.headers.update(self._headers)
         await page.prepare(request)
         # Kept, since the request forgets it when the connection ends.
         transport = request.transport

@@ -18,6 +18,7 @@ class ViewSettings:
         address: `HOST:PORT`; port 0 picks a free one.
         security: The certificate.
         names: Further names by which browsers reach the server.
+        framed_by: Origins, or schemes with their colon, whose pages may show this one in a frame.
         scene: Name or file of a scene that the map shows; None: none.
         scene_seed: Of what the scene leaves to chance.
     """
@@ -25,6 +26,7 @@ class ViewSettings:
     address: str = ADDRESS
     security: ServerSecurity = field(default_factory=ServerSecurity)
     names: tuple[str, ...] = ()
+    framed_by: tuple[str, ...] = ()
     scene: str | None = None
     scene_seed: int = 0
 
@@ -44,4 +46,4 @@ def settings_of(configuration: Configuration) -> ViewSettings | None:
         key=None if view.tls_key is None else Path(view.tls_key),
         insecure_beyond_loopback=view.insecure_beyond_loopback,
     )
-    return ViewSettings(chosen, security, view.names, view.scene, view.scene_seed)
+    return ViewSettings(chosen, security, view.names, scene=view.scene, scene_seed=view.scene_seed)

@@ -18,7 +18,7 @@ from robosc_bridge.view import server as server_module
 from robosc_bridge.view.access import Access
 from robosc_bridge.view.page_files import FOLDER, TOKEN_PLACE, read_page
 from robosc_bridge.view.requests import MAXIMUM_BYTES
-from robosc_bridge.view.server import BURST, HEADERS, MAXIMUM_VIEWERS
+from robosc_bridge.view.server import BURST, MAXIMUM_VIEWERS, answer_headers
 from support.certificates import Authority
 from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed
 from support.pages_open import LIMIT_S, opened, token_of
@@ -67,7 +67,7 @@ def test_the_token_stands_only_in_the_page_that_was_opened_with_it(face: ViewFac
     status, text, headers = got(face.url, f"/?token={token}")
     assert status == 200
     assert TOKEN_PLACE.replace('""', f'"{token}"') in text
-    assert {name: headers[name] for name in HEADERS} == HEADERS
+    assert {name: headers[name] for name in answer_headers()} == answer_headers()
     assert "no-store" in headers["Cache-Control"]
     status, text, _ = got(face.url, "/")
     assert status == 200

@@ -2,7 +2,6 @@
 
 import argparse
 import asyncio
-import os
 import signal
 import subprocess
 import sys
@@ -18,18 +17,10 @@ from robosc_api.security import add_client_arguments
 from robosc_bridge.configuration import parse
 from robosc_bridge.daemon.faces import is_remote, is_startable
 from robosc_bridge.view import ADDRESS, command, settings_of
+from support.hostile_models import products
 from support.live import LiveRobot, large_model, supervisor_without_synthesis
 from support.pages_open import opened
-
-START = """
-import sys
-from robosc.cli.arguments import Parser
-from robosc_bridge.view import command
-parser = Parser(prog="robosc")
-command.add_parser(parser.add_subparsers())
-arguments = parser.parse_args(["view", *sys.argv[1:]])
-sys.exit(int(arguments.run(arguments)))
-"""
+from support.view_servers import process_of_view, view_process
 
 
 @pytest.fixture
@@ -53,23 +44,41 @@ def arguments(*words: str) -> argparse.Namespace:
 
 
 def test_a_log_is_served_until_a_signal_comes(files: tuple[Path, Path]) -> None:
-    model, log = map(str, files)
-    started = [sys.executable, "-c", START, "--log", log, "--model", model, "--address", "127.0.0.1:0"]
-    with subprocess.Popen(started, stdout=subprocess.PIPE, text=True, env=dict(os.environ)) as process:
-        try:
-            assert process.stdout is not None
-            url = process.stdout.readline().strip()
+    model, log = files
+    with view_process("--log", log, "--model", model) as (process, url):
 
-            async def look() -> None:
-                async with opened(url) as page:
-                    assert (await page.told("definition"))["log"]["count"] == 50
-                    assert (await page.told("update"))["enabled"]
+        async def look() -> None:
+            async with opened(url) as page:
+                assert (await page.told("definition"))["log"]["count"] == 50
+                assert (await page.told("update"))["enabled"]
 
-            asyncio.run(look())
-            process.send_signal(signal.SIGINT)
-            assert process.wait(20) == 0
-        finally:
-            process.kill()
+        asyncio.run(look())
+        process.send_signal(signal.SIGINT)
+        assert process.wait(20) == 0
+
+
+def test_it_ends_with_its_input_where_it_is_told_to(files: tuple[Path, Path]) -> None:
+    with view_process("--model", files[0], "--end-with-input") as (process, url):
+        assert process.stdin is not None
+        process.stdin.write("whatever")
+        process.stdin.flush()
+
+        async def look() -> None:
+            async with opened(url) as page:
+                await page.told("update")
+
+        asyncio.run(look())
+        process.stdin.close()
+        assert process.wait(20) == 0
+
+
+def test_it_ends_with_its_input_while_its_model_is_synthesized(tmp_path: Path) -> None:
+    model = tmp_path / "long.rscd"
+    model.write_text(products())
+    with process_of_view("--model", model, "--end-with-input") as process:
+        assert process.stdin is not None
+        process.stdin.close()
+        assert process.wait(60) == 0
 
 
 def test_wrong_use(files: tuple[Path, Path], tmp_path: Path) -> None:
@@ -80,6 +89,7 @@ def test_wrong_use(files: tuple[Path, Path], tmp_path: Path) -> None:
             command.run(arguments(*words))
         return str(error.value)
 
+    assert "what is shown?" in why()
     assert "needs --model" in why("--log", log)
     assert "tells its model itself" in why("--bridge", "127.0.0.1:1", "--model", model)
     assert "--ros2" in why("--bridge", "127.0.0.1:1", "--namespace", "x")
@@ -88,7 +98,7 @@ def test_wrong_use(files: tuple[Path, Path], tmp_path: Path) -> None:
     assert "line 1" in why("--log", model, "--model", model)
     assert "there is no scene" in why("--log", log, "--model", model, "--scene", "nowhere")
     assert "other machines" in why("--log", log, "--model", model, "--address", "0.0.0.0:0")
-    for words in ((), ("--ros2", "--bridge", "127.0.0.1:1"), ("--bridge", "x"), ("--ros2", "--address", "h:99999")):
+    for words in (("--ros2", "--bridge", "127.0.0.1:1"), ("--bridge", "x"), ("--ros2", "--address", "h:99999")):
         with pytest.raises(SystemExit):
             arguments(*words)
 

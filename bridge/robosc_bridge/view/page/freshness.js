@@ -57,6 +57,7 @@ export function startFreshness(connection) {
 
 function liveWord() {
   if (told.definition.source === "log") return "recorded";
+  if (told.definition.source === "model") return "initial state";
   if (told.update === null) return "connected";
   return told.definition.source === "ros2" && ageS() > OLD_S ? `live, last change ${ago(ageS())} ago` : "live";
 }

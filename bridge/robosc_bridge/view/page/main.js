@@ -115,3 +115,6 @@ connection = new Connection(`${location.protocol === "https:" ? "wss" : "ws"}://
 });
 lookAtFreshness();
 touch("stream", "map");
+
+// Whoever frames this page cannot see whether it has come.
+if (window.parent !== window) window.parent.postMessage("robosc-live-view", "*");

@@ -2,7 +2,7 @@
 
 import { announce } from "./announce.js";
 import { byId, make, mark, say, show } from "./dom.js";
-import { isReplay, told } from "./told.js";
+import { isModel, isReplay, told } from "./told.js";
 
 /** On the page, and before a graph in full size, which covers it. */
 const STOPS = ["stop", "large-stop"];
@@ -117,6 +117,7 @@ function flash() {
 
 function whyNoCommands(definition, canCommand, token) {
   if (definition === null) return "";
+  if (isModel()) return "A model alone, in its initial state: nothing is executed.";
   if (isReplay()) return "A recorded run: nothing here moves a robot.";
   if (!canCommand) return "This view only watches: it can neither stop nor command the robot.";
   return token ? "" : "Start, standby, resume and reset need the address with the token that the server printed. Stop works without.";

@@ -27,6 +27,9 @@ export const under = (object, name) => (Object.hasOwn(object, name) ? object[nam
 /** Whether a recorded run is shown. */
 export const isReplay = () => told.definition?.source === "log";
 
+/** Whether nothing is executed: a model in its initial state. */
+export const isModel = () => told.definition?.source === "model";
+
 /** How old the state is that is shown, in seconds. */
 export function ageS() {
   if (told.update === null) return 0;

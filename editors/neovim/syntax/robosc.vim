@@ -1,0 +1,27 @@
+" RoboSC: words, texts, numbers and comments. What a name stands for is told by the language server.
+if exists("b:current_syntax")
+  finish
+endif
+
+syntax case match
+syntax keyword roboscWord action always and array behaviour boolean cancel component constant datatype default
+syntax keyword roboscWord disables do double else enum error false feedback from goto if import incoming initial
+syntax keyword roboscWord integer interface library links marked message needs never none object on or outgoing
+syntax keyword roboscWord provide request requirement response robot service state string then to transition true
+syntax keyword roboscWord use value variable with
+" A word of the language as a name.
+syntax match roboscName "\^\h\w*"
+syntax match roboscNumber "\<\d\+\%(\.\d\+\)\?\>"
+syntax region roboscText start=+"+ skip=+\\.+ end=+"+
+syntax region roboscText start=+'+ skip=+\\.+ end=+'+
+syntax match roboscComment "//.*" contains=@Spell
+syntax region roboscComment start="/\*" end="\*/" contains=@Spell
+syntax sync fromstart
+
+highlight default link roboscWord Keyword
+highlight default link roboscName Identifier
+highlight default link roboscNumber Number
+highlight default link roboscText String
+highlight default link roboscComment Comment
+
+let b:current_syntax = "robosc"

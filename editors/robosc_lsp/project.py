@@ -1,0 +1,271 @@
+"""The files that an editor works on: what is open, what is saved, and what each robot consists of."""
+
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from lsprotocol import types as lsp
+from pygls.uris import from_fs_path, to_fs_path
+
+from robosc.editing.completion import Surroundings
+from robosc.editing.names import Names
+from robosc.editing.outline import Part, outline
+from robosc.errors import Diagnostic, LanguageError, Severity
+from robosc.language import load_bundle, parse, read_source, syntax
+from robosc.language.bundle import SUFFIX
+from robosc.language.interfaces import INTERFACE_KINDS, interface_folders
+from robosc.language.parser import Parsed
+from robosc.language.scan import declared_libraries
+from robosc.model.check import Checked, Inspected, inspect
+from robosc.source import Bundle, Location, SourceFile
+from robosc_lsp.texts import Text
+
+_MOST_FILES = 1_000
+"""Files of a folder that are looked through for who names something."""
+
+
+@dataclass(frozen=True, slots=True)
+class Analysis:
+    """What is known of a robot or library as it is in the editor.
+
+    Attributes:
+        uri: Of its file.
+        text: Of its file.
+        bundle: All its texts; None where they cannot be read together.
+        inspected: What they mean.
+        names: What their names mean.
+        whole: The parts of the file; None where nothing is sound.
+        uris: The URI of each file by its name in the bundle.
+    """
+
+    uri: str
+    text: Text
+    bundle: Bundle | None
+    inspected: Inspected
+    names: Names
+    whole: Part | None
+    uris: Mapping[str, str]
+
+    @property
+    def file(self) -> str:
+        """The file's name in the bundle."""
+        return "" if self.bundle is None else self.bundle.main.name
+
+    @property
+    def errors(self) -> int:
+        """How many errors it has."""
+        return sum(item.severity is Severity.ERROR for item in self.inspected.checked.diagnostics)
+
+
+class Project:
+    """Open texts over saved ones.
+
+    Args:
+        encoding: What the editor counts columns in.
+        folders: The folders that it works on.
+    """
+
+    def __init__(self, encoding: str, folders: Iterable[Path] = ()) -> None:
+        self.encoding = encoding
+        self.folders = list(folders)
+        self.library_paths: tuple[Path, ...] = ()
+        self.interface_paths = interface_folders()
+        self._open: dict[str, Text] = {}
+        self._by_path: dict[str, str] = {}
+        self._known: dict[str, Analysis] = {}
+        self._packages: dict[str, tuple[str, ...]] | None = None
+
+    @property
+    def open_uris(self) -> tuple[str, ...]:
+        """What is open."""
+        return tuple(self._open)
+
+    def open(self, uri: str, text: str) -> None:
+        """A file has been opened, or its text given anew."""
+        self._open[uri] = Text(text, self.encoding)
+        self._find_paths()
+        self.forget()
+
+    def edit(self, uri: str, changes: Iterable[lsp.TextDocumentContentChangeEvent]) -> None:
+        """An open file has been edited: what depends on it is looked at again, or all if it is another library now."""
+        before = self._open.get(uri, Text("", self.encoding))
+        self._open[uri] = before.edited(changes)
+        if declared_libraries(before.text) != declared_libraries(self._open[uri].text):
+            self.forget()
+        for other, analysis in list(self._known.items()):
+            if uri == other or uri in analysis.uris.values():
+                del self._known[other]
+
+    def close(self, uri: str) -> None:
+        """A file has been closed: what is saved counts."""
+        self._open.pop(uri, None)
+        self._find_paths()
+        self.forget()
+
+    def _find_paths(self) -> None:
+        # Two that are open may be one file; of the last one the text counts.
+        paths = ((path, uri) for uri in self._open if (path := _path(uri)) is not None)
+        self._by_path = {os.path.realpath(path): uri for path, uri in paths}
+
+    def with_edits(self, changes: Mapping[str, Iterable[lsp.TextEdit]]) -> "Project":
+        """What it would be like after some edits, of files that are there and that do not overlap."""
+        changed = Project(self.encoding, self.folders)
+        changed.library_paths, changed.interface_paths = self.library_paths, self.interface_paths
+        changed._open = dict(self._open)
+        changed._find_paths()
+        for uri, edits in changes.items():
+            text = self.text(uri)
+            if text is not None:
+                # From the end on: what comes before stays where it is.
+                last_first = sorted(edits, key=lambda edit: text.offset(edit.range.start), reverse=True)
+                changed.open(
+                    uri,
+                    text.edited(
+                        lsp.TextDocumentContentChangePartial(text=edit.new_text, range=edit.range)
+                        for edit in last_first
+                    ).text,
+                )
+        return changed
+
+    def forget(self) -> None:
+        """Something has changed: everything is looked at again when it is asked for."""
+        self._known.clear()
+
+    def text(self, uri: str) -> Text | None:
+        """A text, open or saved; None where there is none."""
+        if uri in self._open:
+            return self._open[uri]
+        path = _path(uri)
+        try:
+            # What is no file, such as a pipe, might never be read to its end.
+            return Text(read_source(path, path.name), self.encoding) if path is not None and path.is_file() else None
+        except (OSError, LanguageError):
+            return None
+
+    def analysis(self, uri: str) -> Analysis | None:
+        """What is known of a file; None where there is none."""
+        if uri not in self._known:
+            text = self.text(uri)
+            if text is None:
+                return None
+            self._known[uri] = self._analysed(uri, text)
+        return self._known[uri]
+
+    def analyses(self) -> Iterator[Analysis]:
+        """What is known of every file: the open ones, and those in the folders."""
+        seen = set[str]()
+        for uri in (*self._open, *self._saved()):
+            if uri not in seen:
+                seen.add(uri)
+                found = self.analysis(uri)
+                if found is not None:
+                    yield found
+
+    def surroundings(self, uri: str) -> Surroundings:
+        """What can be imported, and which ROS types there are."""
+        path = _path(uri)
+        libraries: dict[str, tuple[str, ...]] = {}
+        folders = () if path is None else (path.parent, path.parent.parent / "shared", *self.library_paths)
+        for folder in folders:
+            for file in self._models_in(folder):
+                text = self.text(self._uri(file))
+                for name, components in _libraries("" if text is None else text.text):
+                    libraries.setdefault(name, components)
+        return Surroundings(libraries, self._interfaces())
+
+    def unreadable(self) -> Iterator[Path]:
+        """The files around that are no texts."""
+        for uri in self._saved():
+            path = _path(uri)
+            if path is not None and uri not in self._open and path.is_file() and self.text(uri) is None:
+                yield path
+
+    def _models_in(self, folder: Path) -> list[Path]:
+        """The models and libraries of a folder, saved or open."""
+        here = Path(os.path.realpath(folder))
+        found = {path for path in map(Path, self._by_path) if path.parent == here}
+        if folder.is_dir():
+            found |= {Path(os.path.realpath(file)) for file in folder.glob(f"*{SUFFIX}")}
+        return sorted(found)
+
+    def _interfaces(self) -> Mapping[str, tuple[str, ...]]:
+        """The types of each ROS package that is installed; looked for once."""
+        if self._packages is None:
+            self._packages = {}
+            for folder in self.interface_paths:
+                for kind in INTERFACE_KINDS:
+                    for file in sorted(folder.glob(f"*/{kind}/*.{kind}")):
+                        package = file.parent.parent.name
+                        self._packages[package] = (*self._packages.get(package, ()), file.stem)
+        return self._packages
+
+    def _analysed(self, uri: str, text: Text) -> Analysis:
+        bundle, uris, faults = self._bundle(uri, text)
+        unread = Inspected(Checked(None, faults), Parsed(None, faults))
+        inspected = unread if bundle is None else inspect(bundle)
+        return Analysis(uri, text, bundle, inspected, Names(inspected), outline(inspected.parsed, text.text), uris)
+
+    def _bundle(self, uri: str, text: Text) -> tuple[Bundle | None, dict[str, str], tuple[Diagnostic, ...]]:
+        path = _path(uri)
+        if path is None:
+            main = SourceFile(uri.rpartition("/")[2] or "untitled", text.text)
+            return Bundle(main), {main.name: uri}, ()
+        unsaved = {real: self._open[other].text for real, other in self._by_path.items()}
+        if uri in self._open:
+            unsaved[os.path.realpath(path)] = text.text
+        try:
+            bundle = load_bundle(path, self.library_paths, self.interface_paths, unsaved)
+        except LanguageError as error:
+            return None, {}, error.diagnostics
+        except OSError:
+            return Bundle(SourceFile(path.name, text.text)), {path.name: uri}, ()
+        folder = Path(os.path.realpath(path)).parent
+        uris = {file.name: self._uri(folder / file.name) for file in bundle.libraries}
+        return bundle, {**uris, bundle.main.name: uri}, ()
+
+    def _uri(self, path: Path) -> str:
+        """The URI of a file: that which the editor has for it, if it is open."""
+        real = os.path.realpath(path)
+        return self._by_path.get(real) or from_fs_path(real) or ""
+
+    def _saved(self) -> Iterator[str]:
+        folders = list(self.folders)
+        for uri in self._open:
+            path = _path(uri)
+            if path is not None:
+                folders += [path.parent, path.parent.parent / "shared"]
+        count = 0
+        for folder in dict.fromkeys(folders):
+            for file in (
+                sorted(folder.rglob(f"*{SUFFIX}")) if folder in self.folders else sorted(folder.glob(f"*{SUFFIX}"))
+            ):
+                count += 1
+                if count > _MOST_FILES:
+                    return
+                yield self._uri(file)
+
+
+@lru_cache(maxsize=256)
+def _libraries(text: str) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """The library that a text is, if it is one, with the names of its components."""
+    tree = parse(SourceFile("", text)).sound if declared_libraries(text) else None
+    if tree is None or not tree.is_library:
+        return ()
+    return ((tree.name.text, tuple(item.name.text for item in tree.items if isinstance(item, syntax.Component))),)
+
+
+def _path(uri: str) -> Path | None:
+    """The path of a URI; None for what is no file."""
+    if not uri.startswith("file:"):
+        return None
+    found = to_fs_path(uri)
+    return Path(found) if found and "\0" not in found else None
+
+
+def place_of(analysis: Analysis, project: Project, location: Location) -> lsp.Location | None:
+    """Where a location is for the editor; None where its file is not to be had."""
+    uri = analysis.uris.get(location.file)
+    text = None if uri is None else project.text(uri)
+    return None if uri is None or text is None else lsp.Location(uri, text.range_of(location))

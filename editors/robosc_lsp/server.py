@@ -1,0 +1,644 @@
+"""The features of the language server.
+
+Everything is answered from what `Project` knows of the texts as they are this moment. Findings are told after each edit
+(after as long a pause as the last look took, so that typing is never behind); synthesis runs in a process beside, from
+half a second after the last edit until the next one.
+"""
+
+import asyncio
+import contextlib
+import logging
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from urllib.parse import unquote
+
+from lsprotocol import types as lsp
+from pygls.exceptions import JsonRpcInvalidParams
+from pygls.lsp.server import LanguageServer
+from pygls.protocol import LanguageServerProtocol, lsp_method
+from pygls.uris import to_fs_path
+
+from robosc import __version__
+from robosc.editing.completion import Candidate, complete
+from robosc.editing.definitions import Definition, DefinitionKind
+from robosc.editing.hover import holder_of, hover_text
+from robosc.editing.mends import mends
+from robosc.editing.outline import folds, parts
+from robosc.errors import Diagnostic, LanguageError, RelatedPlace, Severity
+from robosc.formatting import format_text
+from robosc.language.bundle import SUFFIX
+from robosc.language.words import spelled
+from robosc.source import Bundle, Location, SourceFile
+from robosc_lsp.convert import (
+    COMPLETIONS,
+    SYMBOLS,
+    TOKEN_MODIFIERS,
+    TOKEN_TYPES,
+    diagnostics,
+    semantic_tokens,
+    symbol,
+)
+from robosc_lsp.project import Analysis, Project, place_of
+from robosc_lsp.synthesis import Outcome, Turns, synthesized
+
+_LOG = logging.getLogger(__name__)
+
+_SYNTHESIS_PAUSE_S = 0.5
+_SYNTHESIS_LIMIT_S = 60.0
+_LONGEST_PAUSE_S = 1.0
+_MOST_SYMBOLS = 500
+_LONGEST_NAME = 255
+_TRIED_S = 0.3
+
+
+class _Protocol(LanguageServerProtocol):
+    """Texts are kept by `Project` alone: lines end elsewhere for pygls' own.
+
+    Handlers of notifications are plain functions: of others, which it would await, pygls keeps something for ever.
+    """
+
+    @lsp_method(lsp.TEXT_DOCUMENT_DID_OPEN)
+    def lsp_text_document__did_open(self, params: lsp.DidOpenTextDocumentParams) -> None:
+        self.fm.features[lsp.TEXT_DOCUMENT_DID_OPEN](params)
+
+    @lsp_method(lsp.TEXT_DOCUMENT_DID_CHANGE)
+    def lsp_text_document__did_change(self, params: lsp.DidChangeTextDocumentParams) -> None:
+        self.fm.features[lsp.TEXT_DOCUMENT_DID_CHANGE](params)
+
+    @lsp_method(lsp.TEXT_DOCUMENT_DID_CLOSE)
+    def lsp_text_document__did_close(self, params: lsp.DidCloseTextDocumentParams) -> None:
+        self.fm.features[lsp.TEXT_DOCUMENT_DID_CLOSE](params)
+
+
+class Server(LanguageServer):
+    """A server for one editor.
+
+    Args:
+        library_paths: Folders with libraries, beside those that the models' own places tell.
+        interface_paths: Folders with ROS packages, before those that the environment tells.
+        synthesis_s: Longest time of a synthesis beside; 0: there is none.
+    """
+
+    def __init__(
+        self,
+        library_paths: Sequence[Path] = (),
+        interface_paths: Sequence[Path] = (),
+        synthesis_s: float = _SYNTHESIS_LIMIT_S,
+    ) -> None:
+        super().__init__(
+            "robosc-lsp",
+            __version__,
+            text_document_sync_kind=lsp.TextDocumentSyncKind.Incremental,
+            protocol_cls=_Protocol,
+        )
+        self.project = Project(lsp.PositionEncodingKind.Utf16)
+        self._library_paths, self._interface_paths = tuple(library_paths), tuple(interface_paths)
+        self._synthesis_s = synthesis_s
+        self._versions: dict[str, int] = {}
+        self._outcomes: dict[str, tuple[str, Outcome]] = {}
+        self._look: asyncio.Task[None] | None = None
+        self._syntheses: dict[str, tuple[str, asyncio.Task[None]]] = {}
+        self._look_s = 0.0
+        self._turns = Turns()
+
+    # Texts
+
+    def begin(self, parameters: lsp.InitializeParams) -> None:
+        """The editor has told what it can and where it works."""
+        uris = [folder.uri for folder in parameters.workspace_folders or ()]
+        if not uris and parameters.root_uri:
+            uris = [parameters.root_uri]
+        paths = _paths(uris)
+        encoding = self.workspace.position_encoding or lsp.PositionEncodingKind.Utf16
+        self.project = Project(encoding, paths)
+        self.project.library_paths = self._library_paths
+        self.project.interface_paths = (*self._interface_paths, *self.project.interface_paths)
+
+    def work_in(self, added: Sequence[str], removed: Sequence[str]) -> None:
+        """The editor works in other folders now."""
+        gone = _paths(removed)
+        self.project.folders = [path for path in self.project.folders if path not in gone] + _paths(added)
+
+    def opened(self, document: lsp.TextDocumentItem) -> None:
+        """A file is shown."""
+        self._versions[document.uri] = document.version
+        self._turns.prefer(document.uri)
+        self.project.open(document.uri, document.text)
+        self.look_again()
+
+    def changed(
+        self,
+        document: lsp.VersionedTextDocumentIdentifier,
+        changes: Sequence[lsp.TextDocumentContentChangeEvent],
+    ) -> None:
+        """A file is edited: what is known of it is out of date."""
+        self._versions[document.uri] = document.version
+        self._turns.prefer(document.uri)
+        self._stop(document.uri)
+        self.project.edit(document.uri, changes)
+        self.look_again()
+
+    def closed(self, uri: str) -> None:
+        """A file is shown no more."""
+        self.project.close(uri)
+        self._versions.pop(uri, None)
+        self._outcomes.pop(uri, None)
+        self._turns.forget(uri)
+        self._stop(uri)
+        self.text_document_publish_diagnostics(lsp.PublishDiagnosticsParams(uri, []))
+        self.look_again()
+
+    def look_again(self) -> None:
+        """Tell before long what is found in the open files."""
+        if self._look is None or self._look.done():
+            self._look = asyncio.get_running_loop().create_task(self._look_at_all())
+
+    async def _look_at_all(self) -> None:
+        # As long as the last look took: edits that come meanwhile are looked at together.
+        await asyncio.sleep(min(self._look_s, _LONGEST_PAUSE_S))
+        begun_s = time.monotonic()
+        for uri in self.project.open_uris:
+            try:
+                analysis = self.project.analysis(uri)
+                if analysis is not None:
+                    self._tell(uri, analysis)
+                    self._begin_synthesis(uri, analysis)
+            except Exception:
+                # A fault of ours: the other files are to be looked at for all that.
+                _LOG.exception("%s could not be looked at", uri)
+        self._look_s = time.monotonic() - begun_s
+
+    def _tell(self, uri: str, analysis: Analysis) -> None:
+        items = diagnostics(analysis, self.project, self._findings(uri, analysis))
+        self.text_document_publish_diagnostics(
+            lsp.PublishDiagnosticsParams(uri, items, version=self._versions.get(uri))
+        )
+
+    def _findings(self, uri: str, analysis: Analysis) -> tuple[Diagnostic, ...]:
+        return (*analysis.inspected.checked.diagnostics, *self._from_synthesis(uri, analysis))
+
+    # Synthesis
+
+    def outcome(self, analysis: Analysis) -> Outcome | None:
+        """What synthesis has told of this very text; None: nothing yet."""
+        known = self._outcomes.get(analysis.uri)
+        if known is None or analysis.bundle is None or known[0] != analysis.bundle.digest:
+            return None
+        return known[1]
+
+    def _from_synthesis(self, uri: str, analysis: Analysis) -> tuple[Diagnostic, ...]:
+        found = self.outcome(analysis)
+        if found is None:
+            return ()
+        items = [
+            Diagnostic(
+                Severity(item.severity),
+                item.code,
+                item.message,
+                item.location,
+                item.mend,
+                tuple(RelatedPlace(*place) for place in item.related),
+            )
+            for item in found.findings
+        ]
+        if found.reason and analysis.whole is not None:
+            place = analysis.whole.definition.location
+            mend = "`robosc synth` tells what is to blame."
+            items.append(Diagnostic(Severity.WARNING, "no-supervisor", found.reason.rstrip("."), place, mend))
+        return tuple(items)
+
+    def _begin_synthesis(self, uri: str, analysis: Analysis) -> None:
+        bundle = analysis.bundle
+        if uri in self._syntheses and bundle is not None and self._syntheses[uri][0] == bundle.digest:
+            return
+        self._stop(uri)
+        if (
+            self._synthesis_s > 0
+            and bundle is not None
+            and analysis.inspected.checked.model is not None
+            and self.outcome(analysis) is None
+        ):
+            task = asyncio.get_running_loop().create_task(self._synthesize(uri, analysis, bundle))
+            self._syntheses[uri] = bundle.digest, task
+
+    def _stop(self, uri: str) -> None:
+        if uri in self._syntheses:
+            self._syntheses.pop(uri)[1].cancel()
+
+    async def _synthesize(self, uri: str, analysis: Analysis, bundle: Bundle) -> None:
+        await asyncio.sleep(_SYNTHESIS_PAUSE_S)
+        known = frozenset(item.code for item in analysis.inspected.checked.diagnostics)
+        async with self._turns.turn(uri):
+            self._outcomes[uri] = bundle.digest, await synthesized(bundle, known, self._synthesis_s)
+        self._tell(uri, analysis)
+        capabilities = self.client_capabilities.workspace
+        lens = capabilities.code_lens if capabilities is not None else None
+        if lens is not None and lens.refresh_support:
+            with contextlib.suppress(Exception):  # It is gone, or does not want to.
+                await self.workspace_code_lens_refresh_async(None)
+
+    async def watch(self) -> None:
+        """Ask the editor to tell of files that change beside it."""
+        capabilities = self.client_capabilities.workspace
+        watched = capabilities.did_change_watched_files if capabilities is not None else None
+        if watched is not None and watched.dynamic_registration:
+            options = lsp.DidChangeWatchedFilesRegistrationOptions([lsp.FileSystemWatcher(f"**/*{SUFFIX}")])
+            registration = lsp.Registration("watched-files", lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES, options)
+            await self.client_register_capability_async(lsp.RegistrationParams([registration]))
+
+    async def finish(self) -> None:
+        """End what goes on beside."""
+        for uri in tuple(self._syntheses):
+            self._stop(uri)
+        if self._look is not None:
+            self._look.cancel()
+
+    # Names
+
+    def named(self, uri: str, position: lsp.Position) -> tuple[Analysis, Location, Definition] | None:
+        """The name at a position; None: there is none that means something."""
+        analysis = self.project.analysis(uri)
+        if analysis is None:
+            return None
+        line, column = analysis.text.line_and_column(analysis.text.offset(position))
+        found = analysis.names.at(analysis.file, line, column)
+        return None if found is None else (analysis, *found)
+
+    def everywhere(self, analysis: Analysis, definition: Definition, *, declared: bool) -> list[lsp.Location]:
+        """Every place that names a definition, in whatever file."""
+        home = place_of(analysis, self.project, definition.location)
+        if home is None:
+            return []
+        found: dict[tuple[str, int, int], lsp.Location] = {}
+        for other in (analysis, *self.project.analyses()):
+            there = next(
+                (
+                    item
+                    for item in other.names.definitions.values()
+                    if item.name == definition.name
+                    and item.kind is definition.kind
+                    and place_of(other, self.project, item.location) == home
+                ),
+                None,
+            )
+            for use in other.names.uses(there) if there is not None else ():
+                place = place_of(other, self.project, use)
+                if place is not None:
+                    found[place.uri, place.range.start.line, place.range.start.character] = place
+        places = [found[key] for key in sorted(found)]
+        return [home, *places] if declared else places
+
+    def renamed(self, uri: str, position: lsp.Position, name: str) -> lsp.WorkspaceEdit | None:
+        """The edits that give a definition another name, in all files.
+
+        Raises:
+            JsonRpcInvalidParams: It is no name, or other names would mean something else afterwards.
+        """
+        found = self.named(uri, position)
+        if found is None:
+            return None
+        wanted = name.removeprefix("^")
+        if not (wanted.isascii() and wanted.isidentifier()) or len(wanted) > _LONGEST_NAME:
+            raise JsonRpcInvalidParams(f"'{name}' is no name: letters, digits and '_', not a digit first")
+        analysis, _, definition = found
+        self._see_all_uses(analysis, definition)
+        changes: dict[str, list[lsp.TextEdit]] = {}
+        for place in self.everywhere(analysis, definition, declared=True):
+            changes.setdefault(place.uri, []).append(lsp.TextEdit(place.range, spelled(wanted)))
+        changed = self.project.with_edits(changes)
+        for other in self.project.analyses():
+            if changes.keys() & set(other.uris.values()):
+                after = changed.analysis(other.uri)
+                if after is None or after.errors > other.errors or after.names.pattern() != other.names.pattern():
+                    raise JsonRpcInvalidParams(f"'{name}' means something else in {other.file} already")
+        return lsp.WorkspaceEdit(changes=changes)
+
+    def _see_all_uses(self, analysis: Analysis, definition: Definition) -> None:
+        """See to it that no use of a definition stays unseen.
+
+        Raises:
+            JsonRpcInvalidParams: Its name stands in what cannot be understood.
+        """
+        home = place_of(analysis, self.project, definition.location)
+        for other in (analysis, *self.project.analyses()):
+            if home is not None and home.uri in other.uris.values() and other.errors:
+                for place in other.names.not_understood(SourceFile(other.file, other.text.text), definition.name):
+                    line = other.text.range_of(place).start.line + 1
+                    raise JsonRpcInvalidParams(
+                        f"'{definition.name}' stands in line {line} of {other.file}, where errors hide what it means"
+                    )
+        for path in self.project.unreadable():
+            if definition.name.encode() in path.read_bytes():
+                raise JsonRpcInvalidParams(f"'{definition.name}' stands in {path.name}, which is not UTF-8")
+
+    def hover(self, uri: str, position: lsp.Position) -> lsp.Hover | None:
+        """What is told of the name at a position."""
+        found = self.named(uri, position)
+        if found is None:
+            return None
+        analysis, place, definition = found
+        outcome = self.outcome(analysis)
+        text = hover_text(
+            definition,
+            analysis.inspected,
+            self._declaration(analysis, definition),
+            self._holders(analysis, definition),
+            {} if outcome is None else outcome.added,
+        )
+        return lsp.Hover(lsp.MarkupContent(lsp.MarkupKind.Markdown, text), analysis.text.range_of(place))
+
+    def _declaration(self, analysis: Analysis, definition: Definition) -> str:
+        """The text of a definition; of one in another file, its line."""
+        if definition.location.file == analysis.file and analysis.whole is not None:
+            for part in parts(analysis.whole):
+                if part.definition.location == definition.location and part is not analysis.whole:
+                    return analysis.text.text[part.begin : part.end]
+            return analysis.text.text.split("\n")[definition.location.line - 1].strip()
+        file = analysis.bundle.file(definition.location.file) if analysis.bundle is not None else None
+        return "" if file is None else file.line(definition.location.line).strip()
+
+    def _holders(self, analysis: Analysis, definition: Definition) -> list[str]:
+        """What each use of a definition stands in: a part of this file, or another file."""
+        found = []
+        for use in analysis.names.uses(definition):
+            holder = (
+                holder_of(analysis.inspected.parsed, analysis.text.begin_of(use)) if use.file == analysis.file else ""
+            )
+            found.append(holder or use.file)
+        if analysis.whole is not None and analysis.whole.definition.kind is DefinitionKind.LIBRARY:
+            own = set(analysis.uris.values())
+            places = self.everywhere(analysis, definition, declared=False)
+            found += [unquote(place.uri.rpartition("/")[2]) for place in places if place.uri not in own]
+        return found
+
+    def completions(self, uri: str, position: lsp.Position) -> lsp.CompletionList:
+        """What can be written at a position."""
+        analysis = self.project.analysis(uri)
+        if analysis is None:
+            return lsp.CompletionList(is_incomplete=False, items=[])
+        offset = analysis.text.offset(position)
+        begin, found = complete(analysis.text.text, offset, analysis.inspected, lambda: self.project.surroundings(uri))
+        where = analysis.text.range(begin, offset)
+        items = [_completion(item, number, where) for number, item in enumerate(found)]
+        return lsp.CompletionList(is_incomplete=False, items=items)
+
+    def actions(self, uri: str, where: lsp.Range, kinds: Sequence[str] | None = None) -> list[lsp.CodeAction]:
+        """The mends of the findings in a range, as many as can be tried in a moment.
+
+        Args:
+            uri: Of the file.
+            where: The range.
+            kinds: The kinds of actions that are wanted; None: all.
+        """
+        analysis = self.project.analysis(uri)
+        if analysis is None or (kinds is not None and not {"", lsp.CodeActionKind.QuickFix.value} & set(kinds)):
+            return []
+        findings = self._findings(uri, analysis)
+        actions: list[lsp.CodeAction] = []
+        until_s = time.monotonic() + _TRIED_S
+        for item, shown in zip(findings, diagnostics(analysis, self.project, findings), strict=True):
+            if item.location is None or item.location.file != analysis.file or not _touch(shown.range, where):
+                continue
+            if time.monotonic() > until_s:
+                break
+            is_first = True
+            for mend in mends(item, analysis.text.line_of(item.location)):
+                edit = lsp.TextEdit(analysis.text.range_of(mend.location), mend.text)
+                if not self._is_mended(analysis, item, edit):
+                    continue
+                actions.append(
+                    lsp.CodeAction(
+                        mend.title,
+                        kind=lsp.CodeActionKind.QuickFix,
+                        diagnostics=[shown],
+                        is_preferred=is_first,
+                        edit=lsp.WorkspaceEdit(changes={uri: [edit]}),
+                    )
+                )
+                is_first = False
+        return actions
+
+    def _is_mended(self, analysis: Analysis, found: Diagnostic, edit: lsp.TextEdit) -> bool:
+        """Whether an edit takes a finding away, and brings no more than one for it."""
+        after = self.project.with_edits({analysis.uri: [edit]}).analysis(analysis.uri)
+        if after is None:
+            return False
+        # Behind errors of syntax others are not looked for: those that come into sight were there.
+        first, second = analysis.inspected.parsed.diagnostics, after.inspected.parsed.diagnostics
+        if not first and not second:
+            first, second = analysis.inspected.checked.diagnostics, after.inspected.checked.diagnostics
+        there = {(item.code, item.message, item.location) for item in second}
+        return len(second) <= len(first) and (found.code, found.message, found.location) not in there
+
+    def lenses(self, uri: str) -> list[lsp.CodeLens]:
+        """Over a robot: how many states it has under control, and to how many events the supervisor adds something."""
+        analysis = self.project.analysis(uri)
+        if analysis is None or analysis.whole is None:
+            return []
+        if analysis.whole.definition.kind is not DefinitionKind.ROBOT:
+            return []
+        outcome = self.outcome(analysis)
+        if outcome is None:
+            if analysis.inspected.checked.model is None:
+                return []
+            title = "synthesis goes on" if self._synthesis_s > 0 else "synthesis is switched off"
+        elif outcome.unknown:
+            title = outcome.unknown
+        elif outcome.reason:
+            title = "no supervisor"
+        else:
+            added = sum(condition != "true" for condition in outcome.added.values())
+            events = f"{added} event{'' if added == 1 else 's'}"
+            states = f"{outcome.states:,} state{'' if outcome.states == 1 else 's'}"
+            title = f"{states}, supervisor adds conditions to {events if added else 'no event'}"
+        where = analysis.text.range_of(analysis.whole.definition.location)
+        return [lsp.CodeLens(where, command=lsp.Command(title, ""))]
+
+
+def _paths(uris: Sequence[str]) -> list[Path]:
+    return [Path(path) for uri in uris if uri.startswith("file:") and (path := to_fs_path(uri))]
+
+
+def _touch(first: lsp.Range, second: lsp.Range) -> bool:
+    def key(position: lsp.Position) -> tuple[int, int]:
+        return position.line, position.character
+
+    return key(first.start) <= key(second.end) and key(second.start) <= key(first.end)
+
+
+def _completion(item: Candidate, number: int, where: lsp.Range) -> lsp.CompletionItem:
+    kind = lsp.CompletionItemKind.Keyword if item.kind is None else COMPLETIONS[item.kind]
+    return lsp.CompletionItem(
+        item.text,
+        kind=kind,
+        detail=item.detail or None,
+        preselect=item.is_wanted or None,
+        # In our order: what has the needed type comes first, words of the language last.
+        sort_text=f"{number:05}",
+        filter_text=item.text,
+        text_edit=lsp.TextEdit(where, item.text),
+    )
+
+
+def make_server(
+    library_paths: Sequence[Path] = (),
+    interface_paths: Sequence[Path] = (),
+    synthesis_s: float = _SYNTHESIS_LIMIT_S,
+) -> Server:
+    """A server with all its features; see `Server`."""
+    server = Server(library_paths, interface_paths, synthesis_s)
+    feature = server.feature
+
+    @feature(lsp.INITIALIZE)
+    def initialize(parameters: lsp.InitializeParams) -> None:
+        server.begin(parameters)
+
+    @feature(lsp.INITIALIZED)
+    async def initialized(_: lsp.InitializedParams) -> None:
+        await server.watch()
+
+    @feature(lsp.WORKSPACE_DID_CHANGE_WORKSPACE_FOLDERS)
+    def did_change_folders(parameters: lsp.DidChangeWorkspaceFoldersParams) -> None:
+        server.work_in(
+            [folder.uri for folder in parameters.event.added], [folder.uri for folder in parameters.event.removed]
+        )
+
+    @feature(lsp.SHUTDOWN)
+    async def shutdown(_: None) -> None:
+        await server.finish()
+
+    @feature(lsp.TEXT_DOCUMENT_DID_OPEN)
+    def did_open(parameters: lsp.DidOpenTextDocumentParams) -> None:
+        server.opened(parameters.text_document)
+
+    @feature(lsp.TEXT_DOCUMENT_DID_CHANGE)
+    def did_change(parameters: lsp.DidChangeTextDocumentParams) -> None:
+        server.changed(parameters.text_document, parameters.content_changes)
+
+    @feature(lsp.TEXT_DOCUMENT_DID_CLOSE)
+    def did_close(parameters: lsp.DidCloseTextDocumentParams) -> None:
+        server.closed(parameters.text_document.uri)
+
+    @feature(lsp.TEXT_DOCUMENT_DID_SAVE)
+    def did_save(_: lsp.DidSaveTextDocumentParams) -> None:
+        server.project.forget()
+        server.look_again()
+
+    @feature(lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES)
+    def did_change_files(_: lsp.DidChangeWatchedFilesParams) -> None:
+        server.project.forget()
+        server.look_again()
+
+    @feature(lsp.TEXT_DOCUMENT_HOVER)
+    def hover(parameters: lsp.HoverParams) -> lsp.Hover | None:
+        return server.hover(parameters.text_document.uri, parameters.position)
+
+    @feature(lsp.TEXT_DOCUMENT_COMPLETION, lsp.CompletionOptions(trigger_characters=[".", " ", ":", "{", ","]))
+    def completion(parameters: lsp.CompletionParams) -> lsp.CompletionList:
+        return server.completions(parameters.text_document.uri, parameters.position)
+
+    @feature(lsp.TEXT_DOCUMENT_DEFINITION)
+    def definition(parameters: lsp.DefinitionParams) -> lsp.Location | None:
+        found = server.named(parameters.text_document.uri, parameters.position)
+        return None if found is None else place_of(found[0], server.project, found[2].location)
+
+    @feature(lsp.TEXT_DOCUMENT_REFERENCES)
+    def references(parameters: lsp.ReferenceParams) -> list[lsp.Location]:
+        found = server.named(parameters.text_document.uri, parameters.position)
+        if found is None:
+            return []
+        return server.everywhere(found[0], found[2], declared=parameters.context.include_declaration)
+
+    @feature(lsp.TEXT_DOCUMENT_DOCUMENT_HIGHLIGHT)
+    def highlight(parameters: lsp.DocumentHighlightParams) -> list[lsp.DocumentHighlight]:
+        uri = parameters.text_document.uri
+        found = server.named(uri, parameters.position)
+        if found is None:
+            return []
+        analysis, _, definition = found
+        places = [definition.location, *analysis.names.uses(definition)]
+        return [lsp.DocumentHighlight(analysis.text.range_of(each)) for each in places if each.file == analysis.file]
+
+    @feature(lsp.TEXT_DOCUMENT_PREPARE_RENAME)
+    def prepare_rename(parameters: lsp.PrepareRenameParams) -> lsp.PrepareRenamePlaceholder | None:
+        found = server.named(parameters.text_document.uri, parameters.position)
+        if found is None:
+            return None
+        return lsp.PrepareRenamePlaceholder(found[0].text.range_of(found[1]), found[2].name)
+
+    @feature(lsp.TEXT_DOCUMENT_RENAME, lsp.RenameOptions(prepare_provider=True))
+    def rename(parameters: lsp.RenameParams) -> lsp.WorkspaceEdit | None:
+        return server.renamed(parameters.text_document.uri, parameters.position, parameters.new_name)
+
+    @feature(lsp.TEXT_DOCUMENT_DOCUMENT_SYMBOL)
+    def document_symbol(parameters: lsp.DocumentSymbolParams) -> list[lsp.DocumentSymbol]:
+        analysis = server.project.analysis(parameters.text_document.uri)
+        return [] if analysis is None or analysis.whole is None else [symbol(analysis.whole, analysis.text)]
+
+    @feature(lsp.WORKSPACE_SYMBOL)
+    def workspace_symbol(parameters: lsp.WorkspaceSymbolParams) -> list[lsp.WorkspaceSymbol]:
+        wanted = parameters.query.casefold()
+        found = []
+        for analysis in server.project.analyses():
+            for part in parts(analysis.whole) if analysis.whole is not None else ():
+                item = part.definition
+                if _is_in_order(wanted, item.name.casefold()):
+                    where = lsp.Location(analysis.uri, analysis.text.range_of(item.location))
+                    found.append(
+                        lsp.WorkspaceSymbol(where, item.name, SYMBOLS[item.kind], container_name=item.owner or None)
+                    )
+        return found[:_MOST_SYMBOLS]
+
+    @feature(
+        lsp.TEXT_DOCUMENT_SEMANTIC_TOKENS_FULL,
+        lsp.SemanticTokensLegend(list(TOKEN_TYPES), list(TOKEN_MODIFIERS)),
+    )
+    def tokens(parameters: lsp.SemanticTokensParams) -> lsp.SemanticTokens:
+        analysis = server.project.analysis(parameters.text_document.uri)
+        return lsp.SemanticTokens([] if analysis is None else semantic_tokens(analysis))
+
+    @feature(lsp.TEXT_DOCUMENT_FOLDING_RANGE)
+    def folding(parameters: lsp.FoldingRangeParams) -> list[lsp.FoldingRange]:
+        text = server.project.text(parameters.text_document.uri)
+        if text is None:
+            return []
+        found = []
+        for begin, end, is_comment in folds(text.text):
+            first, last = text.position(begin).line, text.position(end).line
+            kind = lsp.FoldingRangeKind.Comment if is_comment else lsp.FoldingRangeKind.Region
+            # The line of the closing brace stays in sight.
+            last -= not is_comment
+            if last > first:
+                found.append(lsp.FoldingRange(first, last, kind=kind))
+        return found
+
+    @feature(lsp.TEXT_DOCUMENT_FORMATTING)
+    def formatting(parameters: lsp.DocumentFormattingParams) -> list[lsp.TextEdit]:
+        text = server.project.text(parameters.text_document.uri)
+        if text is None:
+            return []
+        try:
+            formatted = format_text(text.text)
+        except LanguageError:
+            return []  # Its findings are shown.
+        return [] if formatted == text.text else [lsp.TextEdit(text.whole, formatted)]
+
+    @feature(lsp.TEXT_DOCUMENT_CODE_ACTION, lsp.CodeActionOptions(code_action_kinds=[lsp.CodeActionKind.QuickFix]))
+    def code_action(parameters: lsp.CodeActionParams) -> list[lsp.CodeAction]:
+        return server.actions(parameters.text_document.uri, parameters.range, parameters.context.only)
+
+    @feature(lsp.TEXT_DOCUMENT_CODE_LENS)
+    def code_lens(parameters: lsp.CodeLensParams) -> list[lsp.CodeLens]:
+        return server.lenses(parameters.text_document.uri)
+
+    return server
+
+
+def _is_in_order(wanted: str, name: str) -> bool:
+    """Whether a name has the characters that are wanted, in their order."""
+    rest = iter(name)
+    return all(character in rest for character in wanted)
+
+
+__all__ = ["Server", "make_server"]

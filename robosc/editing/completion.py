@@ -1,0 +1,404 @@
+"""What can be written at a place of a text, also of one that is broken elsewhere."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from robosc.editing.definitions import DefinitionKind
+from robosc.editing.place import Place, name_of, place_at
+from robosc.expressions import ArrayType, EnumType, ObjectType, Type, type_text
+from robosc.language import parse
+from robosc.language.words import RESERVED_WORDS, spelled
+from robosc.model.check import Inspected
+from robosc.model.scope import ComponentNames, Scope
+from robosc.model.structure import EVENT_KINDS, Communication, CommunicationKind, EventKind
+from robosc.source import SourceFile
+
+_TYPES = ("boolean", "integer", "double", "string", "none", "array")
+_FUNCTIONS = ("abs", "all", "any", "clamp", "double", "integer", "length", "max", "min")
+_OPERATORS = ("and", "or")
+_KEYS = frozenset("identifier type request response feedback qos depth max_age stamped when".split())
+_KINDS = {
+    CommunicationKind.INCOMING_MESSAGE: DefinitionKind.INCOMING,
+    CommunicationKind.OUTGOING_MESSAGE: DefinitionKind.OUTGOING,
+    CommunicationKind.SERVICE: DefinitionKind.SERVICE,
+    CommunicationKind.ACTION: DefinitionKind.ACTION,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """Something that can be written.
+
+    Attributes:
+        text: What is written.
+        kind: What it is; None: a word of the language.
+        detail: Its type or the like; may be empty.
+        is_wanted: Whether it has the very type that is needed there.
+    """
+
+    text: str
+    kind: DefinitionKind | None = None
+    detail: str = ""
+    is_wanted: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What there is around a text.
+
+    Attributes:
+        libraries: The components of each library that can be imported from, by its name.
+        interfaces: The types of each ROS package, by its name.
+    """
+
+    libraries: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    interfaces: Mapping[str, Sequence[str]] = field(default_factory=dict)
+
+
+def complete(
+    text: str,
+    offset: int,
+    inspected: Inspected,
+    surroundings: Callable[[], Surroundings] = Surroundings,
+) -> tuple[int, tuple[Candidate, ...]]:
+    """What can be written at a place, in the order of the kinds of things.
+
+    Args:
+        text: The text of the main file.
+        offset: Of the cursor.
+        inspected: What is known of the text, or of an earlier state of it.
+        surroundings: Tells what there is around it; asked only where that matters, since it may have to look.
+
+    Returns:
+        The offset where the word begins that is being typed, and what it can become.
+    """
+    place = place_at(text, offset)
+    if place is None:
+        return offset, ()
+    expected = parse(SourceFile("", text[: place.begin])).expected if place.begin else ("'robot'", "'library'")
+    if not text[: place.begin].strip():
+        expected = ("'robot'", "'library'")
+    if place.item in (("requirement", "always"), ("requirement", "never")):
+        # They may be names of communications, too, and were taken for such.
+        expected = (*expected, "an expression")
+    found = [*_Names(place, inspected, surroundings).candidates(expected), *_words(place, expected)]
+    chosen: dict[str, Candidate] = {}
+    for item in found:
+        chosen.setdefault(item.text, item)
+    return place.begin, tuple(chosen.values())
+
+
+def _words(place: Place, expected: Iterable[str]) -> Iterator[Candidate]:
+    """The words of the language that fit."""
+    words: list[str] = []
+    for item in expected:
+        if item == "an operator":
+            words += _OPERATORS
+        elif item == "a type":
+            words += _TYPES
+        elif item == "an expression":
+            words += ("true", "false", "if")
+        elif item.startswith("'") and item[1:-1].isidentifier():
+            words.append(item[1:-1])
+    if place.last() == "requirement":
+        words += ("always", "never")
+    if "an expression" in expected:
+        words += _FUNCTIONS
+    for word in words:
+        is_key = word in _KEYS and place.item[:1] != ("on",) and "with" in place.item
+        yield Candidate(f"{word}:" if is_key else word)
+
+
+class _Names:
+    """The names that fit at a place."""
+
+    def __init__(self, place: Place, inspected: Inspected, surroundings: Callable[[], Surroundings]) -> None:
+        self._place = place
+        self._inspected = inspected
+        self._surroundings = surroundings
+        part = next((part for part in inspected.parts if part.name == place.component), None)
+        self._scope: Scope | None = None
+        if inspected.scopes is not None and inspected.units:
+            scopes = inspected.scopes
+            self._scope = scopes.of(inspected.units[0]) if part is None else scopes.inside(part)
+
+    def candidates(self, expected: Sequence[str]) -> Iterator[Candidate]:
+        """They, the likeliest first."""
+        place = self._place
+        if not {"a name", "an expression", "a type"} & set(expected):
+            return
+        last = place.last()
+        if last == ".":
+            yield from self._members()
+        elif last == "goto":
+            yield from self._states(self._own)
+        elif last in ("from", "to") and place.last(3) == "on":
+            yield from self._communications(EventKind(place.last(2)) if place.last(2) in EventKind else None)
+        elif last == "links":
+            yield from (Candidate(spelled(name), DefinitionKind.INTERFACE) for name in self._unit("interfaces"))
+        elif place.item[:1] == ("component",) and last in ("component", "from", "import"):
+            yield from self._imported(last)
+        elif place.item[:1] == ("interface",) and last in ("use", "from"):
+            yield from self._interfaces(last)
+        elif "a type" in expected:
+            yield from self._types()
+        elif self._is_communication_wanted():
+            yield from self._restrictable()
+            if last == "requirement":
+                yield from self._values(None)
+        elif self._is_property_wanted():
+            yield from self._properties(self._provided())
+        elif self._is_target_wanted():
+            yield from self._variables(self._own)
+        elif last == "in" or "an expression" in expected or "'true'" in expected:
+            yield from self._values(self._wanted())
+
+    # Where it is
+
+    def _is_communication_wanted(self) -> bool:
+        item = self._place.item
+        if item in (("requirement",), ("provide",)) or item[-1:] == ("disables",):
+            return True
+        # Behind `requirement {` the item of the brace is the requirement itself.
+        opened = self._place.open[-1:] and self._place.open[-1]
+        return bool(opened) and (opened == ("requirement",) or opened[-1:] == ("disables",))
+
+    def _is_property_wanted(self) -> bool:
+        item = self._place.item
+        # A comma between brackets parts arguments.
+        is_whole = item.count("(") == item.count(")") and item.count("[") == item.count("]")
+        return self._is_in_value() and is_whole and self._place.last() in ("{", ",")
+
+    def _is_in_value(self) -> bool:
+        return any(item[:1] == ("provide",) for item in self._place.open)
+
+    def _is_target_wanted(self) -> bool:
+        item = self._place.item
+        if item[:1] != ("on",) or "do" not in item:
+            return False
+        updates = item[item.index("do") + 1 :]
+        return self._place.last() in ("do", ",") and updates.count("(") == updates.count(")")
+
+    # What there is
+
+    @property
+    def _own(self) -> ComponentNames | None:
+        return self._scope.own if self._scope is not None else None
+
+    def _unit(self, what: str) -> Iterable[str]:
+        return getattr(self._inspected.units[0], what) if self._inspected.units else ()
+
+    def _states(self, component: ComponentNames | None) -> Iterator[Candidate]:
+        if component is not None:
+            for name in sorted(component.states):
+                yield Candidate(spelled(name), DefinitionKind.STATE, f"state of {component.name}")
+
+    def _variables(self, component: ComponentNames | None) -> Iterator[Candidate]:
+        if component is not None:
+            for name, type_ in component.variables.items():
+                yield Candidate(spelled(name), DefinitionKind.VARIABLE, _shown(type_))
+
+    def _communications(self, kind: EventKind | None) -> Iterator[Candidate]:
+        for item in self._inspected.communications.values():
+            if kind is None or kind in EVENT_KINDS[item.kind]:
+                yield _communication(item)
+
+    def _restrictable(self) -> Iterator[Candidate]:
+        for item in self._inspected.communications.values():
+            if item.kind is not CommunicationKind.OUTGOING_MESSAGE:
+                yield _communication(item)
+
+    def _types(self) -> Iterator[Candidate]:
+        for unit in self._inspected.units[:1]:
+            for name, tree in unit.types.items():
+                is_object = type(tree).__name__ == "ObjectDefinition"
+                yield Candidate(spelled(name), DefinitionKind.OBJECT if is_object else DefinitionKind.ENUM)
+
+    def _imported(self, last: str) -> Iterator[Candidate]:
+        libraries = self._surroundings().libraries
+        if last == "from":
+            yield from (Candidate(spelled(name), DefinitionKind.LIBRARY) for name in sorted(libraries))
+            return
+        # A component that is imported has the name that it has there, more often than not.
+        chosen = libraries if last == "component" else (name_of(self._place.last(2)),)
+        for library in chosen:
+            for name in libraries.get(library, ()):
+                yield Candidate(spelled(name), DefinitionKind.COMPONENT, f"component of {library}")
+
+    def _interfaces(self, last: str) -> Iterator[Candidate]:
+        packages = self._surroundings().interfaces
+        if last == "from":
+            having = [name for name, types in packages.items() if name_of(self._place.last(2)) in types]
+            for name in sorted(having or packages):
+                yield Candidate(spelled(name), DefinitionKind.LIBRARY, "ROS package")
+        else:
+            homes: dict[str, list[str]] = {}
+            for package, types in packages.items():
+                for name in types:
+                    homes.setdefault(name, []).append(package)
+            for name in sorted(homes):
+                yield Candidate(spelled(name), DefinitionKind.INTERFACE, ", ".join(sorted(homes[name])))
+
+    def _values(self, wanted: Type | None) -> Iterator[Candidate]:
+        """What an expression can begin with."""
+        scope = self._scope
+        if scope is None:
+            return
+        if isinstance(wanted, EnumType):
+            for name in wanted.values:
+                yield Candidate(spelled(name), DefinitionKind.ENUM_VALUE, wanted.name, is_wanted=True)
+        for name in _elements(self._place.before):
+            yield Candidate(spelled(name), DefinitionKind.ELEMENT)
+        if self._received() is not None:
+            yield Candidate("value", None, _shown(self._received()))
+        yield from self._variables(scope.own)
+        for name in scope.components:
+            yield Candidate(spelled(name), DefinitionKind.COMPONENT)
+        for name, typed in scope.constants.items():
+            yield Candidate(spelled(name), DefinitionKind.CONSTANT, _shown(typed.type if typed else None))
+        for name in scope.enums:
+            yield Candidate(spelled(name), DefinitionKind.ENUM)
+        for enum in dict.fromkeys(scope.enums.values()):
+            for name in enum.values:
+                yield Candidate(spelled(name), DefinitionKind.ENUM_VALUE, enum.name)
+
+    def _members(self) -> Iterator[Candidate]:
+        """What can stand behind a point."""
+        chain = _chain(self._place.before[:-1])
+        scope = self._scope
+        if not chain or scope is None:
+            return
+        if len(chain) == 1 and chain[0] in scope.components:
+            yield from self._states(scope.components[chain[0]])
+            yield from self._variables(scope.components[chain[0]])
+        elif len(chain) == 1 and chain[0] in scope.enums:
+            for name in scope.enums[chain[0]].values:
+                yield Candidate(spelled(name), DefinitionKind.ENUM_VALUE, scope.enums[chain[0]].name)
+        else:
+            yield from self._properties(self._type_of(chain))
+
+    def _properties(self, type_: Type | None) -> Iterator[Candidate]:
+        if self._scope is None or not isinstance(type_, ObjectType):
+            return
+        for name in self._scope.types.property_names(type_):
+            shown = _shown(self._scope.types.property_type(type_, name))
+            is_key = self._is_property_wanted()
+            yield Candidate(f"{spelled(name)}:" if is_key else spelled(name), DefinitionKind.PROPERTY, shown)
+
+    # Types
+
+    def _type_of(self, chain: Sequence[str]) -> Type | None:
+        """The type of an access; `[` stands for an index."""
+        scope = self._scope
+        if scope is None or not chain:
+            return None
+        first, *rest = chain
+        if first == "value":
+            return self._below(self._received(), rest)
+        if rest and first in scope.components:
+            return scope.components[first].variables.get(rest[0])
+        if scope.own is not None and first in scope.own.variables:
+            return scope.own.variables[first]
+        return None
+
+    def _below(self, type_: Type | None, steps: Iterable[str]) -> Type | None:
+        for step in steps:
+            if type_ is None or self._scope is None:
+                return None
+            if step == "[":
+                type_ = type_.element if isinstance(type_, ArrayType) else None
+            else:
+                type_ = self._scope.types.property_type(type_, step)
+        return type_
+
+    def _received(self) -> Type | None:
+        """The type of `value` here."""
+        place = self._place
+        for item in reversed(place.open):
+            if item[:2] == ("datatype", "enum") and len(item) > 2 and self._scope is not None:
+                return self._scope.types.sources.get(self._inspected.units[0].type_name(name_of(item[2])))
+        item = place.item
+        if len(item) > 3 and item[0] == "on" and item[1] in EventKind:
+            communication = self._inspected.communications.get(name_of(item[3]))
+            if communication is not None and item[1] in EVENT_KINDS[communication.kind]:
+                return communication.received_type(EventKind(item[1]))
+        if item[:2] == ("incoming", "message") and len(item) > 2:
+            communication = self._inspected.communications.get(name_of(item[2]))
+            return None if communication is None else communication.request
+        return None
+
+    def _wanted(self) -> Type | None:
+        """The type that is needed, as far as what stands before tells it."""
+        place = self._place
+        if place.last() in ("=", "!="):
+            if place.item[:1] in (("variable",), ("constant",)):
+                return self._declared(place.item)
+            return self._type_of(_chain(place.before[:-1]))
+        if place.last() == ":=":
+            return self._type_of(_chain(place.before[:-1])[-1:])
+        if place.last() == ":" and self._is_in_value():
+            return self._below(self._provided(), [name_of(place.last(2))])
+        if place.last() == "with" and place.item[:1] == ("provide",):
+            return self._request(place.item)
+        return None
+
+    def _declared(self, item: Sequence[str]) -> Type | None:
+        """The type of a variable or constant whose value is missing still: nothing but its words tells it."""
+        name = name_of(item[3]) if len(item) > 3 and item[2] == ":" else ""
+        return None if self._scope is None else self._scope.enums.get(name)
+
+    def _provided(self) -> Type | None:
+        """The type of the object value that is open."""
+        opened = self._place.open
+        start = next(index for index, item in enumerate(opened) if item[:1] == ("provide",))
+        type_ = self._request(opened[start])
+        # Each further brace stands behind `property:`.
+        return self._below(type_, [name_of(item[-2]) for item in opened[start + 1 :] if len(item) > 1])
+
+    def _request(self, item: Sequence[str]) -> Type | None:
+        communication = self._inspected.communications.get(name_of(item[1])) if len(item) > 1 else None
+        type_ = None if communication is None else communication.request
+        if isinstance(type_, EnumType) and self._scope is not None:
+            # What is sent is of the type that the enum is made from.
+            return self._scope.types.sources.get(type_.name)
+        return type_
+
+
+def _chain(tokens: Sequence[str]) -> list[str]:
+    """The access that some tokens end with; `[` stands for an index."""
+    found: list[str] = []
+    index = len(tokens) - 1
+    while index >= 0:
+        if tokens[index] == "]":
+            while index > 0 and tokens[index] != "[":
+                index -= 1
+            found.append("[")
+            index -= 1
+            continue
+        if not name_of(tokens[index]).isidentifier() or (tokens[index] in RESERVED_WORDS and tokens[index] != "value"):
+            return []
+        found.append(name_of(tokens[index]))
+        if index == 0 or tokens[index - 1] != ".":
+            break
+        index -= 2
+    return found[::-1]
+
+
+def _elements(tokens: Sequence[str]) -> list[str]:
+    """What `all` and `any` that are open name the elements, the innermost first."""
+    opened: list[int] = []
+    for index, token in enumerate(tokens):
+        if token == "(":
+            opened.append(index)
+        elif token == ")" and opened:
+            opened.pop()
+    starts = [index for index in reversed(opened) if index and tokens[index - 1] in ("all", "any")]
+    return [name_of(tokens[index + 1]) for index in starts if tokens[index + 2 : index + 3] == ("in",)]
+
+
+def _communication(item: Communication) -> Candidate:
+    return Candidate(spelled(item.name), _KINDS[item.kind], f"{item.kind} of {item.component}")
+
+
+def _shown(type_: Type | None) -> str:
+    return "" if type_ is None else type_text(type_)

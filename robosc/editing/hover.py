@@ -1,0 +1,103 @@
+"""What can be told of a name: its declaration, who uses it, the plant that it becomes, what the supervisor adds."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+from robosc.automata.plants import communication_plant
+from robosc.automata.structure import Automaton
+from robosc.editing.definitions import COMMUNICATIONS, Definition, DefinitionKind
+from robosc.language import Parsed, syntax
+from robosc.model.check import Inspected
+
+_LONGEST = 12
+"""Lines of a declaration that are shown."""
+
+_MOST_PLACES = 8
+
+
+def hover_text(
+    definition: Definition,
+    inspected: Inspected,
+    declaration: str,
+    holders: Sequence[str],
+    added: Mapping[str, str],
+) -> str:
+    """What is told of a definition, in Markdown.
+
+    Args:
+        definition: Of the name.
+        inspected: What is known of it.
+        declaration: The text of the definition.
+        holders: What each use stands in.
+        added: For each controllable event what the supervisor adds, in words; empty while it is not known.
+    """
+    lines = declaration.splitlines()
+    shown = lines if len(lines) <= _LONGEST else [*lines[: _LONGEST - 1], "..."]
+    paragraphs = ["\n".join(("```robosc", *shown, "```"))]
+    owner = f" of `{definition.owner}`" if definition.owner else ""
+    paragraphs.append(f"{definition.kind}{owner}")
+    paragraphs.append(_used(holders))
+    if definition.kind in COMMUNICATIONS:
+        communication = inspected.communications.get(definition.name)
+        if communication is not None:
+            paragraphs.append(f"plant `{communication_plant(communication).name}`")
+            paragraphs.append(_arcs(communication_plant(communication)))
+            paragraphs += _added(communication.events, added)
+    elif definition.kind is DefinitionKind.COMPONENT:
+        paragraphs += _component(definition, inspected)
+    return "\n\n".join(part for part in paragraphs if part)
+
+
+def _used(holders: Sequence[str]) -> str:
+    if not holders:
+        return "not used"
+    told = [f"{holder} ({count} times)" if count > 1 else holder for holder, count in Counter(holders).items()]
+    more = [f"{len(told) - _MOST_PLACES} more"] if len(told) > _MOST_PLACES else []
+    return "used by " + ", ".join([*told[:_MOST_PLACES], *more])
+
+
+def _arcs(automaton: Automaton) -> str:
+    return "\n".join(f"- {edge.source} -- `{edge.event}` --> {edge.target}" for edge in automaton.edges)
+
+
+def _added(events: Iterable[str], added: Mapping[str, str]) -> Iterator[str]:
+    for event in events:
+        condition = added.get(event)
+        if condition == "true":
+            yield f"the supervisor adds nothing to `{event}`"
+        elif condition is not None:
+            yield f"the supervisor adds to `{event}`: `{condition}`"
+
+
+def _component(definition: Definition, inspected: Inspected) -> Iterator[str]:
+    model = inspected.checked.model
+    if model is None:
+        return
+    found = next((item for item in model.components if item.name == definition.name), None)
+    if found is not None and found.behaviour is not None:
+        behaviour = found.behaviour
+        counts = (
+            (len(behaviour.states), "state"),
+            (len(behaviour.variables), "variable"),
+            (len(behaviour.transitions), "transition"),
+        )
+        yield "plant: " + ", ".join(f"{number} {word}{'' if number == 1 else 's'}" for number, word in counts)
+
+
+def holder_of(parsed: Parsed, offset: int) -> str:
+    """The component, requirement or the like that an offset stands in, in words; empty where that is none."""
+    # Items of lists stand one in the other, inner ones first: the last is of the file.
+    item = next((item for item, begin, end in reversed(parsed.extents) if begin <= offset < end), None)
+    match item:
+        case syntax.Requirement() | syntax.Invariant():
+            return f"requirement (line {item.location.line})"
+        case syntax.Provide():
+            return f"provide (line {item.location.line})"
+        case syntax.Component():
+            return f"component `{item.name.text}`"
+        case syntax.ObjectDefinition() | syntax.EnumDefinition():
+            return f"datatype `{item.name.text}`"
+        case syntax.Constant():
+            return f"constant `{item.name.text}`"
+        case _:
+            return ""

@@ -1,0 +1,120 @@
+"""Mends that can be made by a machine: the same that findings tell in words."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from robosc.errors import Diagnostic
+from robosc.source import Location
+
+_WRITE = re.compile(r"Write '([^']+)'\.")
+_WORDS = {"&": "and", "|": "or"}
+_PREPOSITIONS = {"request": "to"}
+_RANGE = re.compile(r"(integer\s*\()([^.]+?)(\s*\.\.\s*)([^.]+?)(\s*\))")
+
+
+@dataclass(frozen=True, slots=True)
+class Mend:
+    """One change of a text.
+
+    Attributes:
+        title: What it does, as an instruction.
+        location: What is replaced.
+        text: What stands there then.
+    """
+
+    title: str
+    location: Location
+    text: str
+
+
+def mends(found: Diagnostic, line: str) -> tuple[Mend, ...]:
+    """The changes that would mend a finding, the likeliest first; empty where a person has to think.
+
+    Args:
+        found: What was found.
+        line: The line of the text that it is in.
+    """
+    return () if found.location is None else tuple(_Line(found.location, line).mends(found))
+
+
+class _Line:
+    """The line of a finding: what it covers there, and what stands before it."""
+
+    def __init__(self, location: Location, line: str) -> None:
+        self._location = location
+        self._line = line
+        self._begin = location.column - 1
+        self._end = min(self._begin + location.length, len(line))
+        self._covered = line[self._begin : self._end]
+        self._before = line[: self._begin]
+
+    def mends(self, found: Diagnostic) -> Iterator[Mend]:
+        match found.code:
+            case "unknown-name":
+                for name in _WRITE.findall(found.mend):
+                    yield self._written(name)
+            case "ambiguous-name":
+                for name in re.findall(r"'([^']+\.[^']+)'", found.mend):
+                    yield self._written(name)
+            case "wrong-preposition":
+                for right in re.findall(r"goes with '(from|to)'", found.message):
+                    yield self._written(right)
+            case "wrong-result-kind":
+                yield from self._other_results(found.mend)
+            case "type-mismatch":
+                yield from self._types(found.mend)
+            case "syntax-error":
+                yield from self._syntax(found.mend)
+
+    def _written(self, text: str) -> Mend:
+        return Mend(f"Write '{text}'", self._location, text)
+
+    def _changed(self, title: str, begin: int, end: int, text: str) -> Iterator[Mend]:
+        """Another text for a stretch of the line, which may not be empty."""
+        if end > begin:
+            yield Mend(title, Location(self._location.file, self._location.line, begin + 1, end - begin), text)
+
+    def _other_results(self, mend: str) -> Iterator[Mend]:
+        """`on response from x`, of what has no response."""
+        given = re.match(r"(on\s+)\w+(\s+)\w+\b(.*)", self._covered)
+        if given is None:
+            return
+        for kind in re.findall(r"\w+", mend.removeprefix("Use ")):
+            right = f"{kind}{given[2]}{_PREPOSITIONS.get(kind, 'from')}"
+            yield Mend(f"Write 'on {kind}'", self._location, f"{given[1]}{right}{given[3]}")
+
+    def _types(self, mend: str) -> Iterator[Mend]:
+        if mend == "Write the smaller bound first.":
+            bounds = _RANGE.fullmatch(self._covered)
+            if bounds is not None:
+                opening, first, points, second, closing = bounds.groups()
+                yield self._written(f"{opening}{second}{points}{first}{closing}")
+        elif mend in ("Remove the property: only objects have properties.", "Remove what follows the name."):
+            point = re.search(r"\s*\.\s*\Z", self._before)
+            if point is not None:
+                yield from self._changed(f"Remove '.{self._covered}'", point.start(), self._end, "")
+
+    def _syntax(self, mend: str) -> Iterator[Mend]:
+        token = self._covered
+        if token in _WORDS:
+            end = self._end + self._line[self._end : self._end + 1].count(token)
+            # Signs need no blanks around them, words do.
+            left = " " * self._before[-1:].isidentifier()
+            right = " " * bool(re.match(r"\w", self._line[end : end + 1]))
+            yield from self._changed(f"Write '{_WORDS[token]}'", self._begin, end, f"{left}{_WORDS[token]}{right}")
+        elif mend == "Write '!' for 'not'.":
+            word = re.search(r"\bnot\s*\Z", self._before)
+            if word is not None:
+                yield from self._changed("Write '!'", word.start(), self._begin, "!")
+        elif mend.startswith(("Remove ", "Write '=' once")):
+            yield from self._changed(f"Remove '{token}'", self._begin, self._end, "")
+        elif mend.startswith("Write 'incoming message' or"):
+            yield from (self._written(f"{direction} {token}") for direction in ("incoming", "outgoing"))
+        elif meant := re.fullmatch(r"(?:If '.*' is meant as a name, write|Did you mean) '([^']+)'[.?]", mend):
+            yield self._written(meant[1])
+        elif missing := re.match(r"Write '([^']+)' before it, or", mend):
+            yield from self._changed(f"Write '{missing[1]}' before it", self._begin, self._end, f"{missing[1]} {token}")
+
+
+__all__ = ["Mend", "mends"]

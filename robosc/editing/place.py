@@ -1,0 +1,88 @@
+"""Where in a text somebody types: what is open there, and what came before."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from robosc.language.tokens import Kind, tokenize
+
+_ITEMS = frozenset(
+    """
+    component datatype interface constant requirement provide incoming outgoing service action behaviour variable
+    initial marked state on transition
+    """.split()
+)
+"""Words that begin an item of a list."""
+
+_CLOSED = re.compile(r"/\*.*?\*/|//[^\n]*\n", re.DOTALL)
+"""Comments that have ended."""
+
+_NAMED = frozenset({Kind.NAME, Kind.WORD})
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A place in a text where a word is being typed.
+
+    Attributes:
+        begin: Offset at which the word begins.
+        before: The tokens before it.
+        open: For each brace that is open, the tokens of the item that it belongs to, the outermost first.
+        item: The tokens from the begin of the innermost unfinished item.
+    """
+
+    begin: int
+    before: Sequence[str]
+    open: tuple[tuple[str, ...], ...] = ()
+    item: tuple[str, ...] = ()
+
+    def last(self, number: int = 1) -> str:
+        """One of the tokens before the place, counted backwards from 1; empty where there are not so many."""
+        return self.before[-number] if number <= len(self.before) else ""
+
+    @property
+    def component(self) -> str:
+        """The component that is open; empty where there is none."""
+        return next((name_of(item[1]) for item in self.open if item[:1] == ("component",) and len(item) > 1), "")
+
+
+def place_at(text: str, offset: int) -> Place | None:
+    """The place of a cursor; None inside a comment or a text in quotes, where no word of the language is typed."""
+    before = text[:offset]
+    texts, kinds, starts = tokenize(before)
+    count = kinds.index(Kind.END)
+    end = starts[count - 1] + len(texts[count - 1]) if count else 0
+    # Of what stands behind the last token, comments that are closed do not hold the cursor.
+    if "//" in _CLOSED.sub("", before[end:]).rpartition("\n")[2]:
+        return None
+    if count and kinds[count - 1] == Kind.OTHER and texts[count - 1][:2] in ("/*", *_quoted(texts[count - 1])):
+        return None
+    begin = offset
+    # A `^` alone is the begin of a name, too.
+    if count and end == offset and (kinds[count - 1] in _NAMED or texts[count - 1] == "^"):
+        count -= 1
+        begin = starts[count]
+    tokens = tuple(texts[:count])
+    opened: list[tuple[str, ...]] = []
+    item = 0
+    for index in range(count):
+        match texts[index]:
+            case "{":
+                opened.append(tokens[item:index])
+                item = index + 1
+            case "}":
+                if opened:
+                    opened.pop()
+                item = index + 1
+            case word if word in _ITEMS and not (index > item and tokens[index - 1] in ("initial", "marked")):
+                item = index
+    return Place(begin, tokens, tuple(opened), tokens[item:])
+
+
+def name_of(token: str) -> str:
+    """The name that a token is, without what keeps it from being a word of the language."""
+    return token.removeprefix("^")
+
+
+def _quoted(token: str) -> tuple[str, ...]:
+    return (token[:2],) if token[:1] in "\"'" else ()

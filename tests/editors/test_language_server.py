@@ -1,0 +1,691 @@
+"""The language server over real JSON-RPC: what it finds, tells, offers and changes."""
+
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from lsprotocol import types as lsp
+from pygls.exceptions import JsonRpcException
+
+from robosc.formatting import format_text
+from support.editor import Editor, part_of, position_of, with_edits
+from support.editor_models import LIBRARY, ROBOT
+
+# Nothing can keep it from getting to where nothing leads back from.
+FALL = """robot Fall {
+    component Base {
+        outgoing message fallen with type: none
+        incoming message rise with type: none
+        behaviour {
+            initial marked state standing { on response from fallen goto lying }
+            state lying { on request to rise goto standing }
+        }
+    }
+    requirement rise needs Base.standing
+}
+"""
+
+# Its supervisor has to keep it from walking into where nothing leads back from.
+TRAP = """robot Trap {
+    component Base {
+        incoming message leave with type: none
+        incoming message come with type: none
+        incoming message stay with type: none
+        behaviour {
+            initial marked state home {
+                on request to stay
+                on request to leave goto away
+            }
+            state away { on request to come goto home }
+        }
+    }
+    requirement come needs Base.home
+}
+"""
+
+
+@pytest.fixture
+def editor(tmp_path: Path) -> Iterator[Editor]:
+    """An editor with a robot and its library, none of which is saved."""
+    with Editor(tmp_path) as editor:
+        editor.open("parts.rscd", LIBRARY)
+        editor.open("walker.rscd", ROBOT)
+        yield editor
+
+
+def labels(found: lsp.CompletionList) -> list[str]:
+    """What is offered, in order."""
+    return [item.label for item in sorted(found.items, key=lambda item: item.sort_text or "")]
+
+
+def complete(editor: Editor, name: str, words: str) -> list[str]:
+    """What is offered at the `|` of some words."""
+    place = editor.at(name, words)
+    found = editor.run(
+        editor.client.text_document_completion_async(lsp.CompletionParams(place.text_document, place.position))
+    )
+    return labels(found)
+
+
+def typed(editor: Editor, words: str, instead_of: str = "") -> list[str]:
+    """What is offered at the `|` of some words that are put into the robot instead of others."""
+    new = ROBOT.replace(instead_of, words.replace("|", "")) if instead_of else words.replace("|", "")
+    editor.replace("walker.rscd", new)
+    return complete(editor, "walker.rscd", words)
+
+
+# Findings
+
+
+def test_findings_come_as_one_types(editor: Editor) -> None:
+    assert editor.codes("walker.rscd") == []
+    at = ROBOT.index("goto on_")
+    editor.edit("walker.rscd", (at, at + len("goto on_"), "goto nowhere"))
+    (found,) = editor.findings("walker.rscd", bool)
+    assert found.code == "unknown-name" and found.source == "robosc"
+    assert found.severity is lsp.DiagnosticSeverity.Error
+    assert part_of(editor.texts["walker.rscd"], found.range) == "nowhere"
+    editor.edit("walker.rscd", (at, at + len("goto nowhere"), "goto on_"))
+    assert "unknown-name" not in editor.codes("walker.rscd")
+
+
+def test_an_unsaved_library_is_what_counts(editor: Editor, tmp_path: Path) -> None:
+    assert editor.codes("walker.rscd") == []
+    editor.replace("parts.rscd", LIBRARY.replace("state calm", "state quiet"))
+    assert editor.codes("walker.rscd", bool) == ["unknown-name"]
+    editor.save("parts.rscd", LIBRARY)
+    editor.close("parts.rscd")
+    assert editor.codes("walker.rscd", lambda codes: "unknown-name" not in codes) in ([], ["never-enabled"])
+
+
+def test_a_text_that_is_odd_keeps_nobody_else_from_findings(editor: Editor) -> None:
+    # What an editor sends while somebody splits an emoji, and a mark that some put before every text.
+    editor.open("odd.rscd", "\ufeff// \ud83d\nrobot Odd { component c { incoming message m with type: nne } }")
+    editor.open("other.rscd", "robot Other { component c { incoming message m with type: nne } }")
+    for name in ("odd.rscd", "other.rscd"):
+        (found,) = editor.findings(name, bool)
+        assert found.code == "unknown-name" and part_of(editor.texts[name], found.range) == "nne"
+
+
+def test_a_long_line_with_emoji_is_answered(editor: Editor) -> None:
+    components = " ".join(
+        f"component c{number} {{ incoming message m{number} with type: none }}" for number in range(1500)
+    )
+    editor.open("long.rscd", f"robot Long {{ /* 😀 */ {components} }}")
+    parameters = lsp.SemanticTokensParams(editor.document("long.rscd"))
+    found = editor.run(editor.client.text_document_semantic_tokens_full_async(parameters))
+    assert len(found.data) == 5 * 3001
+    assert list(found.data[:5]) == [0, 6, 4, 0, 1]
+    assert found.data[-4] == len("c1499 { incoming message ")
+
+
+def test_of_a_file_under_two_paths_each_shows_its_own_text(tmp_path: Path) -> None:
+    (tmp_path / "real").mkdir()
+    (tmp_path / "link").symlink_to("real")
+    (tmp_path / "real" / "walker.rscd").write_text("robot Old { }")
+    with Editor(tmp_path, "--synthesis-seconds", "0") as editor:
+        editor.open("link/walker.rscd", "robot New { }")
+        editor.open("real/walker.rscd", "robot Newer { }")
+        editor.close("real/walker.rscd")
+        editor.edit("link/walker.rscd", (0, 0, " "))
+        (found,) = editor.findings("link/walker.rscd", bool)
+        assert part_of(editor.texts["link/walker.rscd"], found.range) == "New"
+
+
+def test_a_library_that_changes_on_disk_is_read_again(tmp_path: Path) -> None:
+    with Editor(tmp_path, "--synthesis-seconds", "0") as editor:
+        editor.until(lambda: bool(editor.watched))
+        assert [item.method for item in editor.watched] == ["workspace/didChangeWatchedFiles"]
+        editor.open("walker.rscd", ROBOT)
+        assert "unknown library 'parts'" in editor.findings("walker.rscd", bool)[0].message
+        editor.save("parts.rscd", LIBRARY)
+        assert editor.codes("walker.rscd", lambda codes: "unknown-name" not in codes) == []
+
+
+def test_related_places_are_told(editor: Editor) -> None:
+    editor.replace("walker.rscd", ROBOT.replace("marked state on_ {", "marked state off { } state on_ {"))
+    found = next(item for item in editor.findings("walker.rscd", bool) if str(item.code).startswith("duplicate"))
+    assert found.related_information is not None
+    place = found.related_information[0].location
+    assert place.uri == editor.uri("walker.rscd")
+    assert part_of(editor.texts["walker.rscd"], place.range) == "off"
+
+
+def test_warnings_of_synthesis_follow(editor: Editor) -> None:
+    found = editor.findings("walker.rscd", lambda found: any(item.code == "unused-requirement" for item in found))
+    unused = next(item for item in found if item.code == "unused-requirement")
+    assert unused.severity is lsp.DiagnosticSeverity.Warning
+    assert unused.range.start.line == ROBOT[: ROBOT.index("requirement {")].count("\n")
+    # What is in the library is told there, too: here it has no line.
+    assert any("parts.rscd:" in item.message for item in found if item.code == "never-enabled")
+
+
+def test_the_next_edit_cancels_synthesis(editor: Editor) -> None:
+    editor.findings("walker.rscd", bool)
+    editor.replace("walker.rscd", "robot Empty { }")
+    codes = editor.codes("walker.rscd", lambda codes: "unused-requirement" not in codes)
+    assert "unused-requirement" not in codes and "never-enabled" not in codes
+
+
+def test_that_there_is_no_supervisor_is_told_at_the_robot(editor: Editor) -> None:
+    editor.open("fall.rscd", FALL)
+    found = editor.findings("fall.rscd", lambda found: any(item.code == "no-supervisor" for item in found))
+    place = next(item.range for item in found if item.code == "no-supervisor")
+    assert part_of(FALL, place) == "Fall"
+    parameters = lsp.CodeLensParams(editor.document("fall.rscd"))
+    (lens,) = editor.run(editor.client.text_document_code_lens_async(parameters))
+    assert lens.command.title == "no supervisor"
+
+
+def test_without_synthesis_there_are_the_findings_of_the_checks(tmp_path: Path) -> None:
+    with Editor(tmp_path, "--synthesis-seconds", "0") as editor:
+        editor.open("trap.rscd", TRAP)
+        assert editor.codes("trap.rscd") == []
+        place = editor.document("trap.rscd")
+        (lens,) = editor.run(editor.client.text_document_code_lens_async(lsp.CodeLensParams(place)))
+        assert lens.command.title == "synthesis is switched off"
+
+
+# What is told
+
+
+def hover(editor: Editor, name: str, words: str) -> str:
+    """What is told of the name at the `|` of some words."""
+    place = editor.at(name, words)
+    found = editor.run(editor.client.text_document_hover_async(lsp.HoverParams(place.text_document, place.position)))
+    assert found is not None
+    return str(found.contents.value)
+
+
+def test_of_a_message_its_type_users_and_plant_are_told(editor: Editor) -> None:
+    told = hover(editor, "walker.rscd", "requirement wa|lk")
+    assert 'incoming message walk with identifier: "/cmd_vel"' in told
+    assert "used by requirement (line 17), provide (line 19)" in told
+    assert "plant `" in told and "`walk.request`" in told
+
+
+def test_of_a_part_of_a_library_the_robots_are_told_that_use_it(editor: Editor) -> None:
+    assert "used by walker.rscd" in hover(editor, "parts.rscd", "state cal|m {")
+    assert "used by walker.rscd" in hover(editor, "parts.rscd", "component Ba|se {")
+
+
+def test_of_a_component_its_plant_is_told(editor: Editor) -> None:
+    told = hover(editor, "walker.rscd", "Butto|n.off")
+    assert "2 states, 1 variable, 3 transitions" in told
+
+
+def test_what_the_supervisor_adds_is_told(tmp_path: Path) -> None:
+    with Editor(tmp_path) as editor:
+        editor.open("trap.rscd", TRAP)
+        editor.until(lambda: editor.lenses_refreshed > 0)
+        assert "the supervisor adds to `leave.request`: `false`" in hover(editor, "trap.rscd", "to le|ave goto")
+        assert "the supervisor adds nothing to `stay.request`" in hover(editor, "trap.rscd", "message st|ay")
+        place = editor.document("trap.rscd")
+        (lens,) = editor.run(editor.client.text_document_code_lens_async(lsp.CodeLensParams(place)))
+        assert lens.command.title == "1 state, supervisor adds conditions to 1 event"
+        assert part_of(TRAP, lens.range) == "Trap"
+
+
+def test_of_words_and_comments_nothing_is_told(editor: Editor) -> None:
+    for words in ("it 🏃 wa|lks", "re|quirement walk", "|robot Walker"):
+        place = editor.at("walker.rscd", words)
+        parameters = lsp.HoverParams(place.text_document, place.position)
+        assert editor.run(editor.client.text_document_hover_async(parameters)) is None
+
+
+# Names
+
+
+def definition(editor: Editor, name: str, words: str) -> lsp.Location:
+    """Where the name at the `|` of some words is defined."""
+    place = editor.at(name, words)
+    found = editor.run(
+        editor.client.text_document_definition_async(lsp.DefinitionParams(place.text_document, place.position))
+    )
+    assert isinstance(found, lsp.Location)
+    return found
+
+
+def test_definitions_are_found_in_their_files(editor: Editor) -> None:
+    assert definition(editor, "walker.rscd", "goto on_|") == editor.where("walker.rscd", "state |on_| {")
+    assert definition(editor, "walker.rscd", "Base.|calm") == editor.where("parts.rscd", "state |calm| {")
+    assert definition(editor, "walker.rscd", "provide w|alk") == editor.where("parts.rscd", "message |walk| with")
+    assert definition(editor, "walker.rscd", "times: mo|st") == editor.where("walker.rscd", "constant |most|:")
+    assert definition(editor, "walker.rscd", "lin|ear: {") == editor.where("parts.rscd", "{ |linear|: Vector")
+    # Behind emoji, where characters and columns differ.
+    assert definition(editor, "walker.rscd", "from pa|rts") == editor.where("parts.rscd", "library |parts| {")
+
+
+def test_of_a_file_that_is_not_open_places_are_as_an_editor_will_show_it(tmp_path: Path) -> None:
+    # A byte order mark is not shown, and each end of a line is one.
+    saved = "\ufefflibrary Parts { component Lamp {} /* 🤖 */\r component Bell {}\r\n component Horn {}\n}"
+    (tmp_path / "parts.rscd").write_bytes(saved.encode())
+    with Editor(tmp_path) as editor:
+        imported = "\n".join(f"component {name} from Parts import {name}" for name in ("Lamp", "Bell", "Horn"))
+        editor.open("robot.rscd", f"robot R {{ {imported} }}")
+        found = [definition(editor, "robot.rscd", f"import |{name}").range.start for name in ("Lamp", "Bell", "Horn")]
+        assert found == [lsp.Position(0, 26), lsp.Position(1, 11), lsp.Position(2, 11)]
+
+
+def references(editor: Editor, name: str, words: str, *, declared: bool = True) -> list[lsp.Location]:
+    """Where the name at the `|` of some words stands."""
+    place = editor.at(name, words)
+    context = lsp.ReferenceContext(include_declaration=declared)
+    found = editor.run(
+        editor.client.text_document_references_async(lsp.ReferenceParams(context, place.text_document, place.position))
+    )
+    return sorted(found, key=lambda item: (item.uri, item.range.start.line, item.range.start.character))
+
+
+def test_references_are_found_in_all_files(editor: Editor) -> None:
+    places = [
+        editor.where("parts.rscd", "variable |count|:"),
+        editor.where("parts.rscd", "if |count| > 1"),
+        editor.where("walker.rscd", "Base.|count| <"),
+    ]
+    assert references(editor, "parts.rscd", "variable co|unt") == places
+    assert references(editor, "walker.rscd", "Base.coun|t") == places
+    assert references(editor, "walker.rscd", "Base.coun|t", declared=False) == places[1:]
+    # Two enums of one name in two files are two.
+    found = references(editor, "parts.rscd", "enum Lev|el")
+    assert {item.uri for item in found} == {editor.uri("parts.rscd")} and len(found) == 2
+
+
+def test_a_file_that_is_not_open_refers_to_a_library_too(tmp_path: Path) -> None:
+    (tmp_path / "robots").mkdir()
+    (tmp_path / "robots" / "walker.rscd").write_text(ROBOT, "utf-8")
+    with Editor(tmp_path) as editor:
+        editor.open("robots/parts.rscd", LIBRARY)
+        found = references(editor, "robots/parts.rscd", "variable co|unt", declared=False)
+    assert [Path(item.uri).name for item in found] == ["parts.rscd", "walker.rscd"]
+
+
+def test_highlights_are_those_of_this_file(editor: Editor) -> None:
+    place = editor.at("walker.rscd", "Button.la|st")
+    found = editor.run(
+        editor.client.text_document_document_highlight_async(
+            lsp.DocumentHighlightParams(place.text_document, place.position)
+        )
+    )
+    assert [part_of(ROBOT, item.range) for item in found] == ["last"] * 3
+
+
+def rename(editor: Editor, name: str, words: str, new: str) -> dict[str, str]:
+    """The texts after the name at the `|` of some words has got another."""
+    place = editor.at(name, words)
+    asked = lsp.PrepareRenameParams(place.text_document, place.position)
+    assert editor.run(editor.client.text_document_prepare_rename_async(asked)) is not None
+    parameters = lsp.RenameParams(place.text_document, place.position, new)
+    found = editor.run(editor.client.text_document_rename_async(parameters))
+    assert found is not None and found.changes is not None
+    return {name: with_edits(text, found.changes.get(editor.uri(name), ())) for name, text in editor.texts.items()}
+
+
+def test_a_name_is_changed_in_all_files(editor: Editor) -> None:
+    texts = rename(editor, "walker.rscd", "Base.|calm", "quiet")
+    assert texts["parts.rscd"] == LIBRARY.replace("calm", "quiet")
+    assert texts["walker.rscd"] == ROBOT.replace("calm", "quiet")
+    texts = rename(editor, "parts.rscd", "enum |Level", "Height")
+    assert texts["walker.rscd"] == ROBOT
+    assert texts["parts.rscd"] == LIBRARY.replace("Level", "Height")
+
+
+def test_nothing_is_renamed_while_a_use_may_be_hidden(editor: Editor, tmp_path: Path) -> None:
+    editor.replace(
+        "walker.rscd",
+        ROBOT.replace("requirement walk needs Base.calm and Button.on_", "requirement walk needs Button.on_ and"),
+    )
+    with pytest.raises(JsonRpcException, match=r"'on_' stands in line 17 of walker\.rscd"):
+        rename(editor, "walker.rscd", "goto |on_", "running")
+    # Nothing of another name is hidden.
+    assert "^state" in rename(editor, "walker.rscd", "goto |off", "state")["walker.rscd"]
+    editor.replace("walker.rscd", ROBOT)
+    (tmp_path / "latin.rscd").write_bytes(
+        "robot L { component Base from parts import Base // für calm\n }".encode("latin-1")
+    )
+    with pytest.raises(JsonRpcException, match=r"'calm' stands in latin\.rscd, which is not UTF-8"):
+        rename(editor, "walker.rscd", "Base.|calm", "quiet")
+
+
+def test_a_word_of_the_language_becomes_a_name(editor: Editor) -> None:
+    texts = rename(editor, "walker.rscd", "|most: integer", "state")
+    assert texts["walker.rscd"] == ROBOT.replace("most", "^state")
+
+
+@pytest.mark.parametrize(
+    ("words", "new", "why"),
+    [
+        ("|most: integer", "a b", "is no name"),
+        ("|most: integer", "", "is no name"),
+        ("|most: integer", "x }", "is no name"),
+        ("|most: integer", "größe", "is no name"),
+        # Another of that name is there, or would be meant from then on.
+        ("state |off {", "on_", "means something else"),
+        ("variable |last", "on_", "means something else"),
+        ("component |Button", "Base", "means something else"),
+    ],
+)
+def test_a_name_that_cannot_be_is_refused(editor: Editor, words: str, new: str, why: str) -> None:
+    with pytest.raises(JsonRpcException, match=why):
+        rename(editor, "walker.rscd", words, new)
+
+
+def test_symbols_of_a_document_stand_one_in_the_other(editor: Editor) -> None:
+    (whole,) = editor.run(
+        editor.client.text_document_document_symbol_async(lsp.DocumentSymbolParams(editor.document("walker.rscd")))
+    )
+    assert (whole.name, whole.kind) == ("Walker", lsp.SymbolKind.Module)
+    names = [item.name for item in whole.children]
+    assert names == ["Base", "power_", "Button", "Level", "Asked", "most"]
+    button = next(item for item in whole.children if item.name == "Button")
+    assert [item.name for item in button.children] == ["pressed", "power", "last", "off", "on_"]
+    for item in (whole, *whole.children, *button.children):
+        text = part_of(ROBOT, item.range)
+        assert part_of(ROBOT, item.selection_range) == item.name and item.name in text
+    assert part_of(ROBOT, button.range).startswith("component Button {")
+
+
+def test_symbols_of_all_files_are_found(editor: Editor, tmp_path: Path) -> None:
+    (tmp_path / "other.rscd").write_text("robot Other { component Basement { } }")
+    found = editor.run(editor.client.workspace_symbol_async(lsp.WorkspaceSymbolParams("bse")))
+    assert {(item.name, Path(item.location.uri).name) for item in found} >= {
+        ("Base", "parts.rscd"),
+        ("Basement", "other.rscd"),
+    }
+    assert not editor.run(editor.client.workspace_symbol_async(lsp.WorkspaceSymbolParams("bsq")))
+
+
+def test_semantic_tokens_cover_every_name(editor: Editor) -> None:
+    legend = editor.initialized.capabilities.semantic_tokens_provider.legend
+    found = editor.run(
+        editor.client.text_document_semantic_tokens_full_async(lsp.SemanticTokensParams(editor.document("walker.rscd")))
+    )
+    line = character = 0
+    told = []
+    for index in range(0, len(found.data), 5):
+        lines, characters, length, kind, modifiers = found.data[index : index + 5]
+        line, character = line + lines, characters + (0 if lines else character)
+        where = lsp.Range(lsp.Position(line, character), lsp.Position(line, character + length))
+        names = [name for bit, name in enumerate(legend.token_modifiers) if modifiers >> bit & 1]
+        told.append((part_of(ROBOT, where), legend.token_types[kind], *names))
+    assert told[0] == ("Walker", "namespace", "declaration")
+    assert told[1:4] == [("Base", "class", "declaration"), ("parts", "namespace"), ("Base", "class")]
+    assert ("on_", "enumMember", "declaration") in told and ("on_", "enumMember") in told
+    assert ("most", "variable", "declaration", "readonly") in told and ("most", "variable", "readonly") in told
+    assert ("pressed", "event") in told and ("power", "function") in told and ("linear", "property") in told
+
+
+def test_braces_and_comments_are_folded(editor: Editor) -> None:
+    text = "// one\n// two\nrobot R {\n    component C {\n    }\n}\n"
+    editor.replace("walker.rscd", text)
+    found = editor.run(
+        editor.client.text_document_folding_range_async(lsp.FoldingRangeParams(editor.document("walker.rscd")))
+    )
+    told = {(item.start_line, item.end_line, item.kind) for item in found}
+    assert told == {(0, 1, lsp.FoldingRangeKind.Comment), (2, 4, lsp.FoldingRangeKind.Region)}
+
+
+def formatted(editor: Editor) -> list[lsp.TextEdit]:
+    """The edits that format the robot."""
+    options = lsp.FormattingOptions(4, insert_spaces=True)
+    parameters = lsp.DocumentFormattingParams(editor.document("walker.rscd"), options)
+    return list(editor.run(editor.client.text_document_formatting_async(parameters)) or ())
+
+
+def test_a_text_is_formatted_as_by_the_command(editor: Editor) -> None:
+    assert with_edits(ROBOT, formatted(editor)) == format_text(ROBOT)
+    editor.replace("walker.rscd", format_text(ROBOT))
+    assert formatted(editor) == []
+    editor.replace("walker.rscd", ROBOT + "}")
+    assert formatted(editor) == []
+
+
+def actions(editor: Editor, name: str, words: str, *kinds: str) -> list[lsp.CodeAction]:
+    """The mends at the `|` of some words; of some kinds alone if these are told."""
+    place = editor.at(name, words)
+    where = lsp.Range(place.position, place.position)
+    parameters = lsp.CodeActionParams(place.text_document, where, lsp.CodeActionContext([], only=list(kinds) or None))
+    return list(editor.run(editor.client.text_document_code_action_async(parameters)))
+
+
+def test_a_name_that_is_nearly_right_is_mended(editor: Editor) -> None:
+    editor.replace("walker.rscd", ROBOT.replace("Base.calm", "Base.clam"))
+    editor.findings("walker.rscd", bool)
+    action, *_ = actions(editor, "walker.rscd", "Base.cl|am")
+    assert action.title == "Write 'calm'" and action.is_preferred and action.kind == lsp.CodeActionKind.QuickFix
+    assert action.edit is not None and action.edit.changes is not None
+    assert with_edits(editor.texts["walker.rscd"], action.edit.changes[editor.uri("walker.rscd")]) == ROBOT
+    assert actions(editor, "walker.rscd", "provide wa|lk") == []
+
+
+def test_mends_are_of_the_text_as_it_is(editor: Editor) -> None:
+    editor.replace("walker.rscd", ROBOT.replace("goto on_", "goto onn_"))
+    editor.findings("walker.rscd", bool)
+    at = editor.texts["walker.rscd"].index("on response from power goto onn_")
+    editor.edit("walker.rscd", (at, at, "/* x */ "))
+    (action,) = actions(editor, "walker.rscd", "goto onn|_")
+    assert action.edit is not None and action.edit.changes is not None
+    changed = with_edits(editor.texts["walker.rscd"], action.edit.changes[editor.uri("walker.rscd")])
+    assert "/* x */ on response from power goto on_ }" in changed
+    editor.edit(
+        "walker.rscd", (at, at + len("/* x */ on response from power goto onn_"), "on response from power goto on_")
+    )
+    assert actions(editor, "walker.rscd", "power goto o|n_") == []
+
+
+def test_other_kinds_of_actions_are_none_of_these(editor: Editor) -> None:
+    editor.replace("walker.rscd", ROBOT.replace("goto on_", "goto onn_"))
+    assert actions(editor, "walker.rscd", "goto onn|_", "source.organizeImports") == []
+    assert len(actions(editor, "walker.rscd", "goto onn|_", "quickfix")) == 1
+
+
+def test_a_name_that_is_a_word_is_written_as_a_name(editor: Editor) -> None:
+    behaviour = "behaviour { initial marked state ^request { on response from m goto reqest } }"
+    text = f"robot R {{ component C {{ outgoing message m with type: none {behaviour} }} }}"
+    editor.open("words.rscd", text)
+    (action,) = actions(editor, "words.rscd", "goto req|est")
+    assert action.title == "Write '^request'"
+
+
+def test_syntax_of_other_languages_is_mended(editor: Editor) -> None:
+    editor.open("other.rscd", "robot R {\n  requirement A && B disables c // 🤖\n}")
+    editor.findings("other.rscd", bool)
+    (action,) = actions(editor, "other.rscd", "A |&& B")
+    assert action.title == "Write 'and'" and action.edit is not None and action.edit.changes is not None
+    changed = with_edits(editor.texts["other.rscd"], action.edit.changes[editor.uri("other.rscd")])
+    assert changed == "robot R {\n  requirement A and B disables c // 🤖\n}"
+
+
+def test_a_mend_that_brings_more_errors_is_not_offered(editor: Editor) -> None:
+    messages = "incoming message m with type: none incoming message n with type: none"
+    editor.open("lamps.rscd", f"library Lamps {{ component Lamp {{ {messages} }} component Other {{ }} }}")
+    editor.open("double.rscd", f"robot R {{ component Own {{ {messages} }} component L from Lamps import Othr }}")
+    assert editor.codes("double.rscd", bool) == ["unknown-name"]
+    assert [action.title for action in actions(editor, "double.rscd", "import Ot|hr")] == ["Write 'Other'"]
+    editor.replace("double.rscd", editor.texts["double.rscd"].replace("Othr", "Lmp"))
+    assert editor.codes("double.rscd", bool) == ["unknown-name"]
+    assert actions(editor, "double.rscd", "import Lm|p") == []
+
+
+def test_a_wrong_preposition_is_mended(editor: Editor) -> None:
+    editor.replace("walker.rscd", ROBOT.replace("response from pressed", "response to pressed"))
+    editor.findings("walker.rscd", bool)
+    (action,) = actions(editor, "walker.rscd", "response t|o pressed")
+    assert action.edit is not None and action.edit.changes is not None
+    assert with_edits(editor.texts["walker.rscd"], action.edit.changes[editor.uri("walker.rscd")]) == ROBOT
+
+
+# What is offered
+
+
+def test_behind_requirement_communications_are_offered(editor: Editor) -> None:
+    found = typed(editor, "requirement |\n    requirement walk", "requirement walk")
+    assert found[:2] == ["walk", "power"] and "pressed" not in found[:2]
+    assert {"always", "never"} <= set(found)
+
+
+def test_behind_goto_states_are_offered(editor: Editor) -> None:
+    assert typed(editor, "on response from power goto o| } }", "on response from power goto off }")[:2] == [
+        "off",
+        "on_",
+    ]
+
+
+def test_in_values_properties_are_offered(editor: Editor) -> None:
+    assert typed(editor, "power with { |data", "power with { data")[:3] == ["data:", "level:", "times:"]
+    assert typed(editor, "walk with { linear: { | } }", "walk with { linear: { x: 0.5 } }")[:1] == ["x:"]
+
+
+def test_values_of_the_expected_enum_come_first(editor: Editor) -> None:
+    assert typed(editor, "needs Button.last = | or", "needs Button.last = high or")[:2] == ["high", "low"]
+    assert typed(editor, "last: Level = |\n", "last: Level = low\n")[:2] == ["high", "low"]
+
+
+def test_members_are_offered_behind_a_point(editor: Editor) -> None:
+    assert set(typed(editor, "needs Button.| and", "needs Base.calm and")) == {"off", "on_", "last"}
+
+
+def test_what_can_be_imported_is_offered(editor: Editor) -> None:
+    assert "parts" in typed(
+        editor, "component Base from |\n    interface", "component Base from parts import Base\n    interface"
+    )
+    assert typed(editor, "component Base from parts import |\n", "component Base from parts import Base\n")[:1] == [
+        "Base"
+    ]
+
+
+def test_types_of_an_installed_ament_index_are_offered(tmp_path: Path) -> None:
+    share = tmp_path / "ros" / "share"
+    for package, kind, name in (
+        ("robot_msgs", "msg", "Wheel"),
+        ("robot_msgs", "srv", "Turn"),
+        ("arm_msgs", "msg", "Joint"),
+    ):
+        folder = share / package / kind
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / f"{name}.{kind}").write_text("bool ok\n---\n" if kind == "srv" else "bool ok\n")
+        index = share / "ament_index" / "resource_index" / "packages"
+        index.mkdir(parents=True, exist_ok=True)
+        (index / package).write_text("")
+    variables = {**os.environ, "AMENT_PREFIX_PATH": str(tmp_path / "ros")}
+    with Editor(tmp_path, variables=variables) as editor:
+        editor.open("r.rscd", "robot R {\n    interface w use Wh from robot_msgs\n}\n")
+        assert {"Wheel", "Turn", "Joint"} <= set(complete(editor, "r.rscd", "use Wh| from"))
+        editor.replace("r.rscd", "robot R {\n    interface w use Wheel from \n}\n")
+        assert complete(editor, "r.rscd", "Wheel from |")[:1] == ["robot_msgs"]
+
+
+def test_types_in_folders_that_are_named_are_offered(tmp_path: Path) -> None:
+    messages = tmp_path / "mine" / "own_msgs" / "msg"
+    messages.mkdir(parents=True)
+    (messages / "Wanted.msg").write_text("bool data\n")
+    with Editor(tmp_path, "--synthesis-seconds", "0", "--interface-path", str(tmp_path / "mine")) as editor:
+        editor.open("robot.rscd", "robot R { interface x use W }")
+        assert "Wanted" in complete(editor, "robot.rscd", "use W|")
+
+
+def test_in_comments_nothing_is_offered(editor: Editor) -> None:
+    assert complete(editor, "walker.rscd", "it 🏃 walks|") == []
+
+
+def test_what_is_offered_replaces_what_is_typed(editor: Editor) -> None:
+    editor.replace("walker.rscd", ROBOT.replace("Base.calm", "Base.ca"))
+    place = editor.at("walker.rscd", "Base.ca|")
+    found = editor.run(
+        editor.client.text_document_completion_async(lsp.CompletionParams(place.text_document, place.position))
+    )
+    item = next(item for item in found.items if item.label == "calm")
+    assert isinstance(item.text_edit, lsp.TextEdit)
+    assert with_edits(editor.texts["walker.rscd"], [item.text_edit]) == ROBOT
+
+
+# In the middle of being typed
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        ROBOT.replace("requirement walk needs Base.calm and Button.on_", "requirement walk needs Base.calm and"),
+        ROBOT.replace("provide walk with { linear: { x: 0.5 } }", "provide walk with { linear: {"),
+        ROBOT.replace("service power with request: Asked", "service power with request:"),
+        ROBOT.replace("constant most: integer = 2", "constant most: integer = (2"),
+        ROBOT.replace("variable last: Level = low", "variable last: Level ="),
+        ROBOT[: ROBOT.rindex("}")],
+        ROBOT[: ROBOT.index("provide power")],
+    ],
+)
+def test_what_is_sound_is_known(editor: Editor, broken: str) -> None:
+    editor.replace("walker.rscd", broken)
+    assert "syntax-error" in editor.codes("walker.rscd", bool)
+    (whole,) = editor.run(
+        editor.client.text_document_document_symbol_async(lsp.DocumentSymbolParams(editor.document("walker.rscd")))
+    )
+    button = next(item for item in whole.children if item.name == "Button")
+    assert {item.name for item in button.children} >= {"pressed", "off", "on_"}
+    assert "outgoing message pressed" in hover(editor, "walker.rscd", "response from pre|ssed")
+    assert definition(editor, "walker.rscd", "goto on|_") == editor.where("walker.rscd", "state |on_| {")
+
+
+# Faults
+
+
+def test_files_that_are_not_there_are_answered(editor: Editor) -> None:
+    nowhere = lsp.TextDocumentIdentifier(editor.uri("nowhere.rscd"))
+    start = lsp.Position(0, 0)
+    client = editor.client
+    assert editor.run(client.text_document_hover_async(lsp.HoverParams(nowhere, start))) is None
+    assert editor.run(client.text_document_definition_async(lsp.DefinitionParams(nowhere, start))) is None
+    assert not editor.run(client.text_document_completion_async(lsp.CompletionParams(nowhere, start))).items
+    assert not editor.run(client.text_document_document_symbol_async(lsp.DocumentSymbolParams(nowhere)))
+    assert not editor.run(client.text_document_code_lens_async(lsp.CodeLensParams(nowhere)))
+
+
+@pytest.mark.parametrize("uri", ["untitled:Untitled-1", "https://example.org/x.rscd", "file:///a%00b.rscd", "file://"])
+def test_texts_that_are_no_files_are_known(editor: Editor, uri: str) -> None:
+    editor.open(uri, "robot R { component C { behaviour { initial marked state s { transition goto t } } } }")
+    assert editor.codes(uri, bool) == ["unknown-name"]
+
+
+def test_positions_that_are_nowhere_are_answered(editor: Editor) -> None:
+    place = editor.document("walker.rscd")
+    for position in (lsp.Position(10_000, 0), lsp.Position(0, 10_000), lsp.Position(2**31 - 1, 2**31 - 1)):
+        editor.run(editor.client.text_document_hover_async(lsp.HoverParams(place, position)))
+        editor.run(editor.client.text_document_completion_async(lsp.CompletionParams(place, position)))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "utf-32"])
+def test_columns_are_counted_as_the_editor_does(tmp_path: Path, encoding: str) -> None:
+    with Editor(tmp_path, encodings=(encoding,)) as editor:
+        assert editor.encoding == encoding
+        editor.open("parts.rscd", LIBRARY)
+        editor.open("walker.rscd", ROBOT)
+        assert definition(editor, "walker.rscd", "from pa|rts").range.start == position_of(
+            LIBRARY, LIBRARY.index("parts {"), encoding
+        )
+        place = editor.at("walker.rscd", "/* 😀 */ on response from po|wer")
+        found = editor.run(
+            editor.client.text_document_hover_async(lsp.HoverParams(place.text_document, place.position))
+        )
+        at = ROBOT.index("power goto on_")
+        assert found.range == lsp.Range(
+            position_of(ROBOT, at, encoding), position_of(ROBOT, at + len("power"), encoding)
+        )
+
+
+def test_folders_that_are_worked_in_can_change(editor: Editor, tmp_path: Path) -> None:
+    other = tmp_path.parent / f"{tmp_path.name}-other"
+    other.mkdir()
+    (other / "far.rscd").write_text("robot Faraway { }")
+    folder = lsp.WorkspaceFolder(other.as_uri(), "other")
+
+    def found() -> set[str]:
+        told = editor.run(editor.client.workspace_symbol_async(lsp.WorkspaceSymbolParams("Faraway")))
+        return {item.name for item in told}
+
+    for added, removed, names in (([folder], [], {"Faraway"}), ([], [folder], set())):
+        event = lsp.WorkspaceFoldersChangeEvent(added, removed)
+        editor.client.workspace_did_change_workspace_folders(lsp.DidChangeWorkspaceFoldersParams(event))
+        assert found() == names
+    shutil.rmtree(other)

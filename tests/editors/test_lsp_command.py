@@ -1,0 +1,186 @@
+"""The language server as a program: how it starts, and that it ends with its editor."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from lsprotocol import types as lsp
+
+from robosc import __version__
+from robosc_lsp import synthesis
+from support.background import children_of, eventually, is_running
+from support.editor import Editor
+from support.hostile_models import bounded_products, products
+
+COMMAND = (sys.executable, "-m", "robosc_lsp.command")
+
+LONG = products()
+"""Synthesis of it takes longer than anybody waits."""
+
+
+def run(*arguments: str, given: bytes = b"") -> subprocess.CompletedProcess[bytes]:
+    return subprocess.run([*COMMAND, *arguments], input=given, capture_output=True, timeout=30, check=False)
+
+
+def message(**content: object) -> bytes:
+    body = json.dumps({"jsonrpc": "2.0", **content}).encode()
+    return b"Content-Length: %d\r\n\r\n" % len(body) + body
+
+
+def test_help_and_version_are_told() -> None:
+    told = run("--help")
+    assert told.returncode == 0 and b"--synthesis-seconds" in told.stdout
+    assert run("--version").stdout.decode().strip() == f"robosc-lsp {__version__}"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        (("--synthesis-seconds", "-1"), "--synthesis-seconds"),
+        (("--synthesis-seconds", "nan"), "--synthesis-seconds"),
+        (("--log-file", "/nowhere/at/all/log"), "/nowhere/at/all/log"),
+        (("file.rscd",), "file.rscd"),
+    ],
+)
+def test_wrong_arguments_are_one_error(arguments: tuple[str, ...], why: str) -> None:
+    told = run(*arguments)
+    assert told.returncode == 2 and not told.stdout
+    assert why in told.stderr.decode() and "Traceback" not in told.stderr.decode()
+
+
+def test_whether_it_can_be_started_is_told() -> None:
+    told = run("--library-path", "/nowhere/at/all", "--check")
+    assert told.returncode == 0 and told.stdout.decode() == f"robosc-lsp {__version__} can be started\n"
+
+
+def test_a_folder_that_is_not_there_holds_no_libraries(tmp_path: Path) -> None:
+    with Editor(tmp_path, "--library-path", str(tmp_path / "later")) as editor:
+        editor.open("robot.rscd", "robot R { component C from Parts import C }")
+        assert "unknown-name" in editor.codes("robot.rscd", lambda codes: bool(codes))
+        editor.save("later/parts.rscd", "library Parts { component C { } }")
+        assert editor.codes("robot.rscd", lambda codes: codes == ["empty-model"])
+
+
+@pytest.mark.parametrize("arguments", [(), ("--check",)])
+def test_without_its_libraries_it_tells_how_to_get_them(tmp_path: Path, arguments: tuple[str, ...]) -> None:
+    (tmp_path / "pygls").mkdir()
+    (tmp_path / "pygls" / "__init__.py").write_text(
+        "raise ModuleNotFoundError(\"No module named 'pygls'\", name='pygls')"
+    )
+    told = subprocess.run(
+        [*COMMAND, *arguments],
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        input=b"",
+        capture_output=True,
+        timeout=30,
+        check=False,
+    )
+    assert told.returncode == 1
+    assert told.stderr.decode() == "robosc-lsp: the language server needs pygls: pip install 'robosc[lsp]'\n"
+
+
+def test_it_ends_when_its_input_does() -> None:
+    assert run().returncode == 0
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        b"nonsense\r\n\r\n",
+        b"Content-Length: 5\r\n\r\n{not}",
+        b"Content-Length: 99999\r\n\r\n{}",
+        b"Content-Length: 2\r\n\r\n[]",
+        message(id=1, method="textDocument/hover", params={}),
+        message(id=1, method="initialize", params={"capabilities": 7}),
+        message(method="textDocument/didChange", params={"textDocument": {"uri": 3}}),
+        message(id=1, method="no/such/thing"),
+    ],
+)
+def test_nonsense_is_survived(given: bytes) -> None:
+    shutdown = message(id=98, method="initialize", params={"capabilities": {}, "processId": None, "rootUri": None})
+    told = run(given=given + shutdown + message(id=99, method="shutdown") + message(method="exit"))
+    if b"99999" not in given:  # The rest is taken for its body there.
+        assert b'"id":99' in told.stdout.replace(b" ", b"") and told.returncode == 0, told.stderr.decode()
+
+
+def synthesis_of(editor: Editor) -> int:
+    """The process that synthesizes for an editor's server, once it is there."""
+    assert eventually(lambda: bool(children_of(editor.pid)))
+    (child,) = children_of(editor.pid)
+    return child
+
+
+def test_an_edit_ends_the_process_of_a_synthesis(tmp_path: Path) -> None:
+    with Editor(tmp_path) as editor:
+        editor.open("long.rscd", LONG)
+        child = synthesis_of(editor)
+        editor.edit("long.rscd", (0, 0, " "))
+        assert eventually(lambda: not is_running(child))
+        other = synthesis_of(editor)
+    assert not is_running(other)
+
+
+def test_nothing_of_the_folder_that_is_edited_is_run(tmp_path: Path) -> None:
+    for module in ("asyncio", "msgspec", "robosc"):
+        (tmp_path / f"{module}.py").write_text("import pathlib; pathlib.Path('was_run').touch(); raise SystemExit")
+    with Editor(tmp_path) as editor:
+        editor.open("small.rscd", "robot R { }")
+        editor.until(lambda: editor.lenses_refreshed > 0)
+        parameters = lsp.CodeLensParams(editor.document("small.rscd"))
+        (lens,) = editor.run(editor.client.text_document_code_lens_async(parameters))
+        assert lens.command.title == "1 state, supervisor adds conditions to no event"
+    assert not (tmp_path / "was_run").exists()
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_a_synthesis_ends_with_its_server(tmp_path: Path, number: signal.Signals) -> None:
+    with Editor(tmp_path) as editor:
+        editor.open("long.rscd", LONG)
+        child = synthesis_of(editor)
+        editor.kill(number)
+        assert eventually(lambda: not is_running(child))
+
+
+def test_a_synthesis_that_takes_too_long_is_given_up(tmp_path: Path) -> None:
+    with Editor(tmp_path, "--synthesis-seconds", "0.5") as editor:
+        editor.open("long.rscd", LONG)
+        child = synthesis_of(editor)
+        assert eventually(lambda: not is_running(child))
+        parameters = lsp.CodeLensParams(editor.document("long.rscd"))
+        editor.until(lambda: editor.lenses_refreshed > 0)
+        (lens,) = editor.run(editor.client.text_document_code_lens_async(parameters))
+        assert lens.command.title == "synthesis takes longer than 0.5 s"
+        assert "no-supervisor" not in editor.codes("long.rscd")
+
+
+def test_a_synthesis_takes_no_more_memory_than_it_may(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = synthesis._Asked(("small.rscd", bounded_products(4)), (), ())
+    assert synthesis._outcome(asked).states
+    monkeypatch.setattr(synthesis, "_MOST_NODES", 10)
+    told = synthesis._outcome(asked)
+    assert "memory" in told.unknown and not told.reason and told.states is None
+
+
+def resident_kb(editor: Editor) -> int:
+    status = Path(f"/proc/{editor.pid}/status").read_text()
+    return int(next(line.split()[1] for line in status.splitlines() if line.startswith("VmRSS:")))
+
+
+def test_nothing_is_kept_of_edits(tmp_path: Path) -> None:
+    with Editor(tmp_path, "--synthesis-seconds", "0") as editor:
+        editor.open("small.rscd", "robot R { }")
+
+        def type_so_often(count: int) -> int:
+            for _ in range(count):
+                editor.send("small.rscd", editor.changes("small.rscd", (0, 0, " ")))
+                editor.send("small.rscd", editor.changes("small.rscd", (0, 1, "")))
+            editor.findings("small.rscd")
+            return resident_kb(editor)
+
+        # Some 2.5 kB would be kept of each, if what was begun for it were.
+        before = type_so_often(1000)
+        assert type_so_often(2000) - before < 5000

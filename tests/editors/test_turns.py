@@ -1,0 +1,66 @@
+"""Syntheses beside an editor: one at a time, that of the text edited last first."""
+
+import asyncio
+
+from robosc_lsp.synthesis import Turns
+
+
+async def settled() -> None:
+    for _ in range(5):
+        await asyncio.sleep(0)
+
+
+def test_one_at_a_time_and_the_text_edited_last_first() -> None:
+    async def run() -> None:
+        turns, had = Turns(), list[str]()
+        ends = {name: asyncio.Event() for name in "abcd"}
+
+        async def synthesize(name: str) -> None:
+            async with turns.turn(name):
+                had.append(name)
+                await ends[name].wait()
+
+        for name in "abcd":
+            turns.prefer(name)
+        tasks = {name: asyncio.create_task(synthesize(name)) for name in "abcd"}
+        await settled()
+        assert had == ["a"]
+        turns.prefer("c")
+        turns.forget("d")
+        ends["a"].set()
+        await settled()
+        assert had == ["a", "c"]
+        # Who does not want it any more keeps nobody waiting, be it while it waits or while it is at it.
+        tasks["b"].cancel()
+        await settled()
+        assert had == ["a", "c"]
+        tasks["c"].cancel()
+        await settled()
+        assert had == ["a", "c", "d"]
+        ends["d"].set()
+        await tasks["d"]
+        await asyncio.create_task(synthesize("a"))
+        assert had == ["a", "c", "d", "a"]
+
+    asyncio.run(run())
+
+
+def test_one_that_is_cancelled_as_it_is_its_turn_gives_it_on() -> None:
+    async def run() -> None:
+        turns, had = Turns(), list[str]()
+
+        async def synthesize(name: str) -> None:
+            async with turns.turn(name):
+                had.append(name)
+
+        first = turns.turn("a")
+        await first.__aenter__()
+        tasks = [asyncio.create_task(synthesize(name)) for name in "bc"]
+        await settled()
+        turns.prefer("b")
+        await first.__aexit__(None, None, None)
+        tasks[0].cancel()
+        await asyncio.wait(tasks)
+        assert had == ["c"]
+
+    asyncio.run(run())

@@ -1,0 +1,85 @@
+"""What can be written: of a sound text, every word is offered where it stands, and every name."""
+
+import pytest
+from hypothesis import given
+
+from robosc.editing.completion import Candidate, Surroundings, complete
+from robosc.editing.names import Names
+from robosc.language import load_bundle, parse, syntax
+from robosc.language.tokens import Kind, tokenize
+from robosc.model.check import check, inspect
+from robosc.source import Bundle, SourceFile
+from support.models import EXAMPLE_NAMES, EXAMPLES, bundle_of
+from support.random_models import models
+
+NOTHING = Surroundings()
+
+
+def surroundings_of(bundle: Bundle) -> Surroundings:
+    """The libraries of a bundle."""
+    trees = [parse(file).tree for file in bundle.libraries]
+    return Surroundings(
+        {
+            tree.name.text: tuple(item.name.text for item in tree.items if isinstance(item, syntax.Component))
+            for tree in trees
+            if tree is not None
+        }
+    )
+
+
+def offered(text: str, surroundings: Surroundings = NOTHING, **libraries: str) -> dict[str, Candidate]:
+    """What is offered at the `|` of a text."""
+    before, _, behind = text.partition("|")
+    _, found = complete(
+        before + behind, len(before), inspect(bundle_of(before + behind, **libraries)), lambda: surroundings
+    )
+    assert len({item.text for item in found}) == len(found)
+    return {item.text: item for item in found}
+
+
+def check_every_word(bundle: Bundle, step: int) -> int:
+    """Each word and bound name of a sound text, with its first character typed alone; how many there were."""
+    text = bundle.main.text
+    texts, kinds, starts = tokenize(text)
+    lines = [0]
+    for line in text.split("\n"):
+        lines.append(lines[-1] + len(line) + 1)
+    used = {
+        lines[place.line - 1] + place.column - 1
+        for place, definition in Names(inspect(bundle)).occurrences(bundle.main.name)
+        if place != definition.location
+    }
+    count = 0
+    for number, (word, kind, start) in enumerate(zip(texts, kinds, starts, strict=True)):
+        if number % step or not (kind == Kind.WORD or start in used):
+            continue
+        typed = text[: start + 1] + text[start + len(word) :]
+        inspected = inspect(
+            Bundle(SourceFile(bundle.main.name, typed), bundle.libraries, bundle.searched, bundle.interfaces)
+        )
+        begin, found = complete(typed, start + 1, inspected, lambda: surroundings_of(bundle))
+        assert begin == start
+        # A `^` may stand before any name.
+        names = {item.text.removesuffix(":").removeprefix("^") for item in found}
+        assert word.removeprefix("^") in names, (text[:start][-80:], word)
+        count += 1
+    return count
+
+
+@given(models())
+def test_every_word_of_a_random_model_is_offered(bundle: Bundle) -> None:
+    if check(bundle).model is not None:
+        check_every_word(bundle, 9)
+
+
+@pytest.mark.parametrize("example", EXAMPLE_NAMES)
+def test_every_word_of_an_example_is_offered(example: str) -> None:
+    assert check_every_word(load_bundle(EXAMPLES / f"{example}.rscd"), 3) > 20
+
+
+def test_comments_that_have_ended_hold_nothing() -> None:
+    text = "robot R {{ component C {{ behaviour {{ initial marked state s {{ transition goto {} }} }} }} }}"
+    for before in ("/* http://a.b */ |", "// a\n |", "// /* a\n |", "/* a\n// */ |", "/* a */ /* // */|"):
+        assert "s" in offered(text.format(before)), before
+    for before in ("// |", "/* a */ // |", "// /* a */ |", "/* |", "/* a */ /* // |", "/* a */ // /* |"):
+        assert not offered(text.format(before)), before

@@ -1,0 +1,91 @@
+"""Mends of findings: each makes the text right that somebody meant."""
+
+import pytest
+
+from robosc.editing.mends import mends
+from robosc.model.check import inspect
+from robosc.source import Bundle, SourceFile
+
+ROBOT = """robot R {
+    component C {
+        outgoing message m with type: integer
+        incoming message go with type: none
+        behaviour {
+            variable n: integer(0..3)
+            on response from m do n := 1
+            initial marked state a {
+                on request to go goto b
+            }
+            state b {
+                on request to go goto a
+            }
+        }
+    }
+    requirement C.a and !C.b and C.n = 2 disables go
+}
+"""
+
+
+def titles_and_texts(text: str) -> dict[str, str]:
+    """What each mend of a text's first finding says, and the text with it."""
+    found = inspect(Bundle(SourceFile("r.rscd", text))).checked.diagnostics
+    lines = text.split("\n")
+    results = {}
+    for item in found[:1]:
+        assert item.location is not None
+        for mend in mends(item, lines[item.location.line - 1]):
+            place = mend.location
+            begin = sum(len(line) + 1 for line in lines[: place.line - 1]) + place.column - 1
+            results[mend.title] = text[:begin] + mend.text + text[begin + place.length :]
+    return results
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "title"),
+    [
+        ("C.a and !C.b", "C.a && !C.b", "Write 'and'"),
+        ("C.a and !C.b", "C.a & !C.b", "Write 'and'"),
+        ("C.a and !C.b and C.n", "C.a and !C.b&&C.n", "Write 'and'"),
+        ("!C.b and", "!C.b or", None),
+        ("!C.b", "not C.b", "Write '!'"),
+        ("C.n = 2", "C.n == 2", "Remove '='"),
+        ("type: none", "type: none;", "Remove ';'"),
+        ("!C.b", "!C.b)", "Remove ')'"),
+        ("incoming message", "message", "Write 'incoming message'"),
+        ("outgoing message", "message", "Write 'outgoing message'"),
+        ("behaviour", "behavoiur", "Write 'behaviour'"),
+        ("integer(0..3)", "integer(3..0)", "Write 'integer(0..3)'"),
+        ("C.n = 2", "C.n.x = 2", "Remove '.x'"),
+        ("goto b", "goto bb", None),
+        ("on request to go goto b", "on response from go goto b", "Write 'on request'"),
+        ("on response from m", "on feedback from m", "Write 'on response'"),
+        ("on response from m", "on response to m", "Write 'from'"),
+        ("C.n = 2", "c.n = 2", "Write 'C'"),
+    ],
+)
+def test_what_was_meant_comes_back(right: str, wrong: str, title: str | None) -> None:
+    assert right in ROBOT
+    found = titles_and_texts(ROBOT.replace(right, wrong, 1))
+    if title is None:
+        assert found == {}
+    else:
+        assert found[title] == ROBOT
+
+
+def test_the_model_is_sound() -> None:
+    assert not any(item.severity == "error" for item in inspect(Bundle(SourceFile("r", ROBOT))).checked.diagnostics)
+
+
+def test_a_word_is_made_a_name() -> None:
+    found = titles_and_texts("robot R { component state { } }")
+    assert found == {"Write '^state'": "robot R { component ^state { } }"}
+
+
+def test_a_word_that_is_missing_is_written() -> None:
+    found = titles_and_texts("robot R { component C from Parts Lamp }")
+    assert found == {"Write 'import' before it": "robot R { component C from Parts import Lamp }"}
+
+
+def test_bars_are_a_word() -> None:
+    found = titles_and_texts("robot R { requirement A||B disables c }")
+    assert found == {"Write 'or'": "robot R { requirement A or B disables c }"}

@@ -1,0 +1,279 @@
+"""An editor without a screen: it starts the language server and speaks to it as editors do, over its standard streams.
+
+What it knows of texts and positions is its own, slow and obvious: it cuts texts in the units of the protocol.
+"""
+
+import asyncio
+import os
+import re
+import signal
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext, suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from lsprotocol import types as lsp
+from pygls.lsp.client import LanguageClient
+
+from robosc import __version__
+
+LIMIT_S = 30.0
+_UNITS = {"utf-8": ("utf-8", 1), "utf-16": ("utf-16-le", 2), "utf-32": ("utf-32-le", 4)}
+
+
+def line_begins(text: str) -> list[int]:
+    """The offset of each line's begin, as the protocol ends lines."""
+    return [0, *(found.end() for found in re.finditer(r"\r\n|\r|\n", text))]
+
+
+def position_of(text: str, offset: int, encoding: str = "utf-16") -> lsp.Position:
+    """The position of an offset."""
+    codec, size = _UNITS[encoding]
+    line = sum(begin <= offset for begin in line_begins(text)) - 1
+    before = text[line_begins(text)[line] : offset]
+    return lsp.Position(line, len(before.encode(codec)) // size)
+
+
+def offset_of(text: str, position: lsp.Position, encoding: str = "utf-16") -> int:
+    """The offset of a position that is in the text."""
+    codec, size = _UNITS[encoding]
+    begin = line_begins(text)[position.line]
+    taken = text[begin:].encode(codec)[: position.character * size]
+    return begin + len(taken.decode(codec))
+
+
+def part_of(text: str, where: lsp.Range) -> str:
+    """What stands in a range."""
+    return text[offset_of(text, where.start) : offset_of(text, where.end)]
+
+
+def with_edits(text: str, edits: Sequence[lsp.TextEdit]) -> str:
+    """A text after edits that do not overlap."""
+    for edit in sorted(edits, key=lambda edit: (edit.range.start.line, edit.range.start.character), reverse=True):
+        text = text[: offset_of(text, edit.range.start)] + edit.new_text + text[offset_of(text, edit.range.end) :]
+    return text
+
+
+async def _all_of(stream: asyncio.StreamReader | None) -> bytes:
+    return b"" if stream is None else await stream.read()
+
+
+class Editor:
+    """An editor that works on a folder; leaving its block ends the server, which must end well.
+
+    Args:
+        folder: With the files.
+        options: Of the server's command line.
+        encodings: What it can count columns in, in its order.
+        variables: The server's environment; None: that of the tests.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        *options: str,
+        encodings: Sequence[str] = ("utf-16",),
+        variables: Mapping[str, str] | None = None,
+    ) -> None:
+        self.folder = folder
+        self.texts: dict[str, str] = {}
+        self.told: dict[str, lsp.PublishDiagnosticsParams] = {}
+        self.lenses_refreshed = 0
+        self.watched: list[lsp.Registration] = []
+        self._options = options
+        self._encodings = [lsp.PositionEncodingKind(item) for item in encodings]
+        self._variables = variables
+        self._versions: dict[str, int] = {}
+        self._is_killed = False
+        self._runner = asyncio.Runner()
+        self._news = asyncio.Event()
+        self.client = LanguageClient("editor", __version__)
+        self._listen()
+
+    def _listen(self) -> None:
+        @self.client.feature(lsp.TEXT_DOCUMENT_PUBLISH_DIAGNOSTICS)  # type: ignore[untyped-decorator]
+        def findings(told: lsp.PublishDiagnosticsParams) -> None:
+            self.told[told.uri] = told
+            self._news.set()
+
+        @self.client.feature(lsp.WORKSPACE_CODE_LENS_REFRESH)  # type: ignore[untyped-decorator]
+        def refresh(_: None) -> None:
+            self.lenses_refreshed += 1
+            self._news.set()
+
+        @self.client.feature(lsp.CLIENT_REGISTER_CAPABILITY)  # type: ignore[untyped-decorator]
+        def register(asked: lsp.RegistrationParams) -> None:
+            self.watched += asked.registrations
+            self._news.set()
+
+    def run(self, coroutine: Any) -> Any:
+        """Wait for something, at most `LIMIT_S`."""
+
+        async def limited() -> Any:
+            async with asyncio.timeout(LIMIT_S):
+                return await coroutine
+
+        return self._runner.run(limited())
+
+    @property
+    def pid(self) -> int:
+        """The server's process."""
+        process = self.client._server
+        assert process is not None
+        return process.pid
+
+    def kill(self, number: signal.Signals) -> None:
+        """End the server by a signal."""
+        self._is_killed = True
+        os.kill(self.pid, number)
+
+    def __enter__(self) -> Self:
+        command = (sys.executable, "-P", "-m", "robosc_lsp.command", "--stdio", *self._options)
+        self.run(self.client.start_io(*command, env=self._variables, cwd=self.folder))
+        capabilities = lsp.ClientCapabilities(
+            general=lsp.GeneralClientCapabilities(position_encodings=self._encodings),
+            workspace=lsp.WorkspaceClientCapabilities(
+                code_lens=lsp.CodeLensWorkspaceClientCapabilities(refresh_support=True),
+                did_change_watched_files=lsp.DidChangeWatchedFilesClientCapabilities(dynamic_registration=True),
+                workspace_folders=True,
+            ),
+            text_document=lsp.TextDocumentClientCapabilities(
+                publish_diagnostics=lsp.PublishDiagnosticsClientCapabilities(related_information=True),
+                document_symbol=lsp.DocumentSymbolClientCapabilities(hierarchical_document_symbol_support=True),
+            ),
+        )
+        folders = [lsp.WorkspaceFolder(self.folder.as_uri(), self.folder.name)]
+        parameters = lsp.InitializeParams(capabilities, root_uri=self.folder.as_uri(), workspace_folders=folders)
+        self.initialized = self.run(self.client.initialize_async(parameters))
+        self.encoding = lsp.PositionEncodingKind(self.initialized.capabilities.position_encoding).value
+        self.client.initialized(lsp.InitializedParams())
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        process = self.client._server
+        assert process is not None
+        try:
+            if not self._is_killed:
+                self.run(self.client.shutdown_async(None))
+                self.client.exit(None)
+                status = self.run(process.wait())
+                assert kind is not None or status == 0, self.run(_all_of(process.stderr))
+        finally:
+            if process.returncode is None:
+                process.kill()
+            with suppress(RuntimeError) if self._is_killed else nullcontext():  # That it has ended.
+                self.run(self.client.stop())  # type: ignore[no-untyped-call]
+            self._runner.close()
+
+    # Texts
+
+    def uri(self, name: str) -> str:
+        """The URI of a file of the folder."""
+        return (self.folder / name).as_uri() if ":" not in name else name
+
+    def document(self, name: str) -> lsp.TextDocumentIdentifier:
+        """How a file is told of."""
+        return lsp.TextDocumentIdentifier(self.uri(name))
+
+    def save(self, name: str, text: str) -> None:
+        """Write a file, and tell of it as an editor does that watches files."""
+        path = self.folder / name
+        kind = lsp.FileChangeType.Changed if path.exists() else lsp.FileChangeType.Created
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, "utf-8", newline="")
+        self.client.workspace_did_change_watched_files(
+            lsp.DidChangeWatchedFilesParams([lsp.FileEvent(self.uri(name), kind)])
+        )
+
+    def open(self, name: str, text: str) -> None:
+        """Show a file, whatever is saved."""
+        self.texts[name] = text
+        self._versions[name] = 1
+        item = lsp.TextDocumentItem(self.uri(name), "robosc", 1, text)
+        self.client.text_document_did_open(lsp.DidOpenTextDocumentParams(item))
+
+    def edit(self, name: str, *edits: tuple[int, int, str]) -> None:
+        """Replace what stands between offsets, one edit after the other, in one message."""
+        self.send(name, self.changes(name, *edits))
+
+    def changes(self, name: str, *edits: tuple[int, int, str]) -> list[lsp.TextDocumentContentChangeEvent]:
+        """Edits of what is shown, in the words of the protocol; to be sent."""
+        changes: list[lsp.TextDocumentContentChangeEvent] = []
+        for begin, end, new in edits:
+            text = self.texts[name]
+            where = lsp.Range(self.position(text, begin), self.position(text, end))
+            changes.append(lsp.TextDocumentContentChangePartial(text=new, range=where))
+            self.texts[name] = text[:begin] + new + text[end:]
+        return changes
+
+    def replace(self, name: str, text: str) -> None:
+        """Give the whole text anew."""
+        self.texts[name] = text
+        self.send(name, [lsp.TextDocumentContentChangeWholeDocument(text)])
+
+    def send(self, name: str, changes: list[lsp.TextDocumentContentChangeEvent]) -> None:
+        """Tell of changes."""
+        self._versions[name] += 1
+        document = lsp.VersionedTextDocumentIdentifier(self._versions[name], self.uri(name))
+        self.client.text_document_did_change(lsp.DidChangeTextDocumentParams(document, changes))
+
+    def close(self, name: str) -> None:
+        """Show a file no more."""
+        del self.texts[name], self._versions[name]
+        self.client.text_document_did_close(lsp.DidCloseTextDocumentParams(self.document(name)))
+
+    def position(self, text: str, offset: int) -> lsp.Position:
+        """The position of an offset, in what columns are counted in here."""
+        return position_of(text, offset, self.encoding)
+
+    def at(self, name: str, words: str) -> lsp.TextDocumentPositionParams:
+        """The place of the `|` in some words, which stand once in the file as it is shown."""
+        text = self.texts[name]
+        plain = words.replace("|", "")
+        assert text.count(plain) == 1, f"{plain!r} stands {text.count(plain)} times there"
+        offset = text.index(plain) + words.index("|")
+        return lsp.TextDocumentPositionParams(self.document(name), self.position(text, offset))
+
+    def where(self, name: str, words: str) -> lsp.Location:
+        """The place of what stands between two `|` in some words, which stand once in the file as it is shown."""
+        begin, end = words.index("|"), words.rindex("|") - 1
+        text = self.texts[name]
+        plain = words.replace("|", "")
+        assert text.count(plain) == 1, f"{plain!r} stands {text.count(plain)} times there"
+        at = text.index(plain)
+        where = lsp.Range(self.position(text, at + begin), self.position(text, at + end))
+        return lsp.Location(self.uri(name), where)
+
+    # What it is told
+
+    def until(self, condition: Callable[[], bool]) -> None:
+        """Wait until the server has told something."""
+
+        async def wait() -> None:
+            while not condition():
+                self._news.clear()
+                await self._news.wait()
+
+        self.run(wait())
+
+    def findings(
+        self, name: str, such: Callable[[list[lsp.Diagnostic]], bool] = lambda found: True
+    ) -> list[lsp.Diagnostic]:
+        """What is found in the text as it is shown, once it is told and as it is wanted."""
+        uri = self.uri(name)
+
+        def is_told() -> bool:
+            told = self.told.get(uri)
+            return told is not None and told.version == self._versions[name] and such(list(told.diagnostics))
+
+        self.until(is_told)
+        return list(self.told[uri].diagnostics)
+
+    def codes(self, name: str, such: Callable[[list[str]], bool] = lambda codes: True) -> list[str]:
+        """The codes of what is found; see `findings`."""
+        found = self.findings(name, lambda found: such([str(item.code) for item in found]))
+        return [str(item.code) for item in found]

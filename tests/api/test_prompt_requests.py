@@ -72,7 +72,7 @@ def test_a_request_comes_in_time_or_the_call_ends(name: str) -> None:
                     grpc.StatusCode.INVALID_ARGUMENT,
                     "the request comes within 0.2 seconds",
                 )
-            assert LIMIT_S <= time.monotonic() - begun_s < PATIENCE_S / 2
+            assert time.monotonic() - begun_s >= LIMIT_S
             # One that ends its requests without any need not be waited for, and the next ones are answered.
             spoken: Any = channel.stream_stream(f"/test.Kinds/{name}")(timeout=PATIENCE_S)
             await spoken.write(b"said")

@@ -10,7 +10,7 @@ import pytest
 from robosc_bridge.devices.dynamixel_bus import DynamixelBus
 from robosc_bridge.errors import DeviceSilentError
 from robosc_bridge.transport.serial_line import SerialLine
-from support.peer import Peer, status
+from support.peer import Answers, Peer, status
 
 LIMIT_S = 0.1
 
@@ -50,6 +50,24 @@ def test_all_requests_of_a_cycle_end_with_it() -> None:
 def test_a_clock_that_is_set_back_prolongs_no_wait(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(time, "time", itertools.count(1e9, -1.0).__next__)
     with Peer(lambda request: []) as peer, _bus(peer) as bus:
+        bus.begin(1.0, repeats=0)
+        begin_s = time.monotonic()
+        with pytest.raises(DeviceSilentError):
+            bus.ping(1)
+        assert time.monotonic() - begin_s < 3 * LIMIT_S
+
+
+@pytest.mark.real_time
+def test_an_endless_stream_of_foreign_bytes_ends_the_wait_all_the_same() -> None:
+    flood = [status(7, b"1234"), b"\xff\xff\xfd\x00" * 50]
+
+    def babble(request: bytes) -> Answers:
+        end_s = time.monotonic() + 5 * LIMIT_S
+        while time.monotonic() < end_s:
+            yield from flood
+            yield 0.001
+
+    with Peer(babble) as peer, _bus(peer) as bus:
         bus.begin(1.0, repeats=0)
         begin_s = time.monotonic()
         with pytest.raises(DeviceSilentError):

@@ -1,7 +1,6 @@
 """Cameras as streams: of a simulator's socket, and of a process that reads a film or a device that hangs."""
 
 import os
-import signal
 import socket
 import subprocess
 import sys
@@ -125,9 +124,6 @@ def test_a_socket_that_is_missing_or_nobody_serves_is_told(tmp_path: Path) -> No
         make_camera(SIMULATED + "x" * 200).open()
 
 
-# Films and devices.
-
-
 def film(path: Path, pictures: int, rate_hz: float) -> Path:
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), rate_hz, (64, 48))
     for number in range(pictures):
@@ -160,20 +156,6 @@ def test_a_film_is_shown_at_its_speed_and_ends(tmp_path: Path) -> None:
     camera.close()
     camera.close()
     assert process.returncode is not None
-
-
-def test_a_camera_that_hangs_while_it_is_opened_is_left(tmp_path: Path) -> None:
-    """Whoever opens a pipe without a writer waits for ever."""
-    path = tmp_path / "hangs"
-    os.mkfifo(path)
-    camera = make_camera(str(path))
-    camera.open()
-    process = process_of(camera)
-    assert camera.receive(0.1) is None
-    begin_s = time.monotonic()
-    camera.close()
-    assert time.monotonic() - begin_s < 2.0
-    assert process.returncode == -signal.SIGKILL
 
 
 def test_its_process_ends_with_the_bridge_even_while_it_hangs(tmp_path: Path) -> None:

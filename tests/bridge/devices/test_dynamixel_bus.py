@@ -157,23 +157,6 @@ def test_waiting_costs_nothing() -> None:
     assert end.ru_utime + end.ru_stime - begin.ru_utime - begin.ru_stime < 0.05
 
 
-def test_an_endless_stream_of_foreign_bytes_ends_the_wait_all_the_same() -> None:
-    flood = [status(7, b"1234"), b"\xff\xff\xfd\x00" * 50]
-
-    def babble(request: bytes) -> Answers:
-        end_s = time.monotonic() + 5 * LIMIT_S
-        while time.monotonic() < end_s:
-            yield from flood
-            yield 0.001
-
-    with Peer(babble) as peer, _bus(peer) as bus:
-        bus.begin(1.0, repeats=0)
-        begin_s = time.monotonic()
-        with pytest.raises(DeviceSilentError):
-            bus.ping(1)
-        assert time.monotonic() - begin_s < 3 * LIMIT_S
-
-
 def test_a_late_answer_is_not_taken_for_that_to_the_next_request() -> None:
     # Of the same shape, and so late that the next request is out already.
     late: Answers = [1.5 * LIMIT_S, status(1, b"late")]

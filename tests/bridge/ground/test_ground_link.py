@@ -300,20 +300,6 @@ def test_the_last_heartbeat_says_that_it_ends() -> None:
         assert of_type("HEARTBEAT", station.station.heard)[-1].system_status == 7
 
 
-def test_it_may_be_stopped_at_any_time() -> None:
-    link = GroundLink(PlayedDaemon().operations, GroundSettings("udpin:127.0.0.1:0", FASTEST))
-    link.stop()
-    link = GroundLink(PlayedDaemon().operations, GroundSettings("tcp:127.0.0.1:1", FASTEST))
-    assert not link.is_alive
-    link.start()
-    assert link.is_alive
-    began_s = time.monotonic()
-    link.stop()
-    assert not link.is_alive
-    link.stop()
-    assert time.monotonic() - began_s < 2.0
-
-
 def test_an_error_inside_ends_nothing(caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch) -> None:
     with peer() as station, linked(f"udpout:127.0.0.1:{station.port}") as (_, link):
         station.until("HEARTBEAT")

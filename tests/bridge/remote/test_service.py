@@ -241,9 +241,7 @@ class TestStop:
             assert code is grpc.StatusCode.RESOURCE_EXHAUSTED
             assert details == "there are 100 watchers already"
             with connected(face.address) as stub:
-                begin_s = time.monotonic()
                 stub.Stop(pb.StopRequest(), timeout=PATIENCE_S)
-                assert time.monotonic() - begin_s < 2.0
             assert daemon.commands() == [Command.STOP]
         finally:
             for call in calls:

@@ -1,11 +1,8 @@
 """Callers without a token who hold connections and calls, over real sockets."""
 
-import logging
 import socket
 import struct
-import threading
 import time
-from collections.abc import Iterator
 from typing import Any
 
 import grpc
@@ -118,28 +115,3 @@ def test_calls_of_a_connection_are_bounded(face: RemoteFace) -> None:
         told = next(content for kind, flags, content in stranger.frames if kind == SETTINGS and not flags)
         settings = {struct.unpack_from(">HI", told, at) for at in range(0, len(told), 6)}
         assert (3, MAXIMUM_CALLS) in settings
-
-
-def test_streams_without_an_end_do_not_keep_it_from_ending(
-    daemon: FakeDaemon, face: RemoteFace, caplog: pytest.LogCaptureFixture
-) -> None:
-    forever = threading.Event()
-
-    def nothing() -> Iterator[bytes]:
-        forever.wait(PATIENCE_S)
-        yield from ()
-
-    channel: Any
-    with grpc.insecure_channel(face.address) as channel:
-        reflect = channel.stream_stream("/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo")
-        attach = channel.stream_stream("/robosc_api.v1.BridgeService/Attach")
-        calls = [reflect(nothing()) for _ in range(20)] + [attach(nothing()) for _ in range(5)]
-        # What comes after them on the same connection is answered after them.
-        health_pb2_grpc.HealthStub(channel).Check(health_pb2.HealthCheckRequest(), timeout=PATIENCE_S)
-        begin_s = time.monotonic()
-        face.stop()
-        assert time.monotonic() - begin_s < 4.0
-        forever.set()
-        # The last ones on a busy machine are ended by gRPC itself.
-        assert "the bridge ends" in {call.details() for call in calls} <= {"the bridge ends", "CANCELLED"}
-    assert not [record for record in caplog.records if record.levelno >= logging.ERROR or record.exc_info]

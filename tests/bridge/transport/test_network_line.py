@@ -1,8 +1,6 @@
 """Lines over real sockets of this computer."""
 
 import socket
-import threading
-import time
 from collections.abc import Iterator
 
 import pytest
@@ -106,35 +104,11 @@ def test_a_connection_carries_bytes_both_ways_and_tells_its_end(server: socket.s
     line.close()
 
 
-def test_a_connection_that_takes_no_more_is_told_in_time(server: socket.socket) -> None:
-    line = NetworkLine(f"tcp:127.0.0.1:{_port(server)}")
-    other, _ = server.accept()
-    begin_s = time.monotonic()
-    with pytest.raises(LineLostError, match="takes no more bytes"):
-        line.write(b"x" * 50_000_000)
-    assert time.monotonic() - begin_s < 2.0
-    other.close()
-    line.close()
-
-
 def test_nobody_serves_there(server: socket.socket) -> None:
     port = _port(server)
     server.close()
     with pytest.raises(LineMissingError, match="nobody serves there"):
         NetworkLine(f"tcp:127.0.0.1:{port}")
-
-
-def test_waiting_ends_in_time_or_when_woken(peer: socket.socket) -> None:
-    line = NetworkLine(f"udpout:127.0.0.1:{_port(peer)}")
-    begin_s = time.monotonic()
-    assert line.read(0.05) == b""
-    assert 0.04 < time.monotonic() - begin_s < 1.0
-    timer = threading.Timer(0.05, line.wake)
-    timer.start()
-    assert line.read(5.0) == b""
-    assert time.monotonic() - begin_s < 3.0
-    timer.join()
-    line.close()
 
 
 def test_a_closed_line_is_told_and_leaves_nothing(peer: socket.socket) -> None:

@@ -88,9 +88,6 @@ class Background:
         return self.result
 
 
-# Reading and writing
-
-
 def test_bytes_arrive_as_they_were_sent_in_both_directions(pty: PtyEnd, line: SerialLine) -> None:
     every = bytes(range(256))
     pty.send(every)
@@ -111,22 +108,6 @@ def test_reading_gives_up_at_its_limit(line: SerialLine) -> None:
     begin_s = time.monotonic()
     assert line.read(0.05) == b""
     assert time.monotonic() - begin_s >= 0.049
-
-
-@pytest.mark.parametrize("limit_s", [0.0, -1.0])
-def test_without_a_limit_reading_does_not_wait(pty: PtyEnd, line: SerialLine, limit_s: float) -> None:
-    begin_s = time.monotonic()
-    assert line.read(limit_s) == b""
-    assert time.monotonic() - begin_s < 1.0
-    pty.send(b"x")
-    assert line.read(limit_s) == b"x"
-
-
-def test_a_full_line_is_an_error_after_the_limit(line: SerialLine) -> None:
-    begin_s = time.monotonic()
-    with pytest.raises(LineLostError, match="takes no more bytes"):
-        line.write(b"x" * 1_000_000, 0.1)
-    assert 0.09 <= time.monotonic() - begin_s < LIMIT_S
 
 
 def test_a_line_that_becomes_free_takes_the_rest(pty: PtyEnd, line: SerialLine) -> None:
@@ -151,9 +132,6 @@ def test_discarded_input_does_not_come(pty: PtyEnd, line: SerialLine) -> None:
     line.discard_input()
     pty.send(b"new")
     assert _everything(line, 3) == b"new"
-
-
-# Waking
 
 
 def test_wake_lets_a_waiting_read_return(line: SerialLine) -> None:
@@ -186,9 +164,6 @@ def test_wake_does_not_take_bytes_along(pty: PtyEnd, line: SerialLine) -> None:
     pty.send(b"x")
     line.wake()
     assert _everything(line, 1) == b"x"
-
-
-# Opening
 
 
 def test_a_missing_port() -> None:
@@ -266,9 +241,6 @@ def test_the_speed_is_set_and_can_be_changed(pty: PtyEnd) -> None:
 
 def test_a_pseudo_terminal_has_no_modem_lines(line: SerialLine) -> None:
     line.set_dtr(False)
-
-
-# Losing and closing
 
 
 def test_a_line_that_is_lost_while_a_thread_reads(pty: PtyEnd, line: SerialLine) -> None:

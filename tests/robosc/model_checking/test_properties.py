@@ -1,7 +1,5 @@
 """The language of properties: what it takes, what it means, and what it says about the rest."""
 
-import time
-
 import pytest
 
 from robosc.errors import LanguageError
@@ -146,11 +144,9 @@ def test_depth_and_size_are_bounded() -> None:
     assert "nested deeper" in faults("(" * 1000 + "A.G")[0]
     assert "nested deeper" in faults("AG !" * 150 + "A.G")[0]
     assert "AG" in read("AG " * 150 + "A.G")
-    begin = time.process_time()
     chain = " and ".join(["EF A.X", "A.G"] * 5_000)
     assert len(read(chain)) > 50_000
     assert len(read("AG (" + " or ".join(["A.n = 1"] * 10_000) + ")")) > 50_000
-    assert time.process_time() - begin < 20
 
 
 def test_so_many_faults_are_told() -> None:

@@ -7,7 +7,6 @@ import stat
 import subprocess
 import sys
 import threading
-import time
 from pathlib import Path
 
 import pytest
@@ -128,26 +127,6 @@ def test_a_transaction_that_takes_too_long_is_cut_off_and_the_next_one_is_served
         store._database._answer_s = PATIENCE_S
         assert await store.find("x") is None
         assert store.is_available
-
-    in_loop(test)
-    store.close()
-
-
-def test_the_event_loop_is_never_held_up(tmp_path: Path) -> None:
-    store = open_store(tmp_path)
-
-    def slow(connection: Connection) -> None:
-        time.sleep(0.3)
-
-    async def test() -> None:
-        loop = asyncio.get_running_loop()
-        writing = asyncio.gather(*(store._database.write(slow) for _ in range(2)))
-        worst_s, last_s = 0.0, loop.time()
-        while not writing.done():
-            await asyncio.sleep(0.005)
-            worst_s, last_s = max(worst_s, loop.time() - last_s), loop.time()
-        await writing
-        assert worst_s < 0.25
 
     in_loop(test)
     store.close()

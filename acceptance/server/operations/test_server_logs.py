@@ -1,0 +1,17 @@
+"""What lines of the log look like, and what never stands in them."""
+
+import time
+
+import pytest
+
+from robosc_server.operations.worker_words import safe_words
+
+
+@pytest.mark.real_time
+@pytest.mark.parametrize(
+    "words", ["\n" * 60_000, " " * 60_000, '  File "' * 8_000, "a." * 30_000, '  File "/robosc/' * 4_000]
+)
+def test_a_workers_words_are_looked_through_in_no_time(words: str) -> None:
+    begun_s = time.process_time()
+    safe_words(words)
+    assert time.process_time() - begun_s < 1.0

@@ -1,8 +1,7 @@
 """Drive bases on simulated robots, with what goes over their line kept."""
 
-import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 
 from robosc_bridge.devices.dynamixel import DynamixelBase
@@ -11,8 +10,11 @@ from robosc_bridge.devices.interface import STANDSTILL, DriveReading, Velocity
 from robosc_bridge.devices.mavlink_rover import MavlinkRover
 from robosc_bridge.devices.opencr import OpenCrBase
 from robosc_bridge.devices.robots import ROBOTS
+from robosc_bridge.host import Host
 from robosc_bridge.simulated import SimulatedTurtleBot3
 from robosc_bridge.simulated.line import Device, Sending
+from robosc_bridge.simulated.virtual_host import VirtualHost
+from robosc_bridge.transport.system_host import SystemHost
 
 # The simulator is a thread of this process, on a machine that may be busy; time-outs are for the tests of time-outs.
 PATIENT_S = 0.5
@@ -63,12 +65,14 @@ class Rig:
         base: Its driver, of the kind `kind`.
         kind: `opencr`, `dynamixel` or `mavlink-rover`.
         tap: On its line; understands the packets of Dynamixel only.
+        host: On which both run.
     """
 
     robot: SimulatedTurtleBot3
     base: OpenCrBase | DynamixelBase | MavlinkRover
     kind: str
     tap: Tap
+    host: Host
 
     def start(self) -> None:
         """Open it and switch torque on."""
@@ -89,22 +93,29 @@ class Rig:
 
     def drive(self, velocity: Velocity = STANDSTILL, seconds: float = 0.0) -> DriveReading:
         """Exchange for so long; the last reading."""
-        end_s = time.monotonic() + seconds
+        end_s = self.host.monotonic() + seconds
         while True:
             reading = self.base.exchange(velocity)
-            if time.monotonic() >= end_s:
+            if self.host.monotonic() >= end_s:
                 return reading
-            time.sleep(PERIOD_S)
+            self.host.sleep(PERIOD_S)
 
     def drive_until(
         self, is_so: Callable[[DriveReading], bool], velocity: Velocity = STANDSTILL, limit_s: float = 5.0
     ) -> DriveReading:
         """Exchange until a reading is as awaited; that reading."""
-        end_s = time.monotonic() + limit_s
+        end_s = self.host.monotonic() + limit_s
         while not is_so(reading := self.base.exchange(velocity)):
-            assert time.monotonic() < end_s, f"not within {limit_s} s; the last reading is {reading}"
-            time.sleep(PERIOD_S)
+            assert self.host.monotonic() < end_s, f"not within {limit_s} s; the last reading is {reading}"
+            self.host.sleep(PERIOD_S)
         return reading
+
+    def until(self, condition: Callable[[], bool], limit_s: float = 5.0) -> None:
+        """Wait for something, without anything being exchanged."""
+        end_s = self.host.monotonic() + limit_s
+        while not condition():
+            assert self.host.monotonic() < end_s, f"not within {limit_s} s"
+            self.host.sleep(0.001)
 
     def goals_rad_s(self) -> tuple[float, float]:
         """What the wheels' motors are told to do, forward positive; 0 without torque."""
@@ -114,34 +125,45 @@ class Rig:
 
     def stops_within(self, seconds: float) -> bool:
         """Whether the motors are told to stand still in time, without anything being exchanged."""
-        end_s = time.monotonic() + seconds
+        end_s = self.host.monotonic() + seconds
         while self.goals_rad_s() != (0.0, 0.0):
-            if time.monotonic() > end_s:
+            if self.host.monotonic() > end_s:
                 return False
-            time.sleep(0.002)
+            self.host.sleep(0.002)
         return True
 
 
 @contextmanager
-def rig(kind: str, robot: str = "burger", answer_limit_s: float = PATIENT_S, **arguments: object) -> Iterator[Rig]:
+def rig(
+    kind: str,
+    robot: str = "burger",
+    answer_limit_s: float = PATIENT_S,
+    host: VirtualHost | SystemHost | None = None,
+    **arguments: object,
+) -> Iterator[Rig]:
     """A simulated robot and its driver, not opened.
 
     Args:
         kind: `opencr`, `dynamixel` or `mavlink-rover`.
         robot: Its name.
         answer_limit_s: Of the driver, if it asks.
+        host: On which both run; None: a virtual one.
         arguments: Further ones of the simulated robot.
     """
-    with SimulatedTurtleBot3(robot, kind, **arguments) as simulated:  # type: ignore[arg-type]
+    host = VirtualHost() if host is None else host
+    with (
+        host if isinstance(host, VirtualHost) else nullcontext(),
+        SimulatedTurtleBot3(robot, kind, **{"clock": host, **arguments}) as simulated,  # type: ignore[arg-type]
+    ):
         tap = Tap(simulated.base_line.device)
         simulated.base_line.device = tap
         base: OpenCrBase | DynamixelBase | MavlinkRover
         if kind == "mavlink-rover":
-            base = MavlinkRover(simulated.base_path, ROBOTS[robot].body)
+            base = MavlinkRover(simulated.base_path, ROBOTS[robot].body, host=host)
         else:
             driver = OpenCrBase if kind == "opencr" else DynamixelBase
-            base = driver(simulated.base_path, ROBOTS[robot], answer_limit_s=answer_limit_s)
+            base = driver(simulated.base_path, ROBOTS[robot], answer_limit_s=answer_limit_s, host=host)
         try:
-            yield Rig(simulated, base, kind, tap)
+            yield Rig(simulated, base, kind, tap, host)
         finally:
             base.close()

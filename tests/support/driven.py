@@ -1,26 +1,27 @@
-"""A whole bridge that drives a simulated robot over real pseudo-terminals, with what its wheels were told kept.
+"""A whole bridge that drives a simulated robot over serial lines, with what its wheels were told kept.
 
-The loop runs in a thread of its own, the devices' threads in theirs. What counts is what the simulated motors are told
-to do, at the time at which they hear it: neither the daemon's own word for it nor the test's look at it.
+On a virtual host everything happens at its exact time, whatever else the computer does; on this computer, over real
+pseudo-terminals. The loop runs in a thread of its own, the devices' threads in theirs. What counts is what the
+simulated motors are told to do, when they hear it: neither the daemon's own word for it nor the test's look at it.
 """
 
 import logging
-import threading
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from typing import Any
 
 from robosc.execution.event_log import MemoryLog
-from robosc.supervisor import make_supervisor
 from robosc_bridge.configuration import parse, tie
 from robosc_bridge.daemon.assembly import Machine, assemble, safety_limits
 from robosc_bridge.daemon.states import State
+from robosc_bridge.host import Host, Thread
 from robosc_bridge.safety import SafetyLimits
 from robosc_bridge.simulated import SimulatedTurtleBot3
 from robosc_bridge.simulated.line import Device, Sending
-from support.models import bundle_of
+from robosc_bridge.simulated.virtual_host import VirtualHost
+from robosc_bridge.transport.system_host import SYSTEM_HOST, SystemHost
+from support.daemons import supervisor_of
 from support.real_time import Lateness
 
 LIMIT_S = 15.0
@@ -108,17 +109,21 @@ class Recorded:
 class HangingLog(MemoryLog):
     """An event log that a test lets hang: it is written by the loop's thread, from inside the executor.
 
+    Args:
+        host: Where it hangs.
+
     Attributes:
-        released: Cleared, the next entry waits until it is set.
+        hangs: Whether the next entry waits.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, host: Host) -> None:
         super().__init__()
-        self.released = threading.Event()
-        self.released.set()
+        self.hangs = False
+        self._host = host
 
     def write(self, entry: dict[str, Any]) -> None:
-        self.released.wait(LIMIT_S)
+        while self.hangs:
+            self._host.sleep(0.001)
         super().write(entry)
 
     def events(self) -> list[str]:
@@ -131,6 +136,7 @@ class Driven:
     """A bridge at work.
 
     Attributes:
+        host: On which it runs.
         robot: The simulated one.
         machine: The daemon and its devices' threads.
         limits: Of its safety layer.
@@ -141,6 +147,7 @@ class Driven:
         error: What has ended the loop.
     """
 
+    host: Host
     robot: SimulatedTurtleBot3
     machine: Machine
     limits: SafetyLimits
@@ -148,10 +155,10 @@ class Driven:
     trace: Recorded
     messages: list[str]
     error: Exception | None = None
-    thread: threading.Thread = field(init=False)
+    thread: Thread = field(init=False)
 
     def __post_init__(self) -> None:
-        self.thread = threading.Thread(target=self._run, name="loop", daemon=True)
+        self.thread = self.host.thread(self._run, "loop")
 
     def _run(self) -> None:
         try:
@@ -165,10 +172,10 @@ class Driven:
 
     def until(self, condition: Callable[[], object], what: str, limit_s: float = LIMIT_S) -> None:
         """Wait for something."""
-        end_s = time.monotonic() + limit_s
+        end_s = self.host.monotonic() + limit_s
         while not condition():
-            assert time.monotonic() < end_s, f"waited {limit_s} s in vain for {what}; told: {self.messages}"
-            time.sleep(0.002)
+            assert self.host.monotonic() < end_s, f"waited {limit_s} s in vain for {what}; told: {self.messages}"
+            self.host.sleep(0.002)
 
     @property
     def wheels_m_s(self) -> tuple[float, float]:
@@ -183,7 +190,7 @@ class Driven:
     def steady(self) -> None:
         """Wait until it moves with the velocity that is wanted: nothing changes any more."""
         self.until(
-            lambda: self.wheels_m_s != (0.0, 0.0) and time.monotonic() - self.trace.told[-1][0] > 0.3,
+            lambda: self.wheels_m_s != (0.0, 0.0) and self.host.monotonic() - self.trace.told[-1][0] > 0.3,
             "a steady motion",
         )
 
@@ -192,10 +199,10 @@ class Driven:
 
         Args:
             cause: What happens.
-            limit_s: When it must have been so; a busy machine's lateness is added.
+            limit_s: When it must have been so; in real time, a busy machine's lateness is added.
         """
         self.steady()
-        with Lateness() as lateness:
+        with Lateness() if self.host is SYSTEM_HOST else nullcontext() as lateness:
             begin_s = self.robot.time.now_s()
             cause()
             self.until(lambda: self._is_still(begin_s), "the wheels to be told to stop")
@@ -203,7 +210,7 @@ class Driven:
         told = self.trace.told
         assert told[-1][1:] == (0.0, 0.0)
         took_s = told[-1][0] - begin_s
-        most_s = limit_s + HANDOVERS * lateness.worst_s
+        most_s = limit_s if lateness is None else limit_s + HANDOVERS * lateness.worst_s
         assert took_s <= most_s, f"{took_s:.3f} s instead of {limit_s:.3f} s, on this machine {most_s:.3f} s"
         return took_s
 
@@ -216,7 +223,7 @@ class Driven:
         """See that nothing is set in motion for so long."""
         before = len(self.trace.told)
         assert self.wheels_m_s == (0.0, 0.0)
-        time.sleep(seconds)
+        self.host.sleep(seconds)
         self.trace.look()
         assert all(wheels == [0.0, 0.0] for _, *wheels in self.trace.told[before:])
 
@@ -258,6 +265,7 @@ def driven(
     lidar: str = "lds03",
     velocity: tuple[float, float] = (0.06, 1.0),
     *,
+    host: VirtualHost | SystemHost | None = None,
     before: Callable[[SimulatedTurtleBot3], None] = lambda robot: None,
     **sections: str,
 ) -> Iterator[Driven]:
@@ -267,29 +275,32 @@ def driven(
         base: Driver of its drive base.
         lidar: Its LiDAR.
         velocity: That its supervisor wants, always.
+        host: On which it runs; None: a virtual one.
         before: What happens to the robot before the bridge starts.
         sections: Of the configuration, in YAML; `options`: of the drive (default: `PATIENT` where it is asked).
     """
-    text = MODEL.replace("LINEAR", str(velocity[0])).replace("ANGULAR", str(velocity[1]))
-    made = make_supervisor(bundle_of(text))
-    assert made.supervisor is not None, made.reason
+    supervisor = supervisor_of(MODEL.replace("LINEAR", str(velocity[0])).replace("ANGULAR", str(velocity[1])))
     handler = _Messages()
     logger = logging.getLogger("robosc_bridge")
     logger.addHandler(handler)
-    with SimulatedTurtleBot3("burger", base, lidar) as robot:
+    host = VirtualHost() if host is None else host
+    with (
+        host if isinstance(host, VirtualHost) else nullcontext(),
+        SimulatedTurtleBot3("burger", base, lidar, clock=host) as robot,
+    ):
         trace = Recorded(robot.base_line.device, robot)
         robot.base_line.device = trace
         before(robot)
         configuration = parse(configured(robot, base, lidar, sections).encode(), "test.yaml").configuration
-        log = HangingLog()
-        ties = tie(made.supervisor.model, configuration)
-        machine = assemble(configuration, ties, made.supervisor, log, starts_itself=True)
-        found = Driven(robot, machine, safety_limits(configuration), log, trace, handler.texts)
+        log = HangingLog(host)
+        ties = tie(supervisor.model, configuration)
+        machine = assemble(configuration, ties, supervisor, log, starts_itself=True, host=host)
+        found = Driven(host, robot, machine, safety_limits(configuration), log, trace, handler.texts)
         found.thread.start()
         try:
             yield found
         finally:
-            log.released.set()
+            log.hangs = False
             machine.quit()
             found.thread.join(LIMIT_S)
             logger.removeHandler(handler)

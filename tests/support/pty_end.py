@@ -5,6 +5,8 @@ import select
 import termios
 import time
 
+from robosc_bridge.transport.system_host import SystemHost
+
 LIMIT_S = 10.0
 """Longer than anything takes that works."""
 
@@ -57,15 +59,17 @@ class PtyEnd:
         return bool(poll.poll(limit_s * 1000))
 
 
-class SkippingClock:
-    """The real clock and what a test skips of it."""
+class SkippingClock(SystemHost):
+    """This computer, with its clock and what a test skips of it."""
 
     def __init__(self) -> None:
         self._skipped_s = 0.0
 
-    def __call__(self) -> float:
-        """The time."""
+    def monotonic(self) -> float:
+        """Return the time."""
         return time.monotonic() + self._skipped_s
+
+    __call__ = monotonic
 
     def skip(self, seconds: float) -> None:
         """Let time pass."""

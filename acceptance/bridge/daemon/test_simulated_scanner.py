@@ -31,7 +31,7 @@ class Scene:
         self.safety = SafetyLayer(replace(LIMITS, scan_timeout_s=None))
         self.reports: list[Report] = []
         self.worker = ScannerWorker(
-            make_lds01(robot.scanner_path, clock=self.clock),
+            make_lds01(robot.scanner_path, host=self.clock),
             self.safety,
             self.reports.append,
             SILENT_S,

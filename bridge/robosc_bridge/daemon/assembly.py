@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import msgspec
 
-from robosc.execution.clock import SystemClock
 from robosc.execution.event_log import EventLog
 from robosc.execution.runner import DeploymentError
 from robosc.execution.settings import Settings, SettingsError, require_settings_of
@@ -34,10 +33,12 @@ from robosc_bridge.devices.registry import make_drive_base, make_range_scanner
 from robosc_bridge.devices.robots import ROBOTS, Body, Robot
 from robosc_bridge.drivers import Facts, Kind, facts_of, find_driver
 from robosc_bridge.errors import BridgeError
+from robosc_bridge.host import Host
 from robosc_bridge.protocol.mavlink_signing import SigningError
 from robosc_bridge.remote import settings_of
 from robosc_bridge.safety import SafetyLayer, SafetyLimits
 from robosc_bridge.skills import EmergencyStop, Rotate
+from robosc_bridge.transport.system_host import SYSTEM_HOST
 from robosc_bridge.view import settings_of as view_settings
 
 EXCHANGE_S = 0.02
@@ -159,7 +160,7 @@ def _robot(configuration: Configuration) -> Robot | Body:
     return Body(chosen.linear_m_s, chosen.angular_rad_s, chosen.wheel_separation_m)
 
 
-def drive_base(configuration: Configuration) -> DriveBase:
+def drive_base(configuration: Configuration, host: Host = SYSTEM_HOST) -> DriveBase:
     """The drive base, not opened yet.
 
     Raises:
@@ -170,17 +171,22 @@ def drive_base(configuration: Configuration) -> DriveBase:
     driver = find_driver(Kind.DRIVE_BASE, drive.driver)
     try:
         options = checked_options(driver, drive.options)
-        return make_drive_base(drive.driver, path=drive.port, robot=_robot(configuration), **options)
+        return make_drive_base(drive.driver, path=drive.port, robot=_robot(configuration), **_on(host), **options)
     except (SigningError, TypeError, ValueError) as error:
         raise AssemblyError(f"driver '{drive.driver}': {error}") from error
 
 
-def range_scanner(scanner: Scanner) -> RangeScanner:
+def _on(host: Host) -> dict[str, Host]:
+    """Arguments of a driver; that of a plug-in need not know any host but this computer."""
+    return {} if host is SYSTEM_HOST else {"host": host}
+
+
+def range_scanner(scanner: Scanner, host: Host = SYSTEM_HOST) -> RangeScanner:
     """The LiDAR, not opened yet; raises as `drive_base`."""
     driver = find_driver(Kind.RANGE_SCANNER, scanner.driver)
     try:
         options = checked_options(driver, scanner.options)
-        return make_range_scanner(scanner.driver, path=scanner.port, **options)
+        return make_range_scanner(scanner.driver, path=scanner.port, **_on(host), **options)
     except (SigningError, TypeError, ValueError) as error:
         raise AssemblyError(f"driver '{scanner.driver}': {error}") from error
 
@@ -273,6 +279,7 @@ def assemble(
     deployment: Deployment = Deployment.CONTROLLER,
     *,
     starts_itself: bool,
+    host: Host = SYSTEM_HOST,
 ) -> Machine:
     """Make everything; nothing is opened yet.
 
@@ -283,6 +290,7 @@ def assemble(
         log: Where its events are written.
         deployment: Where it stands: it decides itself, or lets requests of programs through.
         starts_itself: Whether it starts as soon as the devices are there.
+        host: Where it runs.
 
     Raises:
         AssemblyError: A device or number does not fit, or the supervisor stands elsewhere.
@@ -292,7 +300,6 @@ def assemble(
     if not starts_itself and not is_startable(configuration):
         needed = "'remote.grpc_address', 'remote.mavlink_url' or 'view.address'"
         raise AssemblyError(f"to wait in standby, the bridge needs {needed}")
-    clock = SystemClock()
     limits = safety_limits(configuration)
     safety = SafetyLayer(limits)
     # Who can be reached can be told to start again.
@@ -315,30 +322,30 @@ def assemble(
     stop = EmergencyStop(configuration.skills.emergency_stop)
     feed = Feed()
     try:
-        daemon = Daemon(job, safety, Rotate(rotate), stop, clock, log, feed)
+        daemon = Daemon(job, safety, Rotate(rotate), stop, host, log, feed, host.queue())
     except (DeploymentError, SettingsError) as error:
         raise AssemblyError(str(error)) from error
-    worker = DriveWorker(drive_base(configuration), safety, daemon.post, EXCHANGE_S, clock.monotonic)
-    drive = DeviceThread(worker, clock.monotonic)
+    worker = DriveWorker(drive_base(configuration, host), safety, daemon.post, EXCHANGE_S, host.monotonic)
+    drive = DeviceThread(worker, host)
     scanner = None
     if configuration.scanner is not None:
         listener = ScannerWorker(
-            range_scanner(configuration.scanner),
+            range_scanner(configuration.scanner, host),
             safety,
             daemon.post,
             configuration.safety.scan_timeout_s,
             RESTART_S,
-            clock.monotonic,
+            host.monotonic,
             bad_frames_share=configuration.safety.bad_frames_share,
         )
-        scanner = DeviceThread(listener, clock.monotonic)
+        scanner = DeviceThread(listener, host)
     camera = None
     if job.needs_camera:
-        camera = DeviceThread(camera_worker(configuration.skills.line, daemon.post, clock.monotonic), clock.monotonic)
+        camera = DeviceThread(camera_worker(configuration.skills.line, daemon.post, host.monotonic), host)
     threads = [thread for thread in (drive, scanner, camera) if thread]
     living = Living(threads)
     daemon.connect(drive.hurry, worker.reset, living.are_alive)
     operations = Operations(
-        supervisor, ties, feed, daemon.post, lambda: safety.operator_seen(clock.monotonic()), is_layer=is_layer
+        supervisor, ties, feed, daemon.post, lambda: safety.operator_seen(host.monotonic()), is_layer=is_layer
     )
     return Machine(daemon, drive, scanner, camera, operations, living)

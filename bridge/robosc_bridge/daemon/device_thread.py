@@ -1,9 +1,7 @@
 """The thread in which a worker takes its steps."""
 
-import threading
-from collections.abc import Callable
-
 from robosc_bridge.daemon.workers import Worker
+from robosc_bridge.host import Host
 
 
 class DeviceThread:
@@ -11,17 +9,17 @@ class DeviceThread:
 
     Args:
         worker: What steps.
-        clock: What the time is, in seconds: that of `time.monotonic`, which waiting goes by.
+        host: Whose thread it is.
     """
 
-    def __init__(self, worker: Worker, clock: Callable[[], float]) -> None:
+    def __init__(self, worker: Worker, host: Host) -> None:
         self._worker = worker
-        self._clock = clock
-        self._condition = threading.Condition()
+        self._clock = host.monotonic
+        self._condition = host.condition()
         self._is_hurried = False
         self._is_over = False
         # A daemon thread: a driver that hangs for ever must not keep the process from ending.
-        self._thread = threading.Thread(target=self._run, name=worker.name, daemon=True)
+        self._thread = host.thread(self._run, worker.name)
 
     @property
     def is_alive(self) -> bool:

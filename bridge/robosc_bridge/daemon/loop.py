@@ -33,6 +33,7 @@ from robosc_bridge.daemon.states import Command, Order, State
 from robosc_bridge.daemon.stop_switch import StopSwitch
 from robosc_bridge.daemon.supervised import Listeners
 from robosc_bridge.devices.interface import STANDSTILL, DriveReading, Scan, Velocity
+from robosc_bridge.host import Queue
 from robosc_bridge.safety import SafetyLayer
 from robosc_bridge.skills import EmergencyStop, Rotate
 
@@ -71,6 +72,7 @@ class Daemon:
         clock: The only source of time.
         log: The executor's event log.
         feed: Where everything is shown; None: nobody looks.
+        inbox: What the loop waits at; None: one of this computer.
     """
 
     def __init__(
@@ -82,11 +84,12 @@ class Daemon:
         clock: Clock,
         log: EventLog,
         feed: Feed | None = None,
+        inbox: Queue[Item] | None = None,
     ) -> None:
         self._safety = safety
         self._clock = clock
         feed = feed or Feed()
-        self._inbox: queue.SimpleQueue[Item] = queue.SimpleQueue()
+        self._inbox: Queue[Item] = queue.SimpleQueue() if inbox is None else inbox
         asking = Asking(job.supervisor.model, job.ties, is_layer=job.is_layer)
         self._from_programs = ProgramInbox(lambda: self._inbox.put(_Woken()), asking.look)
         self._orders = Orders()

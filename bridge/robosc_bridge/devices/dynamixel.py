@@ -9,7 +9,6 @@ Source: ROBOTIS e-Manual, pages XL430-W250, XM430-W210 and "DYNAMIXEL Protocol 2
 
 import contextlib
 import logging
-import time
 from collections.abc import Sequence
 
 from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, DynamixelBus, exchange_limit_s
@@ -20,9 +19,10 @@ from robosc_bridge.devices.odometry import Odometry
 from robosc_bridge.devices.robots import ACCELERATION_RAW_RAD_S2, Robot
 from robosc_bridge.devices.servo_pair import ServoPair
 from robosc_bridge.errors import BridgeError, DeviceError, DeviceSilentError
+from robosc_bridge.host import Host, Port
 from robosc_bridge.protocol import servo
 from robosc_bridge.protocol.servo import Measurement
-from robosc_bridge.transport.serial_line import SerialLine
+from robosc_bridge.transport.system_host import SYSTEM_HOST
 
 FACTORY_BAUD = 57_600
 """What a servo fresh from the factory speaks; a robot's are set to 1 000 000."""
@@ -46,6 +46,7 @@ class DynamixelBase:
         acceleration_rad_s2: Of a wheel; None: as fast as it can.
         watchdog_s: After how long without a request the motors stop by themselves, at least three exchanges.
         answer_limit_s: Longest wait for one answer.
+        host: What it has of its computer.
 
     Raises:
         ValueError: An argument is out of its range.
@@ -60,6 +61,7 @@ class DynamixelBase:
         acceleration_rad_s2: float | None = None,
         watchdog_s: float = 0.5,
         answer_limit_s: float = ANSWER_LIMIT_S,
+        host: Host = SYSTEM_HOST,
     ) -> None:
         if motors[0] == motors[1]:
             raise ValueError("the two motors must have different ids")
@@ -78,7 +80,8 @@ class DynamixelBase:
         self._limits = robot.limits(robot.motor.velocity_limit_raw)
         self._odometry = Odometry(robot.tick_m, robot.wheel_separation_m)
         self._following = FollowingWatch(_FOLLOWING_S + ramp_s)
-        self._line: SerialLine | None = None
+        self._host = host
+        self._line: Port | None = None
         self._bus: DynamixelBus | None = None
         self._pair: ServoPair | None = None
         self._is_torque_wanted = False
@@ -112,10 +115,10 @@ class DynamixelBase:
         self._is_torque_wanted = self._is_torque_on = self._is_doubtful = False
         self._stops = frozenset()
         try:
-            self._line = SerialLine(self._path, self._bauds[0])
-            self._bus = DynamixelBus(self._line, self._names.__getitem__, self._answer_limit_s)
+            self._line = self._host.open_port(self._path, self._bauds[0])
+            self._bus = DynamixelBus(self._line, self._names.__getitem__, self._answer_limit_s, self._host)
             self._find(self._line, self._bus)
-            self._pair = ServoPair(self._bus, self._names, self._exchange_limit_s)
+            self._pair = ServoPair(self._bus, self._names, self._exchange_limit_s, self._host)
             limits_raw = [settings.velocity_limit_raw for settings in self._pair.settings.values()]
             self._limits = self._robot.limits(min(limits_raw))
             self._pair.let_go()
@@ -148,7 +151,7 @@ class DynamixelBase:
         self._is_torque_wanted = self._is_torque_on = True
         self._stops = frozenset()
         self._following.forget()
-        self._commanded_s = time.monotonic()
+        self._commanded_s = self._host.monotonic()
 
     def exchange(self, velocity: Velocity) -> DriveReading:
         """Command the wheels and read both; at most `exchange_limit_s` of the bus.
@@ -203,7 +206,7 @@ class DynamixelBase:
             raise DeviceError(f"{self._path}: the motors are not open")
         return self._pair, self._bus
 
-    def _find(self, line: SerialLine, bus: DynamixelBus) -> None:
+    def _find(self, line: Port, bus: DynamixelBus) -> None:
         """Set the line to the speed at which the left motor answers."""
         left = next(iter(self._names))
         for baud in self._bauds:
@@ -232,7 +235,7 @@ class DynamixelBase:
             if not self._stops:
                 goals = wheel_goals(velocity, self._limits, self._robot.wheel_separation_m, self._robot.raw_m_s)
             pair.command(goals)
-            self._commanded_s = time.monotonic()
+            self._commanded_s = self._host.monotonic()
         answers = pair.measure()
         time_s = bus.received_s
         for motor, (_, is_alert) in zip(pair.motors, answers, strict=True):
@@ -245,7 +248,10 @@ class DynamixelBase:
         return self._reading(pair, measured, goals, time_s)
 
     def _has_paused(self) -> bool:
-        return self._is_torque_wanted and time.monotonic() - self._commanded_s > self._watchdog * servo.WATCHDOG_S / 2
+        return (
+            self._is_torque_wanted
+            and self._host.monotonic() - self._commanded_s > self._watchdog * servo.WATCHDOG_S / 2
+        )
 
     def _look_at(self, pair: ServoPair, motor: int, is_alert: bool) -> None:
         if not is_alert:
@@ -256,7 +262,7 @@ class DynamixelBase:
             self._stop_for(pair, faults)
 
     def _check_by_turns(self, pair: ServoPair) -> None:
-        now_s = time.monotonic()
+        now_s = self._host.monotonic()
         if now_s < self._check_s:
             return
         self._check_s = now_s + CHECK_PERIOD_S / 2

@@ -10,7 +10,6 @@ of a device for the one they wait for, and the last forgets the error bytes and 
 """
 
 import itertools
-import time
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 
@@ -18,8 +17,9 @@ from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, INST_PING, INST_REBOOT
 
 from robosc_bridge.devices.dynamixel_port import DynamixelPort
 from robosc_bridge.errors import DeviceError, DeviceSilentError
+from robosc_bridge.host import Host, Port
 from robosc_bridge.protocol.dynamixel import DAMAGED_REQUEST, PING_DATA, PacketHandler, Status, status_of
-from robosc_bridge.transport.serial_line import SerialLine
+from robosc_bridge.transport.system_host import SYSTEM_HOST
 
 ANSWER_LIMIT_S = 0.034
 """As the SDK has it: twice the 16 ms for which an adapter may keep bytes back, and 2 ms."""
@@ -83,16 +83,24 @@ class DynamixelBus:
         line: Open; stays its owner's.
         name_of: What to call a device in messages, with the line.
         answer_limit_s: Longest wait for one answer.
+        host: Whose time it lives by.
 
     Attributes:
         counters: How healthy the line is.
         stranger: Device that has answered to requests for others since the last `begin`; None: none has.
     """
 
-    def __init__(self, line: SerialLine, name_of: Callable[[int], str], answer_limit_s: float = ANSWER_LIMIT_S) -> None:
+    def __init__(
+        self,
+        line: Port,
+        name_of: Callable[[int], str],
+        answer_limit_s: float = ANSWER_LIMIT_S,
+        host: Host = SYSTEM_HOST,
+    ) -> None:
         self.counters = BusCounters()
+        self._host = host
         self.stranger: int | None = None
-        self._port = DynamixelPort(line, answer_limit_s)
+        self._port = DynamixelPort(line, answer_limit_s, host)
         self._handler = PacketHandler()
         self._name_of = name_of
         self._repeats = 0
@@ -110,7 +118,7 @@ class DynamixelBus:
             limit_s: What the requests that follow may take together.
             repeats: How many of them may be made again.
         """
-        self._port.end_s = time.monotonic() + limit_s
+        self._port.end_s = self._host.monotonic() + limit_s
         self._repeats = repeats
         self.stranger = None
 

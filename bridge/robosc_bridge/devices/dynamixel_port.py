@@ -6,10 +6,9 @@ termios and the system through, and is busy for ever after one. This port waits 
 raises `LineError` alone, and is never busy: it is used from one thread.
 """
 
-import time
 from collections.abc import Sequence
 
-from robosc_bridge.transport.serial_line import SerialLine
+from robosc_bridge.host import Host, Port
 
 _BITS_PER_BYTE = 10  # With a start and a stop bit.
 
@@ -20,6 +19,7 @@ class DynamixelPort:
     Args:
         line: That it sends and receives over.
         answer_limit_s: Longest wait for an answer, beside the time that its bytes take on the wire.
+        host: Whose time it lives by.
 
     Attributes:
         line: The same.
@@ -28,11 +28,12 @@ class DynamixelPort:
         received_s: When the last byte came.
     """
 
-    def __init__(self, line: SerialLine, answer_limit_s: float) -> None:
+    def __init__(self, line: Port, answer_limit_s: float, host: Host) -> None:
         self.line = line
+        self._host = host
         self.answer_limit_s = answer_limit_s
-        self.end_s = time.monotonic()
-        self.received_s = time.monotonic()
+        self.end_s = self._host.monotonic()
+        self.received_s = self._host.monotonic()
         self._found = b""
         self._answer_end_s = 0.0
         self._is_over = False
@@ -49,7 +50,7 @@ class DynamixelPort:
     @property
     def is_late(self) -> bool:
         """Whether the time for requests is over."""
-        return time.monotonic() >= self.end_s
+        return self._host.monotonic() >= self.end_s
 
     # The names below are the SDK's.
 
@@ -71,18 +72,18 @@ class DynamixelPort:
         """Begin to wait for answers of so many bytes together, longest for a limit of their own."""
         wire_s = length * _BITS_PER_BYTE / self.line.baud
         wait_s = wire_s + (self.answer_limit_s if limit_s is None else limit_s)
-        self._answer_end_s = min(time.monotonic() + wait_s, self.end_s)
+        self._answer_end_s = min(self._host.monotonic() + wait_s, self.end_s)
         self._is_over = False
 
     def readPort(self, length: int) -> bytes:  # noqa: N802
         """At most so many bytes, waiting for the first."""
         if not self._found and not self._is_over:
-            limit_s = self._answer_end_s - time.monotonic()
+            limit_s = self._answer_end_s - self._host.monotonic()
             # What came while this thread had no turn still counts: one look after the end, and no more.
             self._is_over = limit_s <= 0.0
             self._found = self.line.read(limit_s)
             if self._found:
-                self.received_s = time.monotonic()
+                self.received_s = self._host.monotonic()
         taken, self._found = self._found[:length], self._found[length:]
         return taken
 

@@ -3,17 +3,17 @@
 import contextlib
 import math
 import threading
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
 from robosc_bridge.devices.interface import RawScan, Scan, ScannerCounters
 from robosc_bridge.errors import LineError, LineLostError
+from robosc_bridge.host import Host, Port
 from robosc_bridge.protocol import lds01, lds02, lds03
 from robosc_bridge.protocol.framing import FrameDecoder
 from robosc_bridge.protocol.turns import Points, Turn, TurnBuilder, nearest_by_degree, wrapped_deg
-from robosc_bridge.transport.serial_line import SerialLine
+from robosc_bridge.transport.system_host import SYSTEM_HOST
 
 BAUD_TRIAL_S = 1.0
 """A device sends well-formed frames within this time after its start, or it speaks at another speed."""
@@ -63,7 +63,7 @@ class Lidar[Frame]:
         baud: Speed of its line; None: found out among those of the model.
         front_rad: Where its front points to, counter-clockwise from that of the robot.
         is_upside_down: Whether it hangs, so that it turns the other way round.
-        clock: What the time is, in seconds.
+        host: What it has of its computer.
 
     Attributes:
         counters: Since it was made, across being opened anew.
@@ -77,7 +77,7 @@ class Lidar[Frame]:
         *,
         front_rad: float = 0.0,
         is_upside_down: bool = False,
-        clock: Callable[[], float] = time.monotonic,
+        host: Host = SYSTEM_HOST,
     ) -> None:
         self.counters = ScannerCounters()
         self._model = model
@@ -85,12 +85,13 @@ class Lidar[Frame]:
         self._bauds = model.bauds if baud is None else (baud,)
         self._front_deg = math.degrees(front_rad)
         self._is_upside_down = is_upside_down
-        self._clock = clock
+        self._host = host
+        self._clock = host.monotonic
         self._decoder = model.make_decoder()
         self._turns = TurnBuilder()
-        self._line: SerialLine | None = None
+        self._line: Port | None = None
         self._woken = threading.Event()
-        self._listened_s = self._heard_s = clock()
+        self._listened_s = self._heard_s = self._clock()
         self._is_baud_known = False
         self._start_at_s: float | None = None
         self._trial_end_s: float | None = None
@@ -112,7 +113,7 @@ class Lidar[Frame]:
             LineError: The line cannot be used.
         """
         self.close()
-        self._line = SerialLine(self._path, self._bauds[0])
+        self._line = self._host.open_port(self._path, self._bauds[0])
         try:
             if self._model.is_dtr_off:
                 self._line.set_dtr(False)
@@ -184,12 +185,12 @@ class Lidar[Frame]:
                 line.write(self._model.stop)
             line.close()
 
-    def _opened(self) -> SerialLine:
+    def _opened(self) -> Port:
         if not self._line:
             raise LineLostError(self._path, "the line is not open")
         return self._line
 
-    def _begin(self, line: SerialLine) -> None:
+    def _begin(self, line: Port) -> None:
         """Start the motor on a line that was opened or has got another speed."""
         line.discard_input()
         self._forget(self._clock())
@@ -201,12 +202,12 @@ class Lidar[Frame]:
         self._turns.forget()
         self._listened_s = self._heard_s = now_s
 
-    def _start(self, line: SerialLine) -> None:
+    def _start(self, line: Port) -> None:
         line.write(self._model.start)
         self._start_at_s = None
         self._trial_end_s = None if self._is_baud_known else self._clock() + BAUD_TRIAL_S
 
-    def _keep_on(self, line: SerialLine, now_s: float) -> float:
+    def _keep_on(self, line: Port, now_s: float) -> float:
         """Do what is due at this time; the time when something will be due next."""
         if self._start_at_s is not None and now_s >= self._start_at_s:
             self._start(line)

@@ -6,7 +6,9 @@ from robosc_bridge.devices.mavlink_link import BAUD
 from robosc_bridge.devices.mavlink_obstacles import MavlinkObstacles
 from robosc_bridge.devices.mavlink_rover import MavlinkRover
 from robosc_bridge.devices.robots import Body
+from robosc_bridge.host import Host
 from robosc_bridge.protocol.mavlink_signing import Signing
+from robosc_bridge.transport.system_host import SYSTEM_HOST
 
 
 def make_rover(
@@ -21,6 +23,7 @@ def make_rover(
     signing_link: int = 0,
     motion_limit_s: float = 1.0,
     telemetry_s: float = 0.05,
+    host: Host = SYSTEM_HOST,
 ) -> MavlinkRover:
     """A drive base.
 
@@ -35,6 +38,7 @@ def make_rover(
         signing_link: Number of the signed stream.
         motion_limit_s: For how long the vehicle's last estimate of its motion holds.
         telemetry_s: How often it is asked to tell its motion.
+        host: What it has of its computer.
 
     Raises:
         SigningError: There is no key in that file.
@@ -50,6 +54,7 @@ def make_rover(
         signing=_signing(signing_key, signing_link),
         motion_limit_s=motion_limit_s,
         telemetry_s=telemetry_s,
+        host=host,
     )
 
 
@@ -62,6 +67,7 @@ def make_obstacles(
     own_component: int = 190,
     signing_key: str | None = None,
     signing_link: int = 0,
+    host: Host = SYSTEM_HOST,
 ) -> MavlinkObstacles:
     """A range scanner; arguments and errors are those of `make_rover`."""
     return MavlinkObstacles(
@@ -71,6 +77,7 @@ def make_obstacles(
         own_system=own_system,
         own_component=own_component,
         signing=_signing(signing_key, signing_link),
+        host=host,
     )
 
 

@@ -6,7 +6,6 @@ nothing alive: above all, the heartbeat is sent by the drive base where there is
 """
 
 import threading
-import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -14,6 +13,7 @@ from typing import Any
 
 from robosc_bridge.devices.mavlink_state import Told, VehicleState
 from robosc_bridge.errors import LineBusyError, LineError, LineLostError
+from robosc_bridge.host import Host
 from robosc_bridge.protocol.framing import FrameCounts
 from robosc_bridge.protocol.mavlink import Codec, Decoder
 from robosc_bridge.protocol.mavlink_messages import (
@@ -29,6 +29,7 @@ from robosc_bridge.protocol.mavlink_messages import (
 from robosc_bridge.protocol.mavlink_signing import Signing
 from robosc_bridge.transport.lines import open_line
 from robosc_bridge.transport.network_line import NetworkLine
+from robosc_bridge.transport.system_host import SYSTEM_HOST
 
 BAUD = 57_600
 HEARTBEAT_S = 1.0
@@ -64,13 +65,15 @@ class VehicleLink:
 
     Args:
         settings: How it is reached.
+        host: What it has of its computer.
 
     Raises:
         LineError: The line cannot be used.
     """
 
-    def __init__(self, settings: LinkSettings) -> None:
+    def __init__(self, settings: LinkSettings, host: Host) -> None:
         self.settings = settings
+        self._host = host
         self.has_driver = False
         self.users = 0
         self._signing = settings.signing.begin() if settings.signing else None
@@ -86,11 +89,11 @@ class VehicleLink:
         self._obstacles: deque[Told[Obstacle]] = deque(maxlen=_KEPT_OBSTACLES)
         self._lost: LineError | None = None
         self._is_closing = False
-        self._changed = threading.Condition()
+        self._changed = host.condition()
         self._sending = threading.Lock()
         self._heartbeat_s = -HEARTBEAT_S
-        self._line = open_line(settings.path, settings.baud)
-        self._reader = threading.Thread(target=self._read, name=f"MAVLink {settings.path}", daemon=True)
+        self._line = open_line(settings.path, settings.baud, host)
+        self._reader = host.thread(self._read, f"MAVLink {settings.path}")
         self._reader.start()
 
     @property
@@ -168,7 +171,7 @@ class VehicleLink:
         Raises:
             LineLostError: The line is gone.
         """
-        now_s = time.monotonic()
+        now_s = self._host.monotonic()
         if now_s - self._heartbeat_s >= HEARTBEAT_S:
             self._heartbeat_s = now_s
             self.send(own_heartbeat)
@@ -203,7 +206,7 @@ class VehicleLink:
             while not self._is_closing:
                 data = self._line.read(_READ_S)
                 if data:
-                    self._take(data, time.monotonic())
+                    self._take(data, self._host.monotonic())
         except LineError as error:
             with self._changed:
                 self._lost = error
@@ -237,12 +240,13 @@ _links: dict[str, VehicleLink] = {}
 _guard = threading.Lock()
 
 
-def acquire(settings: LinkSettings, *, as_driver: bool) -> VehicleLink:
+def acquire(settings: LinkSettings, *, as_driver: bool, host: Host = SYSTEM_HOST) -> VehicleLink:
     """The link on that line, opened if nobody uses it yet; to be given back by `release`.
 
     Args:
         settings: How it is reached.
         as_driver: Whether it is to be driven; one user at a time may do that.
+        host: What it has of its computer.
 
     Raises:
         LineBusyError: It is driven already, or used with other settings.
@@ -256,7 +260,7 @@ def acquire(settings: LinkSettings, *, as_driver: bool) -> VehicleLink:
             if as_driver and link.has_driver:
                 raise LineBusyError(settings.path, "another drive base of this program uses this port")
         else:
-            link = _links[settings.path] = VehicleLink(settings)
+            link = _links[settings.path] = VehicleLink(settings, host)
         link.users += 1
         link.has_driver = link.has_driver or as_driver
         return link

@@ -6,15 +6,16 @@ those of single sensors (DISTANCE_SENSOR). Where rings come, single sensors are 
 
 import math
 import threading
-import time
 
 from robosc_bridge.devices.interface import RawScan, Scan, ScannerCounters
 from robosc_bridge.devices.mavlink_link import BAUD, LinkSettings, Obstacle, VehicleLink, acquire, release
 from robosc_bridge.devices.mavlink_state import Told, VehicleState
 from robosc_bridge.errors import LineLostError
+from robosc_bridge.host import Host
 from robosc_bridge.protocol.mavlink_messages import ObstacleRing, SectorDistance, Telemetry
 from robosc_bridge.protocol.mavlink_obstacles import Sector, nearest_in_sectors, ring_sectors, sensor_sector
 from robosc_bridge.protocol.mavlink_signing import Signing
+from robosc_bridge.transport.system_host import SYSTEM_HOST
 
 # As ArduPilot itself has it: what is older says nothing.
 STALE_AFTER_S = 0.5
@@ -32,6 +33,7 @@ class MavlinkObstacles:
         own_system: Ours.
         own_component: Ours.
         signing: How packets are signed; None: not.
+        host: What it has of its computer.
 
     Attributes:
         counters: Of the line since it was opened, and scans since this was made.
@@ -46,8 +48,10 @@ class MavlinkObstacles:
         own_system: int = 255,
         own_component: int = 190,
         signing: Signing | None = None,
+        host: Host = SYSTEM_HOST,
     ) -> None:
         self.counters = ScannerCounters()
+        self._host = host
         self._settings = LinkSettings(path, baud, system, own_system, own_component, signing)
         self._link: VehicleLink | None = None
         self._woken = threading.Event()
@@ -63,7 +67,7 @@ class MavlinkObstacles:
             LineError: The line cannot be used.
         """
         self.close()
-        self._link = acquire(self._settings, as_driver=False)
+        self._link = acquire(self._settings, as_driver=False, host=self._host)
         self._is_requested = False
         self._ring_s = -math.inf
         self._sensors.clear()
@@ -76,10 +80,10 @@ class MavlinkObstacles:
             LineError: The line is gone.
         """
         link = self._opened()
-        end_s = time.monotonic() + limit_s
+        end_s = self._host.monotonic() + limit_s
         while True:
             self._keep_on(link)
-            left_s = end_s - time.monotonic()
+            left_s = end_s - self._host.monotonic()
             scan = None
             for told in link.take_obstacles(min(left_s, _SLICE_S), self._woken.is_set):
                 scan = self._after(told, link.state) or scan

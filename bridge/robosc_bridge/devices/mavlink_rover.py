@@ -8,7 +8,6 @@ Sources: ArduPilot Rover (`GCS_MAVLink_Rover.cpp`, `mode_guided.cpp`, `AP_Arming
 
 import contextlib
 import math
-import time
 from collections.abc import Callable
 
 from robosc_bridge.devices.following import FollowingWatch
@@ -25,6 +24,7 @@ from robosc_bridge.errors import (
     DeviceSilentError,
     WrongDeviceError,
 )
+from robosc_bridge.host import Host
 from robosc_bridge.protocol.mavlink_messages import (
     Command,
     Heartbeat,
@@ -38,6 +38,7 @@ from robosc_bridge.protocol.mavlink_messages import (
     velocity_target,
 )
 from robosc_bridge.protocol.mavlink_signing import Signing
+from robosc_bridge.transport.system_host import SYSTEM_HOST
 
 HEARTBEAT_LIMIT_S = 3.5
 """Three heartbeats of the vehicle were lost."""
@@ -78,6 +79,7 @@ class MavlinkRover:
         own_system: Ours.
         own_component: Ours.
         signing: How packets are signed; None: not.
+        host: What it has of its computer.
         motion_limit_s: For how long the vehicle's last estimate of its motion holds.
         telemetry_s: How often it is asked to tell its motion.
 
@@ -95,19 +97,21 @@ class MavlinkRover:
         own_system: int = 255,
         own_component: int = 190,
         signing: Signing | None = None,
+        host: Host = SYSTEM_HOST,
         motion_limit_s: float = 1.0,
         telemetry_s: float = 0.05,
     ) -> None:
         self.limits: DriveLimits = robot.limits
         self._path = path
         self._robot = robot
+        self._host = host
         self._settings = LinkSettings(path, baud, system, own_system, own_component, signing)
         self._motion_limit_s = motion_limit_s
         self._telemetry_s = telemetry_s
         self._link: VehicleLink | None = None
         self._odometry = VehicleOdometry()
         self._following = FollowingWatch(_FOLLOWING_LIMIT_S)
-        self._began_s = time.monotonic()
+        self._began_s = self._host.monotonic()
         self._restarts = 0
         self._is_torque_wanted = False
         self._is_torque_lost = False
@@ -124,7 +128,7 @@ class MavlinkRover:
             DeviceFaultError: Somebody else drives it, or it does not know where it is, or does not disarm.
         """
         self.close()
-        self._link = acquire(self._settings, as_driver=True)
+        self._link = acquire(self._settings, as_driver=True, host=self._host)
         try:
             self._is_torque_wanted = self._is_torque_lost = False
             self._target, self._target_s = STANDSTILL, -math.inf
@@ -265,13 +269,13 @@ class MavlinkRover:
             DeviceSilentError: It was too long ago.
         """
         told = state.heartbeat
-        if told is None or time.monotonic() - told.time_s > HEARTBEAT_LIMIT_S:
+        if told is None or self._host.monotonic() - told.time_s > HEARTBEAT_LIMIT_S:
             raise DeviceSilentError(f"{self._path}: no heartbeat of the rover for {HEARTBEAT_LIMIT_S:g} s")
         return told.content
 
     def _fresh(self, state: VehicleState) -> Told[Motion] | None:
         told = estimate(state)
-        is_fresh = told is not None and time.monotonic() - told.time_s <= self._motion_limit_s
+        is_fresh = told is not None and self._host.monotonic() - told.time_s <= self._motion_limit_s
         return told if is_fresh else None
 
     def _is_another_s(self, heartbeat: Heartbeat) -> bool:
@@ -317,7 +321,7 @@ class MavlinkRover:
             DeviceSilentError: It is not answered.
         """
         link = self._used_link
-        began_s = time.monotonic()
+        began_s = self._host.monotonic()
         for confirmation in range(trials):
             state = link.state
             if state.system is None or state.component is None:
@@ -365,17 +369,17 @@ class MavlinkRover:
     def _waits(self, is_so: Callable[[VehicleState], bool], limit_s: float) -> bool:
         """Wait until the vehicle has told something, with our heartbeat going on; whether it has, in time."""
         link = self._used_link
-        end_s = time.monotonic() + limit_s
+        end_s = self._host.monotonic() + limit_s
         while True:
             link.keep_alive()
-            left_s = end_s - time.monotonic()
+            left_s = end_s - self._host.monotonic()
             if link.wait(is_so, max(min(left_s, _SLICE_S), 0.0)):
                 return True
             if left_s <= 0:
                 return False
 
     def _is_due(self, target: Velocity) -> bool:
-        since_s = time.monotonic() - self._target_s
+        since_s = self._host.monotonic() - self._target_s
         if target == self._target:
             return since_s >= _TARGET_S
         return target == STANDSTILL or since_s >= _NEW_TARGET_S
@@ -385,7 +389,7 @@ class MavlinkRover:
         state = link.state
         if state.system is None or state.component is None:
             return
-        self._target, self._target_s = target, time.monotonic()
+        self._target, self._target_s = target, self._host.monotonic()
         boot_ms = int((self._target_s - self._began_s) * 1000) % 2**32
         link.send(velocity_target(state.system, state.component, boot_ms, target.linear_m_s, target.angular_rad_s))
 

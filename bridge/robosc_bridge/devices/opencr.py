@@ -8,7 +8,6 @@ here (it reads the device status before it has one, and takes old readings for n
 """
 
 import contextlib
-import time
 from collections.abc import Callable
 
 from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, DynamixelBus, exchange_limit_s
@@ -18,9 +17,10 @@ from robosc_bridge.devices.kinematics import body_velocity, opencr_words, wheel_
 from robosc_bridge.devices.odometry import Odometry
 from robosc_bridge.devices.robots import Robot
 from robosc_bridge.errors import BridgeError, DeviceError, DeviceFaultError, DeviceSilentError, WrongDeviceError
+from robosc_bridge.host import Host, Port
 from robosc_bridge.protocol import opencr
 from robosc_bridge.protocol.opencr import Block, decode_block, encode_command
-from robosc_bridge.transport.serial_line import SerialLine
+from robosc_bridge.transport.system_host import SYSTEM_HOST
 
 BAUD = 1_000_000  # A USB device: any is right.
 
@@ -41,13 +41,19 @@ class OpenCrBase:
         robot: Which it is.
         calibrates_gyro: Whether to calibrate the gyroscope when it is opened, at rest; takes up to 5 s.
         answer_limit_s: Longest wait for one answer.
+        host: What it has of its computer.
 
     Attributes:
         limits: What it can do.
     """
 
     def __init__(
-        self, path: str, robot: Robot, calibrates_gyro: bool = False, answer_limit_s: float = ANSWER_LIMIT_S
+        self,
+        path: str,
+        robot: Robot,
+        calibrates_gyro: bool = False,
+        answer_limit_s: float = ANSWER_LIMIT_S,
+        host: Host = SYSTEM_HOST,
     ) -> None:
         self.limits: DriveLimits = robot.limits(robot.motor.velocity_limit_raw)
         self._path = path
@@ -55,7 +61,8 @@ class OpenCrBase:
         self._calibrates_gyro = calibrates_gyro
         self._answer_limit_s = answer_limit_s
         self._exchange_limit_s = exchange_limit_s(answer_limit_s)
-        self._line: SerialLine | None = None
+        self._host = host
+        self._line: Port | None = None
         self._bus: DynamixelBus | None = None
         self._odometry = Odometry(robot.tick_m, robot.wheel_separation_m)
         self._following = FollowingWatch()
@@ -74,10 +81,10 @@ class OpenCrBase:
             DeviceFaultError: The board has found no motors, or a motor does not let go.
         """
         self.close()
-        line = SerialLine(self._path, BAUD)
+        line = self._host.open_port(self._path, BAUD)
         try:
             self._line = line
-            self._bus = DynamixelBus(line, lambda device: f"{self._path}: OpenCR", self._answer_limit_s)
+            self._bus = DynamixelBus(line, lambda device: f"{self._path}: OpenCR", self._answer_limit_s, self._host)
             self._uptime_ms = None
             self._is_torque_wanted = self._is_torque_lost = False
             self._odometry = self._odometry.rebased()
@@ -234,15 +241,15 @@ class OpenCrBase:
     def _cycles_until(self, is_done: Callable[[Block], bool], limit_s: float) -> bool:
         """Exchange with a command of zero until it has the effect; whether it had in time."""
         begin_ms = self._cycle((0, 0)).uptime_ms
-        end_s = time.monotonic() + limit_s
+        end_s = self._host.monotonic() + limit_s
         while True:
-            time.sleep(_POLL_S)
+            self._host.sleep(_POLL_S)
             block = self._cycle((0, 0))
             # Before, the board tells what was written or how it was, and not what the motors do.
             is_refreshed = (block.uptime_ms - begin_ms) % _UPTIME_MODULUS >= _REFRESHED_MS
             if is_refreshed and is_done(block):
                 return True
-            if time.monotonic() > end_s:
+            if self._host.monotonic() > end_s:
                 return False
 
     def _cycle(self, words: tuple[int, int] | None) -> Block:

@@ -1,6 +1,5 @@
 """The two wheel servos on their bus: what is asked of both, and seen to be done."""
 
-import time
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -8,6 +7,7 @@ from robosc_bridge.devices.dynamixel_bus import DynamixelBus, RefusedError
 from robosc_bridge.devices.interface import MotorFault
 from robosc_bridge.devices.servo_settings import ServoSettings, read_settings
 from robosc_bridge.errors import DeviceError, DeviceFaultError, DeviceSilentError, WrongDeviceError
+from robosc_bridge.host import Host
 from robosc_bridge.protocol import servo
 from robosc_bridge.protocol.dynamixel import Status
 from robosc_bridge.protocol.servo import Measurement, decode_measurement, encode_velocity
@@ -35,6 +35,7 @@ class ServoPair:
         bus: That they are on.
         names: What to call each in messages, by id: the left one, then the right one.
         exchange_limit_s: Longest time for a few requests.
+        host: Whose time it lives by.
 
     Attributes:
         motors: Ids of the left and the right one.
@@ -47,8 +48,9 @@ class ServoPair:
         WrongDeviceError: They are no such motors, not alike, or set to what cannot be driven.
     """
 
-    def __init__(self, bus: DynamixelBus, names: Mapping[int, str], exchange_limit_s: float) -> None:
+    def __init__(self, bus: DynamixelBus, names: Mapping[int, str], exchange_limit_s: float, host: Host) -> None:
         self._bus = bus
+        self._host = host
         self._names = names
         self._limit_s = exchange_limit_s
         self.motors: tuple[int, ...] = tuple(names)
@@ -138,14 +140,14 @@ class ServoPair:
 
     def comes_to_rest(self) -> bool:
         """Whether both stand still in time."""
-        end_s = time.monotonic() + _REST_LIMIT_S
+        end_s = self._host.monotonic() + _REST_LIMIT_S
         while True:
             self._bus.begin(self._limit_s)
             if all(abs(found.velocity_raw) <= _REST_RAW for found, _ in self.measure()):
                 return True
-            if time.monotonic() > end_s:
+            if self._host.monotonic() > end_s:
                 return False
-            time.sleep(_POLL_S)
+            self._host.sleep(_POLL_S)
 
     def measure(self) -> list[tuple[Measurement, bool]]:
         """What each measures, positive forward, and whether it tells of a hardware error.
@@ -231,13 +233,13 @@ class ServoPair:
             )
 
     def _await(self, motor: int) -> None:
-        end_s = time.monotonic() + _REBOOT_LIMIT_S
+        end_s = self._host.monotonic() + _REBOOT_LIMIT_S
         while True:
             self._bus.begin(self._limit_s, repeats=0)
             try:
                 self._bus.ping(motor)
             except DeviceSilentError:
-                if time.monotonic() > end_s:
+                if self._host.monotonic() > end_s:
                     raise
             else:
                 return

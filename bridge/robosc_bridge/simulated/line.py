@@ -1,21 +1,11 @@
-"""The device's end of a serial line: a pseudo-terminal, a thread that serves it, and faults of the wire.
+"""The device's end of a serial line: a thread that serves it, and faults of the wire.
 
-The wire lives in real time, whatever clock the device has, because the host at its other end does: a delayed answer is
-late by real seconds.
+The wire lives in the time of the host at its other end, whatever clock the device has: a delayed answer is late by
+seconds of the host. That is real time on a pseudo-terminal, and virtual time on a port of a `VirtualHost`.
 """
 
-import contextlib
-import fcntl
 import math
-import os
 import random
-import select
-import sys
-import tempfile
-import termios
-import threading
-import time
-import tty
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -24,26 +14,18 @@ from types import TracebackType
 from typing import Protocol, Self
 
 from robosc_bridge.simulated.recorder import Tap
+from robosc_bridge.simulated.terminal_end import TerminalEnd
 from robosc_bridge.simulated.timebase import Timebase
+from robosc_bridge.simulated.virtual_host import VirtualHost
 
-_CHUNK = 4096
 # As much as the line discipline holds: what is beyond it waits deeper in the kernel, where no host can flush it, and
 # would be old news for the next one that opens the port.
 _BUFFER = 4095
-# `poll` knows whole milliseconds only.
-_FINE_S = 0.001
 # A world that passes faster is lived in fewer and larger pieces: a wake-up for each frame would be thousands a second.
 _COARSE_S = 0.002
 _PIECE = 1024
 # Less than a turn of any LiDAR: who leaves more unread is behind.
 _MOST_UNREAD = 1024
-_BAUDS = {
-    getattr(termios, f"B{baud}"): baud
-    for baud in (
-        9600, 19200, 38400, 57600, 115200, 230400, 460800, 500000, 576000, 921600, 1000000, 1152000, 1500000, 2000000,
-        2500000, 3000000, 3500000, 4000000,
-    )
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -115,7 +97,7 @@ class Faults:
 
 
 class SimulatedLine:
-    """Serves a device on a pseudo-terminal until it is closed.
+    """Serves a device until it is closed: on a pseudo-terminal, or on a port of the `VirtualHost` that it lives by.
 
     Args:
         device: That answers.
@@ -146,73 +128,52 @@ class SimulatedLine:
         self._time = time
         self._tap = tap
         self._chance = random.Random(seed)  # noqa: S311 (faults are no secrets)
-        self._folder: tempfile.TemporaryDirectory[str] | None = None
-        if link is None:
-            self._folder = tempfile.TemporaryDirectory(prefix="robosc-port-")
-            link = Path(self._folder.name) / "port"
-        self._link = link
-        self.path = str(self._link)
+        clock = time.clock
+        self._end = clock.new_end(link) if isinstance(clock, VirtualHost) else TerminalEnd(link)
+        self.path = self._end.path
         self._wire: deque[tuple[float, bytes]] = deque()
         # Bytes that were unread when it had sent last, and whether any were ever read.
         self._waiting = 0
         self._is_used = False
-        self._master = self._slave = -1
-        self._woken, self._waker = os.pipe()
-        os.set_blocking(self._woken, False)
-        os.set_blocking(self._waker, False)
         self._is_open = True
-        try:
-            self._plug()
-        except BaseException:
-            self._give_back()
-            raise
         time.join(self._catch_up)
-        self._thread = threading.Thread(target=self._serve, name=f"simulated line {self.path}", daemon=True)
+        self._thread = self._end.thread(self._serve, f"simulated line {self.path}")
         self._thread.start()
 
     @property
     def is_connected(self) -> bool:
         """Whether the port is there."""
-        return self._master >= 0
+        return self._end.is_connected
 
     def disconnect(self) -> None:
         """Pull the plug: the port is gone, and whoever has it open sees a hang-up."""
         with self._time.lock:
-            if self._master < 0:
+            if not self._end.is_connected:
                 return
-            self._link.unlink(missing_ok=True)
-            os.close(self._master)
-            os.close(self._slave)
-            self._master = self._slave = -1
+            self._end.disconnect()
             self._wire.clear()
-        self._wake()
+        self._end.wake()
 
     def reconnect(self) -> None:
         """Plug it in again: another port under the same name."""
         with self._time.lock:
-            if self._master >= 0 or not self._is_open:
+            if self._end.is_connected or not self._is_open:
                 return
-            self._plug()
+            self._end.connect()
             self.device.plug_in()
-        self._wake()
+        self._end.wake()
 
     def close(self) -> None:
         """End it and remove the port; may be called again."""
         if not self._is_open:
             return
         self._is_open = False
-        self._wake()
+        self._end.wake()
         self._thread.join()
         self._time.read(self, is_behind=False)
         self._time.leave(self._catch_up)
         self.disconnect()
-        self._give_back()
-
-    def _give_back(self) -> None:
-        os.close(self._woken)
-        os.close(self._waker)
-        if self._folder is not None:
-            self._folder.cleanup()
+        self._end.close()
 
     def __enter__(self) -> Self:
         return self
@@ -222,66 +183,32 @@ class SimulatedLine:
     ) -> None:
         self.close()
 
-    def _plug(self) -> None:
-        master, slave = os.openpty()
-        try:
-            tty.setraw(slave)
-            os.set_blocking(master, False)
-            self._link.symlink_to(os.ttyname(slave))
-        except BaseException:
-            os.close(master)
-            os.close(slave)
-            raise
-        # The slave stays open here: the master would see an error whenever no host has the port open.
-        self._master, self._slave = master, slave
-
-    def _wake(self) -> None:
-        # A full pipe: it is awake already. A closed one: it has ended.
-        with contextlib.suppress(OSError):
-            os.write(self._waker, b"\0")
-
     def _serve(self) -> None:
         while self._is_open:
             with self._time.lock:
                 self._live()
                 limit_s = self._limit_s()
-                master = self._master
-                poll = select.poll()
-                poll.register(self._woken, select.POLLIN)
-                if master >= 0:
-                    poll.register(master, select.POLLIN)
-            if 0.0 < limit_s < _FINE_S:
-                time.sleep(limit_s)
-                continue
-            ready = dict(poll.poll(None if math.isinf(limit_s) else max(limit_s, 0.0) * 1000))
-            if self._woken in ready:
-                with contextlib.suppress(BlockingIOError):
-                    os.read(self._woken, _CHUNK)
-            if master in ready:
+            if self._end.wait(limit_s):
                 with self._time.lock:
-                    # It may have been pulled since; its number may be another file's by now.
-                    if self._master == master:
-                        self._hear()
+                    self._hear()
 
     def _hear(self) -> None:
-        try:
-            data = os.read(self._master, _CHUNK)
-        except OSError:
+        data = self._end.read()
+        if not data:
             return
         if self._tap is not None:
-            self._tap(True, time.monotonic(), data)
+            self._tap(True, self._end.now_s(), data)
         self.received += len(data)
         self._time.heard()
         if self.faults.echo:
             self._send([Sending(data)])
         if not self.faults.is_deaf:
-            self._send(self.device.receive(self._heard_through(data), self._host_baud()))
+            self._send(self.device.receive(self._heard_through(data), self._end.host_baud()))
 
     def _catch_up(self) -> None:
         """Hear what has come, and live until now: time has passed."""
         with self._time.lock:
-            if self._master >= 0:
-                self._hear()
+            self._hear()
             self._live()
 
     def _live(self) -> None:
@@ -290,27 +217,24 @@ class SimulatedLine:
                 self._look_at_the_host()
             # It lives on without a line, and what it sends then goes nowhere.
             sendings = self.device.live()
-            if self._master >= 0:
+            if self._end.is_connected:
                 self._send(sendings)
             self._flush()
             if self._time.waits:
-                self._waiting = self._unread() if self._master >= 0 else 0
+                self._waiting = self._end.unread()
 
     def _look_at_the_host(self) -> None:
         """Whether the host is behind; nobody waits for one that has no use for this line, and reads nothing of it."""
-        unread = self._unread() if self._master >= 0 else 0
+        unread = self._end.unread()
         self._is_used = self._is_used or unread < self._waiting
         self._time.read(self, is_behind=self._is_used and unread > _MOST_UNREAD)
 
     def _limit_s(self) -> float:
-        wire_s = self._wire[0][0] - time.monotonic() if self._wire else math.inf
+        wire_s = self._wire[0][0] - self._end.now_s() if self._wire else math.inf
         device_s = math.inf if self._time.is_manual else self.device.due_s() - self._time.now_s()
         if self._time.factor > 1.0:
             device_s = max(device_s, _COARSE_S)
         return min(wire_s, device_s)
-
-    def _host_baud(self) -> int:
-        return _BAUDS.get(termios.tcgetattr(self._slave)[5], 0)
 
     def _send(self, sendings: Iterable[Sending]) -> None:
         for sending in sendings:
@@ -318,7 +242,7 @@ class SimulatedLine:
             if data is None:
                 continue
             faults = self.faults
-            due_s = time.monotonic() + sending.after_s + faults.delay_s
+            due_s = self._end.now_s() + sending.after_s + faults.delay_s
             if faults.split_s is None:
                 self._wire.append((due_s, data))
             else:
@@ -347,28 +271,22 @@ class SimulatedLine:
 
     def _heard_through(self, data: bytes) -> bytes:
         """What arrives of it: noise, if the two ends do not agree on the speed."""
-        is_right = self.device.baud is None or self.device.baud == self._host_baud()
+        is_right = self.device.baud is None or self.device.baud == self._end.host_baud()
         return data if is_right else self._chance.randbytes(len(data))
-
-    def _unread(self) -> int:
-        return int.from_bytes(fcntl.ioctl(self._slave, termios.FIONREAD, bytes(4)), sys.byteorder)
 
     def _flush(self) -> None:
         """Pass on what is due; nothing overtakes what came before it."""
-        now_s = time.monotonic()
+        now_s = self._end.now_s()
         while self._wire and self._wire[0][0] <= now_s:
             _, data = self._wire.popleft()
             if self._tap is None:
                 while self._wire and self._wire[0][0] <= now_s and len(data) + len(self._wire[0][1]) <= _PIECE:
                     data += self._wire.popleft()[1]
-            if self._master < 0:
-                continue
             written = 0
-            if self._unread() + len(data) <= _BUFFER:
-                begin_s = time.monotonic()
-                with contextlib.suppress(OSError):
-                    written = os.write(self._master, data)
+            if self._end.is_connected and self._end.unread() + len(data) <= _BUFFER:
+                begin_s = self._end.now_s()
+                written = self._end.write(data)
                 if self._tap is not None and written:
                     self._tap(False, begin_s, data[:written])
             self.sent += written
-            self.lost_bytes += len(data) - written
+            self.lost_bytes += len(data) - written if self._end.is_connected else 0

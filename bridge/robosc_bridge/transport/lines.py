@@ -1,19 +1,21 @@
 """A line by its address, whatever it runs over."""
 
+from robosc_bridge.host import Host, Port
 from robosc_bridge.transport.network_line import NetworkLine, is_network_address
-from robosc_bridge.transport.serial_line import SerialLine
+from robosc_bridge.transport.system_host import SYSTEM_HOST
 
-type Line = SerialLine | NetworkLine
+type Line = Port | NetworkLine
 
 
-def open_line(address: str, baud: int) -> Line:
+def open_line(address: str, baud: int, host: Host = SYSTEM_HOST) -> Line:
     """Open a line.
 
     Args:
         address: Of `transport.network_line`, or a serial port's path.
         baud: Of a serial port.
+        host: Whose serial ports they are.
 
     Raises:
         LineError: It cannot be used.
     """
-    return NetworkLine(address) if is_network_address(address) else SerialLine(address, baud)
+    return NetworkLine(address) if is_network_address(address) else host.open_port(address, baud)

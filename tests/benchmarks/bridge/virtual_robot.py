@@ -224,7 +224,7 @@ class VirtualRobot:
             self._scanner.worker.wake()
             self._scanner.worker.step(CLOCK.now_s)
             self._scanner_due_s += SCANNER_S
-        if CLOCK.now_s >= daemon._execution.due_s or not daemon._inbox.empty():
+        if CLOCK.now_s >= daemon._execution.due_s or daemon._inbox.qsize():
             daemon.turn()
         if CLOCK.now_s >= self._base_due_s:
             self._base.live()

@@ -1,9 +1,9 @@
 """A worker's thread: steps when they are due, at once when it is hurried, and ends with the worker closed."""
 
 import threading
-import time
 
 from robosc_bridge.daemon.device_thread import DeviceThread
+from robosc_bridge.transport.system_host import SYSTEM_HOST
 
 LIMIT_S = 10.0
 LATER_S = 3600.0
@@ -37,7 +37,7 @@ class Worker:
 
 def test_it_steps_at_the_start_and_whenever_it_is_hurried() -> None:
     worker = Worker()
-    thread = DeviceThread(worker, time.monotonic)
+    thread = DeviceThread(worker, SYSTEM_HOST)
     thread.start()
     assert worker.stepped.acquire(timeout=LIMIT_S)
     assert not worker.stepped.acquire(blocking=False)
@@ -52,7 +52,7 @@ def test_it_steps_at_the_start_and_whenever_it_is_hurried() -> None:
 def test_stopping_wakes_a_step_that_waits() -> None:
     worker = Worker()
     worker.blocks = threading.Event()
-    thread = DeviceThread(worker, time.monotonic)
+    thread = DeviceThread(worker, SYSTEM_HOST)
     thread.start()
     assert worker.stepped.acquire(timeout=LIMIT_S)
     assert thread.stop(LIMIT_S)
@@ -62,14 +62,14 @@ def test_stopping_wakes_a_step_that_waits() -> None:
 
 def test_a_thread_that_never_began_is_stopped_at_once() -> None:
     worker = Worker()
-    assert DeviceThread(worker, time.monotonic).stop(LIMIT_S)
+    assert DeviceThread(worker, SYSTEM_HOST).stop(LIMIT_S)
 
 
 def test_a_step_that_hangs_is_told() -> None:
     worker = Worker()
     worker.blocks = threading.Event()
     worker.wake = lambda: None  # type: ignore[method-assign]
-    thread = DeviceThread(worker, time.monotonic)
+    thread = DeviceThread(worker, SYSTEM_HOST)
     thread.start()
     assert worker.stepped.acquire(timeout=LIMIT_S)
     assert not thread.stop(0.01)

@@ -1,7 +1,6 @@
 """Two servos as wheels: what they are told byte for byte, and what can be wrong with them."""
 
 import logging
-import time
 from collections.abc import Iterator
 
 import pytest
@@ -10,8 +9,7 @@ from robosc_bridge.devices.dynamixel import DynamixelBase
 from robosc_bridge.devices.interface import MotorFault, Velocity
 from robosc_bridge.devices.robots import BURGER
 from robosc_bridge.errors import DeviceError, DeviceFaultError, DeviceSilentError, WrongDeviceError
-from support.drive import Rig, rig
-from support.wire import wait_until
+from support.drive import PATIENT_S, Rig, rig
 
 PINGS = ("ff ff fd 00 01 03 00 01 19 4e",)
 
@@ -72,7 +70,7 @@ def test_it_begins_with_pings_and_changes_nothing_of_what_it_refuses(bench: Rig)
     assert bench.robot.left.table["led"] == 1
     bench.base.close()
     assert bench.robot.left.table["bus watchdog"] == 0
-    wait_until(lambda: bench.robot.left.table["led"] == 0)
+    bench.until(lambda: bench.robot.left.table["led"] == 0)
 
 
 def test_with_torque_off_no_goal_is_sent(bench: Rig) -> None:
@@ -141,7 +139,9 @@ def test_motors_fresh_from_the_factory_are_found_if_wanted(bench: Rig, caplog: p
         servo.table["baud rate"] = 1
     with pytest.raises(DeviceSilentError, match=r"at 1000000 baud; has it power\? A motor fresh .* speaks 57600 baud"):
         bench.base.open()
-    bench.base = DynamixelBase(bench.robot.base_path, BURGER, bauds=(1_000_000, 57_600), answer_limit_s=0.2)
+    bench.base = DynamixelBase(
+        bench.robot.base_path, BURGER, bauds=(1_000_000, 57_600), answer_limit_s=0.2, host=bench.host
+    )
     with caplog.at_level(logging.INFO):
         bench.start()
     assert "the motors speak 57600 baud instead of 1000000" in caplog.text
@@ -225,7 +225,7 @@ def test_hardware_errors_from_before_are_told_when_it_is_opened(bench: Rig) -> N
 def test_a_pause_that_trips_the_watchdogs_is_told_and_nothing_goes_on_by_itself(bench: Rig) -> None:
     bench.start()
     bench.drive(FORWARD, 0.2)
-    time.sleep(0.7)
+    bench.host.sleep(0.7)
     assert bench.goals_rad_s() == (0.0, 0.0)
     bench.tap.packets.clear()
     reading = bench.base.exchange(FORWARD)
@@ -249,7 +249,7 @@ def test_a_motor_that_was_away_has_not_jumped(bench: Rig) -> None:
     # It is pushed on unseen, so that falling back does not look as a jump.
     bench.robot.left.set_position(4096 + 1000 + 2500)
     bench.robot.left.brown_out(12.0)
-    time.sleep(0.4)
+    bench.host.sleep(0.4)
     bench.take_time()
     reading = bench.drive()
     assert MotorFault.TORQUE_LOST in reading.faults
@@ -261,7 +261,7 @@ def test_a_restart_while_nothing_is_asked_is_noticed_before_the_wheels_are_comma
     bench.base.open()
     bench.drive()
     bench.robot.left.reboot()
-    time.sleep(0.5)
+    bench.host.sleep(0.5)
     reading = bench.drive(seconds=0.2)
     assert (reading.pose.x_m, reading.pose.heading_rad) == (0.0, 0.0)
     bench.base.set_torque(True)
@@ -276,7 +276,7 @@ def test_torque_is_not_switched_on_while_the_wheels_turn(bench: Rig) -> None:
     wheel = bench.robot.world.left
     wheel.is_driven = True
     wheel.goal_rad_s = 2.0
-    wait_until(lambda: bool(bench.robot.world.pose) and wheel.speed_rad_s == 2.0)
+    bench.until(lambda: bool(bench.robot.world.pose) and wheel.speed_rad_s == 2.0)
     with pytest.raises(DeviceError, match="still turns"):
         bench.base.set_torque(True)
     assert TORQUE_ON not in bench.tap.packets
@@ -287,5 +287,107 @@ def test_a_silent_motor_does_not_keep_the_other_one_from_being_let_go(bench: Rig
     bench.drive(FORWARD, 0.1)
     bench.robot.left.brown_out(0.0)
     bench.base.close()
-    wait_until(lambda: not bench.robot.right.table["torque enable"])
+    bench.until(lambda: not bench.robot.right.table["torque enable"])
     assert bench.goals_rad_s() == (0.0, 0.0)
+
+
+HARDWARE = "ff ff fd 00 01 07 00 02 46 00 01 00 3c a3"
+
+
+def test_the_wheels_speed_up_as_wanted(bench: Rig) -> None:
+    bench.base = DynamixelBase(
+        bench.robot.base_path, BURGER, acceleration_rad_s2=5.0, answer_limit_s=PATIENT_S, host=bench.host
+    )
+    bench.start()
+    assert bench.robot.left.table["profile acceleration"] == 13
+    begin_s = bench.host.monotonic()
+    bench.drive_until(lambda reading: reading.wheels_m_s[0] > 0.145, FORWARD)
+    assert 0.5 < bench.host.monotonic() - begin_s < 1.5
+    assert bench.drive(FORWARD).faults == frozenset()
+    bench.base.close()
+
+
+@pytest.mark.parametrize(
+    ("provoke", "fault"),
+    [("overload", MotorFault.OVERLOAD), ("overheat", MotorFault.OVERHEATING)],
+)
+def test_a_motor_that_shuts_down_stops_the_other_one_at_once(bench: Rig, provoke: str, fault: MotorFault) -> None:
+    bench.start()
+    bench.drive(FORWARD, 0.2)
+    getattr(bench.robot.left, provoke)()
+    bench.tap.packets.clear()
+    reading = bench.base.exchange(FORWARD)
+    assert fault in reading.faults
+    assert not reading.is_torque_on
+    assert bench.stops_within(0.1)
+    assert bench.tap.packets[2] == HARDWARE
+    assert bench.tap.packets[3] == ZERO
+    # Whatever is wanted then, nothing moves.
+    assert fault in bench.drive(FORWARD, 0.2).faults
+    assert bench.goals_rad_s() == (0.0, 0.0)
+    with pytest.raises(DeviceFaultError, match=rf"motor 1 \(left\) tells {fault}; it must be reset"):
+        bench.base.set_torque(True)
+
+
+def test_a_watchdog_that_trips_unseen_is_told_soon(bench: Rig) -> None:
+    bench.start()
+    bench.drive(FORWARD, 0.2)
+    bench.robot.right.table["bus watchdog"] = 0xFF
+    begin_s = bench.host.monotonic()
+    bench.drive_until(lambda reading: MotorFault.WATCHDOG in reading.faults, FORWARD)
+    assert bench.host.monotonic() - begin_s < 0.3
+
+
+def test_torque_that_is_lost_without_a_word_is_told_soon(bench: Rig) -> None:
+    bench.start()
+    bench.drive(FORWARD, 0.2)
+    bench.robot.right.write(64, b"\0")
+    begin_s = bench.host.monotonic()
+    reading = bench.drive_until(lambda reading: MotorFault.TORQUE_LOST in reading.faults, FORWARD)
+    assert bench.host.monotonic() - begin_s < 0.3
+    assert not reading.is_torque_on
+    assert bench.stops_within(0.1)
+    assert MotorFault.TORQUE_LOST in bench.drive(FORWARD, 0.2).faults
+    assert bench.goals_rad_s() == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("turns", [-3, 0, 7])
+def test_a_motor_that_restarts_in_motion_has_not_jumped_and_stops_both(turns: int) -> None:
+    with rig("dynamixel") as bench:
+        bench.robot.left.set_position(4096 * turns + 1000)
+        bench.start()
+        bench.drive(FORWARD, 0.3)
+        bench.hurry()
+        bench.robot.left.reboot()
+        told_at_s = bench.host.monotonic()
+        with pytest.raises(DeviceSilentError, match=r"motor 1 \(left\)"):
+            bench.drive(FORWARD, 1.0)
+        assert bench.host.monotonic() - told_at_s < 0.3
+        assert bench.stops_within(0.2)
+        reading = None
+        while reading is None:
+            try:
+                reading = bench.base.exchange(FORWARD)
+            except DeviceSilentError:
+                assert bench.host.monotonic() - told_at_s < 5.0
+                assert bench.goals_rad_s() == (0.0, 0.0)
+        assert MotorFault.TORQUE_LOST in reading.faults
+        assert not reading.is_torque_on
+        assert reading.pose.x_m == pytest.approx(bench.robot.world.pose[0], abs=0.01)
+        # The wheel rolls on unseen for a part of the time above; a jump would be a turn of it, 0.7 rad.
+        assert reading.pose.heading_rad == pytest.approx(bench.robot.world.pose[2], abs=0.2)
+        assert bench.goals_rad_s() == (0.0, 0.0)
+        bench.take_time()
+        bench.base.reset()
+        bench.base.set_torque(True)
+        assert bench.drive(FORWARD, 0.2).velocity.linear_m_s == pytest.approx(0.15, abs=0.001)
+
+
+def test_a_restart_without_any_silence_is_found_where_the_position_jumps(bench: Rig) -> None:
+    bench.robot.left.set_position(50_000)
+    bench.start()
+    bench.drive(Velocity(0.02), 0.2)
+    bench.robot.left._boot()
+    assert MotorFault.TORQUE_LOST in bench.base.exchange(Velocity(0.02)).faults
+    assert bench.stops_within(0.2)
+    assert bench.base.exchange(Velocity()).pose.x_m == pytest.approx(bench.robot.world.pose[0], abs=0.002)

@@ -74,7 +74,7 @@ class Rig:
         self.kit = kit
         self.pty = PtyEnd()
         self.clock = SkippingClock()
-        self.lidar = kit.make(self.pty.path, clock=self.clock, **arguments)
+        self.lidar = kit.make(self.pty.path, host=self.clock, **arguments)
         self.lidar.open()
 
     def scans(self, frames: list[bytes]) -> list[Scan]:

@@ -29,7 +29,7 @@ class Scene:
     def __init__(self, name: str, robot: SimulatedTurtleBot3) -> None:
         self.robot = robot
         self.clock = SkippingClock()
-        self.lidar: Lidar[Any] = MAKERS[name](robot.scanner_path, clock=self.clock)
+        self.lidar: Lidar[Any] = MAKERS[name](robot.scanner_path, host=self.clock)
         self.name = name
 
     def open(self) -> None:

@@ -2,7 +2,6 @@
 
 import itertools
 import struct
-import time
 from collections.abc import Iterator
 
 import pytest
@@ -14,7 +13,6 @@ from robosc_bridge.errors import DeviceError, DeviceFaultError, DeviceSilentErro
 from robosc_bridge.simulated import OpenCr
 from support.drive import PATIENT_S, Rig, rig
 from support.peer import Answers, Peer, asked, status
-from support.wire import Host, wait_until
 
 PING = "ff ff fd 00 c8 03 00 01 3b fa"
 
@@ -139,10 +137,12 @@ def test_the_gyroscope_sees_the_turn(bench: Rig) -> None:
 
 def test_the_gyroscope_is_calibrated_at_rest_if_asked_to() -> None:
     with rig("opencr", calibration_s=0.8) as bench:
-        bench.base = OpenCrBase(bench.robot.base_path, BURGER, calibrates_gyro=True, answer_limit_s=PATIENT_S)
-        begin_s = time.monotonic()
+        bench.base = OpenCrBase(
+            bench.robot.base_path, BURGER, calibrates_gyro=True, answer_limit_s=PATIENT_S, host=bench.host
+        )
+        begin_s = bench.host.monotonic()
         bench.base.open()
-        assert time.monotonic() - begin_s >= 0.8
+        assert bench.host.monotonic() - begin_s >= 0.8
         packets = bench.tap.packets
         assert packets.count(CALIBRATE) == 1
         assert ZERO in packets[: packets.index(CALIBRATE)]
@@ -152,18 +152,19 @@ def test_the_gyroscope_is_calibrated_at_rest_if_asked_to() -> None:
 
 def test_a_late_answer_to_another_programs_calibration_is_none_of_ours() -> None:
     with rig("opencr", answer_limit_s=0.1, calibration_s=0.8) as bench:
-        with Host(bench.robot.base_path) as host:
-            # Somebody calibrates and leaves; the board is silent until it is done, and answers all of it then.
-            host.send(CALIBRATE)
-            wait_until(lambda: CALIBRATE in bench.tap.packets)
+        # Somebody calibrates and leaves; the board is silent until it is done, and answers all of it then.
+        port = bench.host.open_port(bench.robot.base_path, 1_000_000)
+        port.write(bytes.fromhex(CALIBRATE))
+        bench.until(lambda: CALIBRATE in bench.tap.packets)
+        port.close()
         with pytest.raises(DeviceSilentError):
             bench.base.open()
-        end_s = time.monotonic() + 5.0
+        end_s = bench.host.monotonic() + 5.0
         while True:
             try:
                 bench.base.open()
             except DeviceSilentError:
-                assert time.monotonic() < end_s
+                assert bench.host.monotonic() < end_s
                 continue
             break
         bench.base.set_torque(True)
@@ -178,7 +179,7 @@ def test_it_does_not_start_without_motors() -> None:
 
 
 def test_another_robots_board_is_refused(bench: Rig) -> None:
-    bench.base = OpenCrBase(bench.robot.base_path, WAFFLE, answer_limit_s=PATIENT_S)
+    bench.base = OpenCrBase(bench.robot.base_path, WAFFLE, answer_limit_s=PATIENT_S, host=bench.host)
     with pytest.raises(WrongDeviceError, match="firmware is for another robot than 'waffle'"):
         bench.base.open()
 
@@ -239,9 +240,9 @@ def test_motors_that_restart_in_a_pause_have_not_jumped(bench: Rig) -> None:
     for servo in (bench.robot.left, bench.robot.right):
         servo.set_position(4096 + 1000 + 2500)
     _board(bench).set_battery(4.0)
-    time.sleep(0.1)
+    bench.host.sleep(0.1)
     _board(bench).set_battery(12.0)
-    time.sleep(0.5)
+    bench.host.sleep(0.5)
     reading = bench.base.exchange(Velocity())
     assert MotorFault.TORQUE_LOST in reading.faults
     assert (reading.pose.x_m, reading.pose.heading_rad) == (0.0, 0.0)
@@ -274,7 +275,7 @@ def test_a_board_that_has_started_anew_must_be_opened_again(bench: Rig) -> None:
     bench.start()
     bench.drive(Velocity(0.1), 0.2)
     _board(bench)._began_s = bench.robot.time.now_s()
-    time.sleep(0.05)
+    bench.host.sleep(0.05)
     for _ in range(2):
         with pytest.raises(DeviceError, match="OpenCR has started anew; it must be opened again"):
             bench.base.exchange(Velocity(0.1))
@@ -289,7 +290,27 @@ def test_torque_is_not_switched_on_while_the_wheels_turn(bench: Rig) -> None:
     wheel = bench.robot.world.left
     wheel.is_driven = True
     wheel.goal_rad_s = 2.0
-    wait_until(lambda: bool(bench.robot.world.pose) and wheel.speed_rad_s == 2.0)
+    bench.until(lambda: bool(bench.robot.world.pose) and wheel.speed_rad_s == 2.0)
     with pytest.raises(DeviceError, match="the wheels still turn"):
         bench.base.set_torque(True)
     assert TORQUE_ON not in bench.tap.packets
+
+
+def test_torque_that_is_gone_is_a_fault_that_stays_until_torque_is_switched_on_anew(bench: Rig) -> None:
+    bench.start()
+    bench.drive(Velocity(0.1), 0.2)
+    bench.robot.left.overload()
+    begin_s = bench.host.monotonic()
+    reading = bench.drive_until(lambda reading: MotorFault.TORQUE_LOST in reading.faults, Velocity(0.1))
+    assert bench.host.monotonic() - begin_s < 0.2
+    assert not reading.is_torque_on
+    assert bench.stops_within(0.1)
+    # Whatever is wanted then, nothing moves.
+    reading = bench.drive(Velocity(0.1), 0.2)
+    assert reading.faults == {MotorFault.TORQUE_LOST}
+    assert bench.goals_rad_s() == (0.0, 0.0)
+    with pytest.raises(DeviceFaultError, match="a wheel motor does not hold; switch the robot off and on"):
+        bench.base.set_torque(True)
+    assert not bench.robot.right.table["torque enable"]
+    with pytest.raises(DeviceFaultError, match="does not hold"):
+        bench.base.reset()

@@ -1,37 +1,28 @@
 """Every fault of a robot and its lines, on a whole bridge: within the stated time its wheels are told to stand still.
 
-The bridge is the real one with all its threads; the devices are simulated at the other end of real pseudo-terminals,
-and what counts is what the simulated motors are told, when they hear it. The supervisor always wants to move. The times
-stand in docs/bridge-safety.md ("Every fault, measured at the motors"), whose table is read here.
+The bridge is the real one with all its threads, on a virtual host; the devices are simulated at the other end of its
+serial lines, and what counts is what the simulated motors are told, when they hear it. The supervisor always wants to
+move. `acceptance/bridge/daemon/test_faults_in_real_time.py` is the witness on real lines. The times stand in
+docs/bridge-safety.md ("Every fault, measured at the motors"), whose table is read here.
 """
 
-import errno
-import os
 import re
-import threading
-import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from _pytest.mark import ParameterSet
 
 from robosc.execution.requests import Decisions
 from robosc_bridge.daemon.loop import Key
 from robosc_bridge.daemon.motion import Motion
 from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.errors import LineDeniedError
+from robosc_bridge.host import Port
 from robosc_bridge.simulated import SimulatedTurtleBot3
-from robosc_bridge.transport.serial_line import SerialLine
+from robosc_bridge.simulated.virtual_host import VirtualHost
 from support.driven import LIMIT_S, PATIENT, Driven, driven
+from support.robot_faults import BASES, GRAVE, SCAN_TIMEOUTS_S, STATED_S, TABLE, Fault, answer_as, cases, speak, wires
 
-pytestmark = pytest.mark.real_time
-
-PAGE = (Path(__file__).parents[3] / "docs" / "bridge-safety.md").read_text(encoding="utf-8")
-TABLE = PAGE.partition("## Every fault, measured at the motors")[2]
-STATED_S = {name: float(time_s) for name, time_s in re.findall(r"^\| ([^|]+?) \| ([0-9.]+) s \|", TABLE, re.MULTILINE)}
-BASES = ("opencr", "dynamixel")
-SCAN_TIMEOUTS_S = {"lds01": 0.6, "lds02": 0.5, "lds03": 0.3}
 # A section `remote`; nothing listens there, the test itself is who can be told.
 REACHABLE = "{grpc_address: '127.0.0.1:1'}"
 # Enough for anything that goes on by itself to show.
@@ -42,78 +33,6 @@ class Bug(Exception):
     """In a part of the bridge."""
 
 
-@dataclass(frozen=True)
-class Fault:
-    """Something that goes wrong with a robot that moves.
-
-    Attributes:
-        row: Of the table on the page.
-        cause: Lets it happen.
-        problem: What the run ends with.
-        bases: Where it can happen.
-        is_line: Whether the base itself is lost with it, which the model is told.
-    """
-
-    row: str
-    cause: Callable[[Driven], object]
-    problem: str
-    bases: tuple[str, ...] = BASES
-    is_line: bool = False
-
-
-def _wires(bridge: Driven, **faults: object) -> None:
-    for name, value in faults.items():
-        setattr(bridge.robot.base_faults, name, value)
-
-
-def _speak(bridge: Driven, code: int) -> None:
-    with bridge.robot.time.lock:
-        for servo in (bridge.robot.left, bridge.robot.right):
-            servo.table["baud rate"] = code
-
-
-def _answer_as(robot: SimulatedTurtleBot3, device_id: int | None) -> None:
-    device = robot.opencr or robot.bus
-    assert device is not None
-    device.answers_as = device_id
-
-
-def _empty(bridge: Driven) -> None:
-    for servo in (bridge.robot.left, bridge.robot.right):
-        servo.brown_out(11.05)
-    if bridge.robot.opencr is not None:
-        bridge.robot.opencr.set_battery(11.05)
-
-
-# What a person must see to.
-GRAVE = (
-    Fault("a motor is overloaded", lambda bridge: bridge.robot.left.overload(), "A motor tells of a fault."),
-    Fault("a motor is too hot", lambda bridge: bridge.robot.right.overheat(), "A motor tells of a fault."),
-    Fault(
-        "a motor has lost its power",
-        lambda bridge: bridge.robot.right.brown_out(0.0),
-        "motor 2 (right) does not answer",
-        ("dynamixel",),
-        is_line=True,
-    ),
-    Fault(
-        "a motor has lost its power",
-        lambda bridge: bridge.robot.right.brown_out(0.0),
-        "A motor tells of a fault.",
-        ("opencr",),
-    ),
-    Fault("a wheel is held", lambda bridge: bridge.robot.left.block_wheel(), "A motor tells of a fault."),
-    Fault("the battery is empty", _empty, "The battery is empty."),
-    Fault("the base is unplugged", lambda bridge: bridge.robot.base_line.disconnect(), "the drive base is lost: /",
-          is_line=True),
-    Fault("the base hears nothing", lambda bridge: _wires(bridge, is_deaf=True), " not answer", is_line=True),
-    Fault("its answers are lost", lambda bridge: _wires(bridge, drop_share=1.0), " not answer", is_line=True),
-    Fault("its answers are damaged", lambda bridge: _wires(bridge, corrupt_share=1.0), " not answer", is_line=True),
-    Fault("its answers are cut", lambda bridge: _wires(bridge, cut_next=10**9), " not answer", is_line=True),
-    Fault("another id answers", lambda bridge: _answer_as(bridge.robot, 7), " not answer, but device 7 does",
-          is_line=True),
-    Fault("it speaks at another baud", lambda bridge: _speak(bridge, 1), " not answer", ("dynamixel",), is_line=True),
-)  # fmt: skip
 # What a line may do without any harm.
 HARMLESS = (
     {"split_s": 0.0},
@@ -125,15 +44,7 @@ HARMLESS = (
 )
 
 
-def _cases(faults: tuple[Fault, ...]) -> list[ParameterSet]:
-    return [
-        pytest.param(base, fault, id=f"{base}-{fault.row.replace(' ', '-')}")
-        for fault in faults
-        for base in fault.bases
-    ]
-
-
-@pytest.mark.parametrize(("base", "fault"), _cases(GRAVE))
+@pytest.mark.parametrize(("base", "fault"), cases(GRAVE))
 def test_a_grave_fault_stops_the_wheels_in_time_and_ends_the_run(base: str, fault: Fault) -> None:
     with driven(base, options="{}" if fault.is_line else PATIENT) as bridge:
         bridge.stopped_after(lambda: fault.cause(bridge), STATED_S[fault.row])
@@ -167,7 +78,7 @@ def test_a_voltage_that_is_out_of_range_is_told_and_stops_nothing() -> None:
 def test_a_disturbed_line_does_not_stop_the_wheels_for_good(base: str, wire: dict[str, object]) -> None:
     with driven(base) as bridge:
         bridge.steady()
-        _wires(bridge, **wire)
+        wires(bridge, **wire)
         heard = len(bridge.trace.heard_s)
         bridge.until(lambda: len(bridge.trace.heard_s) > heard + 50, "fifty requests")
         bridge.steady()
@@ -217,9 +128,9 @@ def test_a_loop_that_hangs_stops_the_wheels_until_it_turns_again(
     base: str, row: str, safety: str, message: str
 ) -> None:
     with driven(base, safety=safety) as bridge:
-        bridge.stopped_after(bridge.log.released.clear, STATED_S[row])
+        bridge.stopped_after(lambda: setattr(bridge.log, "hangs", True), STATED_S[row])
         bridge.stays(WHILE_S)
-        bridge.log.released.set()
+        bridge.log.hangs = False
         bridge.moves()
         if message:
             bridge.was_told(message)
@@ -286,23 +197,26 @@ def test_a_resume_lets_it_go_on_also_where_the_motors_have_let_go(base: str, is_
 
 def test_an_operator_who_is_lost_stops_the_wheels_until_he_is_back() -> None:
     with driven("opencr", remote=REACHABLE, safety="{operator_link_timeout_s: 0.3}") as bridge:
-        is_there = threading.Event()
-        is_there.set()
+        is_there = True
 
         def sees() -> None:
             while bridge.state is not State.OVER:
-                if is_there.is_set():
+                if is_there:
                     bridge.machine.operations.operator_seen()
-                time.sleep(0.02)
+                bridge.host.sleep(0.02)
 
-        operator = threading.Thread(target=sees)
+        def leaves() -> None:
+            nonlocal is_there
+            is_there = False
+
+        operator = bridge.host.thread(sees, "operator")
         operator.start()
         try:
-            bridge.stopped_after(is_there.clear, STATED_S["the operator is lost"])
+            bridge.stopped_after(leaves, STATED_S["the operator is lost"])
             bridge.was_told("The link to the operator is lost.")
             bridge.stays(WHILE_S)
             assert bridge.state is State.RUNNING
-            is_there.set()
+            is_there = True
             bridge.moves()
         finally:
             bridge.machine.quit()
@@ -314,7 +228,9 @@ def test_an_operator_who_is_lost_stops_the_wheels_until_he_is_back() -> None:
 
 def _ordered(bridge: Driven, command: Command) -> str:
     """Why it cannot be, or nothing."""
-    return bridge.machine.operations.order(command, "test").result(2 * LIMIT_S)
+    answer = bridge.machine.operations.order(command, "test")
+    bridge.until(answer.done, "an answer to the order", 2 * LIMIT_S)
+    return answer.result()
 
 
 @pytest.mark.parametrize("base", BASES)
@@ -339,11 +255,11 @@ def test_a_line_that_is_sound_again_moves_nothing_by_itself(fault: Fault) -> Non
         bridge.until(lambda: bridge.state is State.FAULT, "the fault")
         bridge.robot.base_line.reconnect()
         bridge.robot.base_faults.clear()
-        _answer_as(bridge.robot, None)
+        answer_as(bridge.robot, None)
         for servo in (bridge.robot.left, bridge.robot.right):
             servo.brown_out(12.0)
         if bridge.robot.bus is not None:
-            _speak(bridge, 3)
+            speak(bridge, 3)
         bridge.until(lambda: bridge.state is State.STANDBY, "the standby with the base back")
         bridge.stays(WHILE_S)
 
@@ -414,9 +330,13 @@ def test_noise_from_a_lidar_is_no_scan(base: str) -> None:
 # Faults at the start.
 
 
+def host_of(robot: SimulatedTurtleBot3) -> VirtualHost:
+    assert isinstance(robot.time.clock, VirtualHost)
+    return robot.time.clock
+
+
 def _busy(robot: SimulatedTurtleBot3) -> Callable[[], object]:
-    line = SerialLine(robot.base_path, 1_000_000)
-    return line.close
+    return host_of(robot).open_port(robot.base_path, 1_000_000).close
 
 
 def _missing(robot: SimulatedTurtleBot3) -> Callable[[], object]:
@@ -430,21 +350,21 @@ def _deaf(robot: SimulatedTurtleBot3) -> Callable[[], object]:
 
 
 def _foreign(robot: SimulatedTurtleBot3) -> Callable[[], object]:
-    _answer_as(robot, 7)
-    return lambda: _answer_as(robot, None)
+    answer_as(robot, 7)
+    return lambda: answer_as(robot, None)
 
 
 def _forbidden(robot: SimulatedTurtleBot3) -> Callable[[], object]:
-    # Root may open everything: the system's answer is what is played.
     patch = pytest.MonkeyPatch()
-    opened = os.open
+    host = host_of(robot)
+    opened = host.open_port
 
-    def refused(path: str, *arguments: int) -> int:
-        if str(path) == robot.base_path:
-            raise PermissionError(errno.EACCES, "Permission denied", path)
-        return opened(path, *arguments)
+    def refused(path: str, baud: int) -> Port:
+        if path == robot.base_path:
+            raise LineDeniedError(path, "no permission; is this user in the group dialout?")
+        return opened(path, baud)
 
-    patch.setattr("serial.serialposix.os.open", refused)
+    patch.setattr(host, "open_port", refused)
     return patch.undo
 
 

@@ -1,0 +1,40 @@
+"""This computer as a host: its clocks, threads and serial ports."""
+
+import queue
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+from robosc.execution.clock import SystemClock
+from robosc_bridge.transport.serial_line import SerialLine
+
+
+class SystemHost(SystemClock):
+    """This computer."""
+
+    sleep = staticmethod(time.sleep)
+
+    def condition(self) -> threading.Condition:
+        """Return a new condition variable."""
+        return threading.Condition()
+
+    def queue(self) -> queue.SimpleQueue[Any]:
+        """Return a new queue; a signal handler may put into it while the same thread takes from it."""
+        return queue.SimpleQueue()
+
+    def thread(self, run: Callable[[], None], name: str) -> threading.Thread:
+        """Return a new thread that does not keep the process from ending."""
+        return threading.Thread(target=run, name=name, daemon=True)
+
+    def open_port(self, path: str, baud: int) -> SerialLine:
+        """Open a serial port.
+
+        Raises:
+            LineError: It cannot be used.
+        """
+        return SerialLine(path, baud)
+
+
+SYSTEM_HOST = SystemHost()
+"""This computer: what is used where nothing else is said."""

@@ -1,0 +1,105 @@
+"""Faults of a robot that moves, and within which time each is stated to stop its wheels (docs/bridge-safety.md)."""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from _pytest.mark import ParameterSet
+
+from robosc_bridge.simulated import SimulatedTurtleBot3
+from support.driven import Driven
+
+PAGE = (Path(__file__).parents[2] / "docs" / "bridge-safety.md").read_text(encoding="utf-8")
+TABLE = PAGE.partition("## Every fault, measured at the motors")[2]
+STATED_S = {name: float(time_s) for name, time_s in re.findall(r"^\| ([^|]+?) \| ([0-9.]+) s \|", TABLE, re.MULTILINE)}
+BASES = ("opencr", "dynamixel")
+SCAN_TIMEOUTS_S = {"lds01": 0.6, "lds02": 0.5, "lds03": 0.3}
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Something that goes wrong with a robot that moves.
+
+    Attributes:
+        row: Of the table on the page.
+        cause: Lets it happen.
+        problem: What the run ends with.
+        bases: Where it can happen.
+        is_line: Whether the base itself is lost with it, which the model is told.
+    """
+
+    row: str
+    cause: Callable[[Driven], object]
+    problem: str
+    bases: tuple[str, ...] = BASES
+    is_line: bool = False
+
+
+def wires(bridge: Driven, **faults: object) -> None:
+    """Let something be wrong with the wire of the base."""
+    for name, value in faults.items():
+        setattr(bridge.robot.base_faults, name, value)
+
+
+def speak(bridge: Driven, code: int) -> None:
+    """Let the motors speak at another speed."""
+    with bridge.robot.time.lock:
+        for servo in (bridge.robot.left, bridge.robot.right):
+            servo.table["baud rate"] = code
+
+
+def answer_as(robot: SimulatedTurtleBot3, device_id: int | None) -> None:
+    """Let the base answer by another id; None: by its own."""
+    device = robot.opencr or robot.bus
+    assert device is not None
+    device.answers_as = device_id
+
+
+def empty(bridge: Driven) -> None:
+    """Let the battery be empty."""
+    for servo in (bridge.robot.left, bridge.robot.right):
+        servo.brown_out(11.05)
+    if bridge.robot.opencr is not None:
+        bridge.robot.opencr.set_battery(11.05)
+
+
+# What a person must see to.
+GRAVE = (
+    Fault("a motor is overloaded", lambda bridge: bridge.robot.left.overload(), "A motor tells of a fault."),
+    Fault("a motor is too hot", lambda bridge: bridge.robot.right.overheat(), "A motor tells of a fault."),
+    Fault(
+        "a motor has lost its power",
+        lambda bridge: bridge.robot.right.brown_out(0.0),
+        "motor 2 (right) does not answer",
+        ("dynamixel",),
+        is_line=True,
+    ),
+    Fault(
+        "a motor has lost its power",
+        lambda bridge: bridge.robot.right.brown_out(0.0),
+        "A motor tells of a fault.",
+        ("opencr",),
+    ),
+    Fault("a wheel is held", lambda bridge: bridge.robot.left.block_wheel(), "A motor tells of a fault."),
+    Fault("the battery is empty", empty, "The battery is empty."),
+    Fault("the base is unplugged", lambda bridge: bridge.robot.base_line.disconnect(), "the drive base is lost: /",
+          is_line=True),
+    Fault("the base hears nothing", lambda bridge: wires(bridge, is_deaf=True), " not answer", is_line=True),
+    Fault("its answers are lost", lambda bridge: wires(bridge, drop_share=1.0), " not answer", is_line=True),
+    Fault("its answers are damaged", lambda bridge: wires(bridge, corrupt_share=1.0), " not answer", is_line=True),
+    Fault("its answers are cut", lambda bridge: wires(bridge, cut_next=10**9), " not answer", is_line=True),
+    Fault("another id answers", lambda bridge: answer_as(bridge.robot, 7), " not answer, but device 7 does",
+          is_line=True),
+    Fault("it speaks at another baud", lambda bridge: speak(bridge, 1), " not answer", ("dynamixel",), is_line=True),
+)  # fmt: skip
+
+
+def cases(faults: tuple[Fault, ...]) -> list[ParameterSet]:
+    """Return a parameter for each fault on each base where it can happen."""
+    return [
+        pytest.param(base, fault, id=f"{base}-{fault.row.replace(' ', '-')}")
+        for fault in faults
+        for base in fault.bases
+    ]

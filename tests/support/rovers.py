@@ -1,6 +1,5 @@
-"""A simulated rover in a world, and a driver of it, over a pseudo-terminal or UDP."""
+"""A simulated rover in a world, and a driver of it: on a virtual host, or over a pseudo-terminal or UDP."""
 
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,7 +13,10 @@ from robosc_bridge.devices.interface import (
 from robosc_bridge.devices.mavlink_rover import MavlinkRover
 from robosc_bridge.devices.registry import make_drive_base
 from robosc_bridge.devices.robots import Body
+from robosc_bridge.host import Host, Thread
 from robosc_bridge.simulated import BODIES, DatagramLine, Rover, SimulatedLine, Timebase, World, room
+from robosc_bridge.simulated.virtual_host import VirtualHost
+from robosc_bridge.transport.system_host import SYSTEM_HOST
 
 BODY = Body(0.5, 2.0, BODIES["burger"].wheel_separation_m)
 FORWARD = Velocity(0.2)
@@ -32,27 +34,45 @@ class Bench:
     line: SimulatedLine | DatagramLine
     base: MavlinkRover
     path: str
+    host: Host
 
     def start(self) -> None:
         self.base.open()
         self.base.set_torque(True)
 
     def drive(self, velocity: Velocity = STANDSTILL, seconds: float = 0.0) -> DriveReading:
-        end_s = time.monotonic() + seconds
+        end_s = self.host.monotonic() + seconds
         while True:
             reading = self.base.exchange(velocity)
-            if time.monotonic() >= end_s:
+            if self.host.monotonic() >= end_s:
                 return reading
-            time.sleep(0.01)
+            self.host.sleep(0.01)
 
     def drive_until(
         self, is_so: Callable[[DriveReading], bool], velocity: Velocity = STANDSTILL, limit_s: float = 5.0
     ) -> DriveReading:
-        end_s = time.monotonic() + limit_s
+        end_s = self.host.monotonic() + limit_s
         while not is_so(reading := self.base.exchange(velocity)):
-            assert time.monotonic() < end_s, f"not within {limit_s} s; the last reading is {reading}"
-            time.sleep(0.01)
+            assert self.host.monotonic() < end_s, f"not within {limit_s} s; the last reading is {reading}"
+            self.host.sleep(0.01)
         return reading
+
+    def until(self, condition: Callable[[], bool], limit_s: float = 5.0) -> None:
+        end_s = self.host.monotonic() + limit_s
+        while not condition():
+            assert self.host.monotonic() < end_s, f"not within {limit_s} s"
+            self.host.sleep(0.001)
+
+    def later(self, seconds: float, act: Callable[[], None]) -> Thread:
+        """Let something happen in a thread of its own after a time."""
+
+        def run() -> None:
+            self.host.sleep(seconds)
+            act()
+
+        thread = self.host.thread(run, "later")
+        thread.start()
+        return thread
 
     @property
     def speed_m_s(self) -> float:
@@ -63,14 +83,16 @@ class Bench:
 
 @contextmanager
 def rig(
-    kind: str = "pty", key: bytes | None = None, vehicle: tuple[int, int] = (10, 3), **arguments: Any
+    kind: str = "virtual", key: bytes | None = None, vehicle: tuple[int, int] = (10, 3), **arguments: Any
 ) -> Iterator[Bench]:
-    passing = Timebase()
+    virtual = VirtualHost()
+    host: Host = virtual if kind == "virtual" else SYSTEM_HOST
+    passing = Timebase(host)
     world = World(BODIES["burger"], room(4.0, 3.0), passing, POSE)
     rover = Rover(world, key=key, heartbeat_s=0.2)
     rover.kind, rover.autopilot = vehicle
     line: SimulatedLine | DatagramLine
-    if kind == "pty":
+    if kind in ("virtual", "pty"):
         line = SimulatedLine(rover, passing)
         path = line.path
     elif kind == "udpout":
@@ -81,10 +103,11 @@ def rig(
             free = other.port
         line = DatagramLine(rover, passing, free)
         path = f"udpin:127.0.0.1:{free}"
-    base = make_drive_base("mavlink-rover", path=path, robot=BODY, **arguments)
+    base = make_drive_base("mavlink-rover", path=path, robot=BODY, host=host, **arguments)
     assert isinstance(base, MavlinkRover)
     try:
-        yield Bench(rover, world, passing, line, base, path)
+        yield Bench(rover, world, passing, line, base, path, host)
     finally:
         base.close()
         line.close()
+        virtual.close()

@@ -1,7 +1,6 @@
 """A MAVLink rover as a source of obstacles, over a real pseudo-terminal and real UDP."""
 
 import math
-import threading
 import time
 
 import pytest
@@ -9,16 +8,13 @@ import pytest
 from robosc_bridge.devices.interface import (
     RangeScanner,
     Scan,
-    Velocity,
 )
 from robosc_bridge.devices.registry import make_range_scanner
 from robosc_bridge.errors import (
-    LineError,
     LineLostError,
 )
-from robosc_bridge.simulated import SimulatedLine, Walls
-from support.rovers import FORWARD, Bench, rig
-from support.wire import wait_until
+from robosc_bridge.simulated import Walls
+from support.rovers import Bench, rig
 
 pytestmark = pytest.mark.real_time
 
@@ -60,73 +56,6 @@ def test_obstacles_are_where_they_are(any_bench: Bench, obstacles: str) -> None:
         scanner.close()
     with pytest.raises(LineLostError, match="not open"):
         scanner.receive(0.0)
-
-
-def test_drive_base_and_scanner_share_a_line_and_outlive_each_other(bench: Bench) -> None:
-    scanner = make_range_scanner("mavlink-rover", path=bench.path)
-    bench.base.open()
-    scanner.open()
-    seen: list[Scan] = []
-    ended = threading.Event()
-
-    def look() -> None:
-        while not ended.is_set():
-            if scan := scanner.receive(0.5):
-                seen.append(scan)
-
-    thread = threading.Thread(target=look)
-    thread.start()
-    try:
-        bench.base.set_torque(True)
-        reading = bench.drive(Velocity(0.1, 0.3), 1.5)
-        assert reading.velocity.linear_m_s == pytest.approx(0.1, abs=0.001)
-        assert len(seen) >= 10
-        assert 1 <= len(bench.rover.heartbeats) <= 4
-        # The base no longer lives: its heartbeat ends though the scanner goes on, until the base is closed.
-        before = len(bench.rover.heartbeats)
-        time.sleep(1.3)
-        assert len(bench.rover.heartbeats) == before
-        bench.base.close()
-        count = len(seen)
-        wait_until(lambda: len(seen) > count + 2)
-        bench.base.open()
-    finally:
-        ended.set()
-        scanner.wake()
-        thread.join()
-        scanner.close()
-    assert not bench.drive(FORWARD, 0.1).is_torque_on
-
-
-def test_a_scanner_that_waits_is_woken_and_told_of_a_lost_line(bench: Bench) -> None:
-    assert isinstance(bench.line, SimulatedLine)
-    bench.rover.is_silent = True
-    scanner = make_range_scanner("mavlink-rover", path=bench.path)
-    scanner.open()
-    timer = threading.Timer(0.1, scanner.wake)
-    timer.start()
-    begin_s = time.monotonic()
-    assert scanner.receive(5.0) is None
-    assert time.monotonic() - begin_s < 1.0
-    timer.join()
-    timer = threading.Timer(0.1, bench.line.disconnect)
-    timer.start()
-    with pytest.raises(LineError):
-        scanner.receive(5.0)
-    timer.join()
-    scanner.close()
-
-
-def test_a_scanner_asks_again_when_told_to(bench: Bench) -> None:
-    scanner = make_range_scanner("mavlink-rover", path=bench.path)
-    scanner.open()
-    _next(scanner)
-    bench.rover.restart()
-    while scanner.receive(0.5):
-        pass
-    scanner.restart()
-    _next(scanner)
-    scanner.close()
 
 
 def test_walls_that_are_too_far_are_none() -> None:

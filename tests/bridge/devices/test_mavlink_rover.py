@@ -1,16 +1,18 @@
-"""A MAVLink rover as a drive base, over a real pseudo-terminal and real UDP."""
+"""A MAVLink rover as a drive base, on a virtual host."""
 
 import pytest
 
 from robosc_bridge.devices.interface import (
+    STANDSTILL,
     DriveBase,
+    Velocity,
 )
 from robosc_bridge.devices.registry import make_drive_base
 from robosc_bridge.errors import (
     DeviceError,
     LineMissingError,
 )
-from support.rovers import BODY, FORWARD
+from support.rovers import BODY, FORWARD, POSE, Bench
 
 
 def test_a_missing_port_is_told() -> None:
@@ -20,3 +22,101 @@ def test_a_missing_port_is_told() -> None:
     base.close()
     with pytest.raises(DeviceError, match="not open"):
         base.exchange(FORWARD)
+
+
+def test_it_goes_where_it_is_told_in_the_worked_packets_fields(bench: Bench) -> None:
+    bench.start()
+    bench.drive(Velocity(0.1, -0.5), 0.05)
+    values = bench.rover.targets[-1]
+    assert (values["vx"], values["yaw_rate"]) == pytest.approx((0.1, 0.5))
+    assert (values["type_mask"], values["frame"]) == (0x05E7, 8)
+    assert (values["target_system"], values["target_component"]) == (1, 1)
+    # Beyond its limits.
+    bench.drive(Velocity(-9.0, 9.0), 0.05)
+    assert (bench.rover.targets[-1]["vx"], bench.rover.targets[-1]["yaw_rate"]) == pytest.approx((-0.5, -2.0))
+
+
+def test_targets_are_repeated_and_new_ones_go_at_once(bench: Bench) -> None:
+    bench.start()
+    before = len(bench.rover.targets)
+    begin_s = bench.host.monotonic()
+    bench.drive(FORWARD, 1.0)
+    passed_s = bench.host.monotonic() - begin_s
+    count = len(bench.rover.targets) - before
+    assert 5 * passed_s <= count <= 11 * passed_s + 2
+    bench.base.exchange(STANDSTILL)
+    bench.until(lambda: bench.rover.targets[-1]["vx"] == 0.0, 0.08)
+    before = len(bench.rover.targets)
+    for step in range(100):
+        bench.base.exchange(Velocity(0.1 + step / 1000))
+        bench.host.sleep(0.001)
+    # A slow radio is not filled.
+    assert len(bench.rover.targets) - before < 15
+
+
+def test_a_driver_that_dies_stops_the_vehicle(bench: Bench) -> None:
+    bench.start()
+    bench.drive(FORWARD, 0.2)
+    assert bench.speed_m_s == pytest.approx(0.2, abs=0.001)
+    begin_s = bench.host.monotonic()
+    bench.until(lambda: bench.speed_m_s == 0.0, 4.0)
+    assert bench.host.monotonic() - begin_s == pytest.approx(3.0, abs=0.3)
+
+
+def test_torque_off_is_after_a_stop_and_on_again_without_motion(bench: Bench) -> None:
+    bench.start()
+    bench.drive(FORWARD, 0.2)
+    bench.base.set_torque(False)
+    assert not bench.rover.is_armed
+    assert bench.rover.targets[-1]["vx"] == 0.0
+    assert not bench.drive(FORWARD, 0.1).is_torque_on
+    assert bench.rover.targets[-1]["vx"] == 0.0
+    bench.base.set_torque(True)
+    assert bench.speed_m_s == 0.0
+    assert bench.drive(FORWARD, 0.4).velocity.linear_m_s == pytest.approx(0.2, abs=0.001)
+
+
+def test_a_vehicle_of_a_driver_that_died_is_left_at_rest_when_opened(bench: Bench) -> None:
+    bench.start()
+    bench.drive(FORWARD, 0.2)
+    bench.base._is_torque_wanted = False  # As a process that is gone, which closes nothing.
+    bench.base._release()
+    assert bench.rover.is_armed
+    bench.base.open()
+    assert not bench.rover.is_armed
+    assert bench.world.speed_m_s == 0.0
+
+
+def test_a_robot_that_was_moved_while_closed_is_where_it_was(bench: Bench) -> None:
+    bench.start()
+    bench.drive(FORWARD, 0.3)
+    bench.drive_until(lambda reading: reading.velocity == STANDSTILL)
+    pose = bench.drive(seconds=0.2).pose
+    assert pose.x_m > 0.02
+    bench.base.close()
+    bench.world.place(-0.5, 0.1, 2.0)
+    bench.base.open()
+    assert bench.base.exchange(FORWARD).pose == pose
+
+
+def test_place_and_attitude_do_where_there_is_no_odometry(bench: Bench) -> None:
+    bench.rover.tells_motion = False
+    bench.start()
+    bench.drive(Velocity(0.2, 0.6), 0.5)
+    reading = bench.drive(Velocity(-0.2, 0.6), 0.4)
+    assert reading.velocity.linear_m_s == pytest.approx(-0.2, abs=0.01)
+    assert reading.velocity.angular_rad_s == pytest.approx(0.6, abs=0.01)
+    bench.drive_until(lambda reading: abs(reading.velocity.linear_m_s) < 1e-6)
+    reading = bench.drive(seconds=0.2)
+    assert reading.pose.heading_rad == pytest.approx(bench.world.pose[2] - POSE[2], abs=0.005)
+
+
+def test_an_estimate_that_jumps_is_no_motion(bench: Bench) -> None:
+    bench.start()
+    bench.drive(FORWARD, 0.2)
+    bench.drive_until(lambda reading: reading.velocity == STANDSTILL)
+    pose = bench.drive(seconds=0.2).pose
+    with bench.time.lock:
+        bench.rover.shift_m = (5.0, -3.0)
+        bench.rover.resets += 1
+    assert bench.drive(seconds=0.3).pose == pose

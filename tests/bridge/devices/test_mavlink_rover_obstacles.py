@@ -1,0 +1,85 @@
+"""A MAVLink rover as a source of obstacles, on a virtual host."""
+
+import pytest
+
+from robosc_bridge.devices.interface import (
+    RangeScanner,
+    Scan,
+    Velocity,
+)
+from robosc_bridge.devices.registry import make_range_scanner
+from robosc_bridge.errors import (
+    LineError,
+)
+from robosc_bridge.simulated import SimulatedLine
+from support.rovers import FORWARD, Bench
+
+
+def _next(scanner: RangeScanner, limit_s: float = 3.0) -> Scan:
+    scan = scanner.receive(limit_s)
+    assert scan is not None
+    return scan
+
+
+def test_drive_base_and_scanner_share_a_line_and_outlive_each_other(bench: Bench) -> None:
+    scanner = make_range_scanner("mavlink-rover", path=bench.path, host=bench.host)
+    bench.base.open()
+    scanner.open()
+    seen: list[Scan] = []
+    is_over = False
+
+    def look() -> None:
+        while not is_over:
+            if scan := scanner.receive(0.5):
+                seen.append(scan)
+
+    thread = bench.later(0.0, look)
+    try:
+        bench.base.set_torque(True)
+        reading = bench.drive(Velocity(0.1, 0.3), 1.5)
+        assert reading.velocity.linear_m_s == pytest.approx(0.1, abs=0.001)
+        assert len(seen) >= 10
+        assert 1 <= len(bench.rover.heartbeats) <= 4
+        # The base no longer lives: its heartbeat ends though the scanner goes on, until the base is closed.
+        before = len(bench.rover.heartbeats)
+        bench.host.sleep(1.3)
+        assert len(bench.rover.heartbeats) == before
+        bench.base.close()
+        count = len(seen)
+        bench.until(lambda: len(seen) > count + 2)
+        bench.base.open()
+    finally:
+        is_over = True
+        scanner.wake()
+        thread.join()
+        scanner.close()
+    assert not bench.drive(FORWARD, 0.1).is_torque_on
+
+
+def test_a_scanner_that_waits_is_woken_and_told_of_a_lost_line(bench: Bench) -> None:
+    assert isinstance(bench.line, SimulatedLine)
+    bench.rover.is_silent = True
+    scanner = make_range_scanner("mavlink-rover", path=bench.path, host=bench.host)
+    scanner.open()
+    timer = bench.later(0.1, scanner.wake)
+    begin_s = bench.host.monotonic()
+    assert scanner.receive(5.0) is None
+    assert bench.host.monotonic() - begin_s == pytest.approx(0.1)
+    timer.join()
+    timer = bench.later(0.1, bench.line.disconnect)
+    with pytest.raises(LineError):
+        scanner.receive(5.0)
+    timer.join()
+    scanner.close()
+
+
+def test_a_scanner_asks_again_when_told_to(bench: Bench) -> None:
+    scanner = make_range_scanner("mavlink-rover", path=bench.path, host=bench.host)
+    scanner.open()
+    _next(scanner)
+    bench.rover.restart()
+    while scanner.receive(0.5):
+        pass
+    scanner.restart()
+    _next(scanner)
+    scanner.close()

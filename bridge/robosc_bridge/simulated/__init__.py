@@ -1,4 +1,4 @@
-"""Simulated devices on pseudo-terminals, and the planar world that they move in and see.
+"""Simulated devices on pseudo-terminals or on virtual time, and the planar world that they move in and see.
 
 `SimulatedTurtleBot3` is a whole robot; its parts can be put together otherwise: a `World` with `Walls`, `Servo`s on a
 `ServoBus`, an `OpenCr`, one of the `LIDARS`, each on a `SimulatedLine`, a `SimulatedCamera` over a `Track`.
@@ -23,6 +23,7 @@ from robosc_bridge.simulated.servo_bus import ServoBus
 from robosc_bridge.simulated.textures import Texture
 from robosc_bridge.simulated.timebase import Timebase
 from robosc_bridge.simulated.turtlebot3 import BASES, SimulatedTurtleBot3, wheel_servos
+from robosc_bridge.simulated.virtual_host import VirtualHost, VirtualTimeError
 from robosc_bridge.simulated.walls import Walls, maze, open_maze, parse_walls, room
 from robosc_bridge.simulated.world import Wheel, World
 
@@ -62,6 +63,8 @@ __all__ = [
     "Texture",
     "Timebase",
     "Track",
+    "VirtualHost",
+    "VirtualTimeError",
     "Walls",
     "Wheel",
     "World",

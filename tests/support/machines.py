@@ -8,6 +8,8 @@ from robosc_bridge.configuration import parse, tie
 from robosc_bridge.daemon.assembly import Machine, assemble
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.errors import BridgeError
+from robosc_bridge.host import Host
+from robosc_bridge.transport.system_host import SYSTEM_HOST
 from support.daemons import MODEL
 from support.models import bundle_of
 
@@ -19,11 +21,11 @@ def controller() -> Supervisor:
     return made.supervisor
 
 
-def machine(supervisor: Supervisor, text: str, *, starts_itself: bool = True) -> Machine:
+def machine(supervisor: Supervisor, text: str, *, starts_itself: bool = True, host: Host = SYSTEM_HOST) -> Machine:
     """Return what is assembled of the text of a configuration."""
     configuration = parse(text.encode(), "test.yaml").configuration
     ties = tie(supervisor.model, configuration)
-    return assemble(configuration, ties, supervisor, NullLog(), starts_itself=starts_itself)
+    return assemble(configuration, ties, supervisor, NullLog(), starts_itself=starts_itself, host=host)
 
 
 class RecordedFace:

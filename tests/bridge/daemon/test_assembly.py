@@ -1,6 +1,7 @@
 """What is refused before anything is opened, and how the parts start and stop together."""
 
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -9,8 +10,14 @@ from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc_bridge.configuration import parse, tie
 from robosc_bridge.daemon.assembly import AssemblyError, check_settings, safety_limits
+from robosc_bridge.daemon.states import State
 from robosc_bridge.errors import BridgeError
+from robosc_bridge.safety import Reason
+from robosc_bridge.simulated import SimulatedTurtleBot3, VirtualHost
+from robosc_bridge.simulated.mavlink_packets import Encoder
+from support.certificates import Authority
 from support.daemons import CONFIGURATION
+from support.driven import driven
 from support.machines import RecordedFace, controller, machine
 
 
@@ -114,3 +121,109 @@ def test_a_scanner_that_cannot_be_so_is_refused(scanner: str, why: str, supervis
     with pytest.raises(AssemblyError) as raised:
         check_settings(configuration, tie(supervisor.model, configuration), supervisor.deployment)
     assert why in str(raised.value)
+
+
+SET_MESSAGE_INTERVAL = 511
+
+
+TLS = "{grpc_address: '127.0.0.1:1', tls_certificate: CERTIFICATE, tls_key: KEY"
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        (("driver: opencr", "driver: opncr"), "unknown drive base 'opncr'; did you mean 'opencr'?"),
+        (("driver: lds01", "driver: lds9"), "unknown range scanner 'lds9'"),
+        (("/dev/base", "/dev/base, options: {bauds: 1}"), "driver 'opencr': "),
+        (("/dev/scanner", "/dev/scanner, options: {speed: 1}"), "driver 'lds01': "),
+        (("skills:", "remote: {grpc_address: '127.0.0.1:1', tokens: NONE}\nskills:"), "remote: NONE: "),
+        (
+            ("skills:", "remote: {grpc_address: '127.0.0.1:1', tls_certificate: NONE, tls_key: NONE}\nskills:"),
+            "remote: NONE: ",
+        ),
+        (("skills:", f"remote: {TLS}, client_ca: NONE}}\nskills:"), "remote: NONE: "),
+        (
+            ("skills:", "remote: {mavlink_url: 'udpout:127.0.0.1:1', mavlink_key: NONE}\nskills:"),
+            "remote.mavlink_key: NONE: ",
+        ),
+        (("skills:", "supervisor: {ca: NONE}\nskills:"), "supervisor: NONE: "),
+        (("skills:", "supervisor: {token_file: NONE}\nskills:"), "supervisor: NONE: "),
+        (("skills:", "supervisor: {key: NONE}\nskills:"), "supervisor: a certificate and its key belong together"),
+    ],
+)
+def test_what_cannot_be_used_is_refused_without_a_start(
+    change: tuple[str, str], why: str, supervisor: Supervisor, tmp_path: Path
+) -> None:
+    certificate, key = Authority(tmp_path).sign("bridge")
+    names = {"CERTIFICATE": str(certificate), "KEY": str(key), "NONE": str(tmp_path / "none")}
+    text = CONFIGURATION.replace(*change)
+    for name, path in names.items():
+        text, why = text.replace(name, path), why.replace(name, path)
+    configuration = parse(text.encode(), "test.yaml").configuration
+    with pytest.raises(BridgeError) as raised:
+        check_settings(configuration, tie(supervisor.model, configuration), Deployment.CONTROLLER)
+    assert why in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_rover_is_driven_within_its_own_limits() -> None:
+    """Those of its body, not those of a TurtleBot3; one that is called like one has its numbers."""
+    own = "{wheel_separation_m: 0.16, linear_m_s: 0.1, angular_rad_s: 0.5}"
+    patient = "{motor_timeout_s: 1.0, scan_timeout_s: 1.0, overrun_s: 1.0}"
+    with driven("mavlink-rover", velocity=(3.0, 0.0), robot=own, safety=patient) as bridge:
+        assert bridge.limits.linear_m_s == 0.1
+        assert bridge.limits.separation_m == 0.16
+        assert bridge.limits.wheel_m_s == pytest.approx(0.14)
+        bridge.until(lambda: bridge.wheels_m_s == pytest.approx((0.1, 0.1), rel=0.05), "the fastest that it may")
+        assert max(speed for _, *wheels in bridge.trace.told for speed in wheels) <= 0.1 * 1.05
+    with driven("mavlink-rover", safety=patient) as bridge:
+        assert bridge.limits.linear_m_s == 0.22
+        bridge.moves()
+
+
+def test_a_rover_may_take_as_long_to_arm_as_its_heartbeats_need() -> None:
+    """Mode and arming show in a heartbeat each: with the second and third of a slow radio lost, after 5 s."""
+
+    def slowed(robot: SimulatedTurtleBot3) -> None:
+        assert robot.rover is not None
+        words = {"target_system": 1, "target_component": 1, "command": SET_MESSAGE_INTERVAL}
+        packet = Encoder(255, 190).encode("COMMAND_LONG", parameters=(0.0, 2.5e6, *(0.0,) * 5), **words)
+        robot.rover.receive(packet, 0)
+
+    with driven("mavlink-rover", before=slowed) as bridge:
+        bridge.moves()
+        assert Reason.TORQUE_LOST not in bridge.messages
+
+
+def test_faces_are_started_before_the_devices_and_stopped_after_them(supervisor: Supervisor) -> None:
+    with VirtualHost() as host, SimulatedTurtleBot3("burger", "opencr", "lds01", clock=host) as robot:
+        text = CONFIGURATION.replace("/dev/base", str(robot.base_path)).replace("/dev/scanner", str(robot.scanner_path))
+        made = machine(supervisor, text, host=host)
+        face = RecordedFace(made)
+        before_s = sys.getswitchinterval()
+        assert made.run([face])
+    # While it runs, a busy face must not hold up the other threads; afterwards that is nobody's business.
+    assert face.switch_s < 0.001 < before_s == sys.getswitchinterval()
+    assert face.told == ["start False", f"stop False {State.OVER}"]
+
+
+class MortalFace(RecordedFace):
+    """One that ends by itself as soon as the robot runs."""
+
+    @property
+    def is_alive(self) -> bool:  # type: ignore[override]
+        return self.made.daemon.state is not State.RUNNING
+
+    def start(self) -> None:
+        self.told.append("start")
+
+
+def test_the_robot_stops_when_a_face_ends_by_itself(supervisor: Supervisor, caplog: pytest.LogCaptureFixture) -> None:
+    with VirtualHost() as host, SimulatedTurtleBot3("burger", "opencr", "lds01", clock=host) as robot:
+        text = CONFIGURATION.replace("/dev/base", str(robot.base_path)).replace("/dev/scanner", str(robot.scanner_path))
+        made = machine(supervisor, text, host=host)
+        face = MortalFace(made)
+        made.run([face])
+    assert "has ended" in made.daemon.problem
+    assert caplog.text.count("the recorded face has ended by itself: the robot stops") == 1
+    assert face.told == ["start", f"stop False {State.OVER}"]

@@ -57,8 +57,7 @@ vscode: ## install the VS Code that the extension's tests run in
 demo: $(READY) ## lead a simulated robot out of a maze, from model to serial bytes; DEMO='--scene maze-spiral' and so on
 	$(BIN)/python deploy/demo/demo.py $(DEMO)
 
-# One worker more than cores: some tests wait for a device or a process.
-WORKERS := $(shell echo $$(( $$(nproc 2>/dev/null || echo 2) + 1 )))
+WORKERS := $(shell nproc 2>/dev/null || echo 2)
 PYTEST := $(BIN)/python -m pytest
 
 TESTS := tests
@@ -66,8 +65,9 @@ TESTS := tests
 test: $(READY) ## the suite that says the same on every machine; TESTS=... chooses, WORKERS=... says how many at a time
 	$(PYTEST) -n $(WORKERS) --dist worksteal --durations 20 -r fE $(TESTS)
 
+# One worker more than cores: these tests wait for real middleware.
 acceptance: $(READY) ## real parts and real time: ROS, compilers, browser, databases, clusters; TESTS=acceptance/... chooses
-	@PYTHON=$(BIN)/python WORKERS=$(WORKERS) sh acceptance/run.sh $(filter-out tests,$(TESTS))
+	@PYTHON=$(BIN)/python WORKERS=$$(( $(WORKERS) + 1 )) sh acceptance/run.sh $(filter-out tests,$(TESTS))
 
 smoke: $(READY) demo ## one of each real part; SMOKE=--no-skips wants all of them to be there
 	$(PYTEST) -n $(WORKERS) --dist loadfile --durations 0 --durations-min 1 -r fEsR -m smoke $(SMOKE) acceptance

@@ -13,6 +13,9 @@ COLCON := .venv-colcon
 CHECKERS := .venv-checkers
 WHEELS := out/wheels
 
+# Without bytecode on disk, every program that the tests start would compile all that it imports.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo test acceptance smoke soak mutants fuzz lint format bindings lock benchmark environment colcon checkers images extension vscode clean help
 
 help:

@@ -3,12 +3,15 @@
 from collections import Counter
 from collections.abc import Callable
 
+import pytest
+
 from robosc.automata import System
 from robosc.automata.decision import Decision
 from robosc.supervisor.conditions import state_predicate, state_predicates
 from robosc.synthesis import SynthesisStatus, synthesize
 from robosc.verification import Outcome, Verification, synthesize_explicit, verify
 from robosc.verification.symbolic import verify_symbolically
+from support.effort import seeds
 from support.random_systems import wide_system
 from support.systems import automaton, system
 
@@ -28,10 +31,11 @@ NOWHERE = Decision((), 0, ())
 """A condition on the beginning that is true nowhere."""
 
 
+@pytest.mark.random
 def test_systems_may_not_begin_where_no_supervisor_can_go_on(record_property: Callable[[str, object], None]) -> None:
     """Whoever forgets where the supervisor lets a system begin, or lets it begin nowhere, is told so."""
     met: Counter[str] = Counter()
-    for seed in range(120):
+    for seed in seeds(40):
         made = wide_system(seed)
         result = synthesize(made)
         explicit = synthesize_explicit(made, limit=LIMIT)

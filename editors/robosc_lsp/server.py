@@ -39,8 +39,9 @@ from robosc_lsp.convert import (
     semantic_tokens,
     symbol,
 )
+from robosc_lsp.outcome import Outcome
 from robosc_lsp.project import Analysis, Project, place_of
-from robosc_lsp.synthesis import Outcome, Turns, synthesized
+from robosc_lsp.synthesis import Turns, synthesized
 
 _LOG = logging.getLogger(__name__)
 
@@ -99,6 +100,7 @@ class Server(LanguageServer):
         self._outcomes: dict[str, tuple[str, Outcome]] = {}
         self._look: asyncio.Task[None] | None = None
         self._syntheses: dict[str, tuple[str, asyncio.Task[None]]] = {}
+        self._tasks: set[asyncio.Task[None]] = set()
         self._look_s = 0.0
         self._turns = Turns()
 
@@ -221,6 +223,8 @@ class Server(LanguageServer):
         ):
             task = asyncio.get_running_loop().create_task(self._synthesize(uri, analysis, bundle))
             self._syntheses[uri] = bundle.digest, task
+            self._tasks.add(task)
+            task.add_done_callback(self._tasks.discard)
 
     def _stop(self, uri: str) -> None:
         if uri in self._syntheses:
@@ -248,11 +252,13 @@ class Server(LanguageServer):
             await self.client_register_capability_async(lsp.RegistrationParams([registration]))
 
     async def finish(self) -> None:
-        """End what goes on beside."""
-        for uri in tuple(self._syntheses):
-            self._stop(uri)
+        """End what goes on beside; its processes are gone then."""
         if self._look is not None:
             self._look.cancel()
+        for uri in tuple(self._syntheses):
+            self._stop(uri)
+        if self._tasks:
+            await asyncio.wait(self._tasks)
 
     # Names
 
@@ -397,12 +403,14 @@ class Server(LanguageServer):
         findings = self._findings(uri, analysis)
         actions: list[lsp.CodeAction] = []
         until_s = time.monotonic() + _TRIED_S
+        is_tried = False
         for item, shown in zip(findings, diagnostics(analysis, self.project, findings), strict=True):
             if item.location is None or item.location.file != analysis.file or not _touch(shown.range, where):
                 continue
-            if time.monotonic() > until_s:
+            # One is always tried, however slow the machine is.
+            if is_tried and time.monotonic() > until_s:
                 break
-            is_first = True
+            is_tried = is_first = True
             for mend in mends(item, analysis.text.line_of(item.location)):
                 edit = lsp.TextEdit(analysis.text.range_of(mend.location), mend.text)
                 if not self._is_mended(analysis, item, edit):

@@ -1,66 +1,20 @@
 """Synthesis beside the editor: in a process of its own, which is killed when its answer is not wanted any more.
 
-As a program (`python -m robosc_lsp.synthesis`) it reads a bundle as a line of JSON and writes as JSON what synthesis
-tells of it. It ends when its input does: nothing goes on when the language server is gone.
+That process runs `robosc_lsp.synthesizer`; nothing here imports it, so that the server starts without what only
+synthesis needs, and synthesis without what only the server needs.
 """
 
 import asyncio
 import contextlib
-import os
 import sys
-import threading
 from collections.abc import AsyncIterator
-from typing import IO, NoReturn
 
 import msgspec
 
-from robosc.automata import to_automata
-from robosc.errors import NodeLimitError, RoboscError
-from robosc.model.structure import Deployment
-from robosc.source import Bundle, Location, SourceFile
-from robosc.supervisor import make_supervisor
-from robosc.supervisor.summary import added_texts
-from robosc.synthesis.engines import EngineOptions
+from robosc.source import Bundle
+from robosc_lsp.outcome import Asked, Outcome
 
-_MOST_NODES = 4_000_000
-"""Of decision diagrams, for which CUDD takes a gigabyte at most: who types wants to go on with other work."""
-
-
-class Finding(msgspec.Struct, frozen=True):
-    """A finding of synthesis, as `robosc.errors.Diagnostic`."""
-
-    severity: str
-    code: str
-    message: str
-    mend: str
-    location: Location | None
-    related: tuple[tuple[str, Location], ...] = ()
-
-
-class Outcome(msgspec.Struct, frozen=True):
-    """What synthesis tells of a robot.
-
-    Attributes:
-        unknown: Why nothing is known; empty where something is.
-        states: States of the controlled robot; None where there is no supervisor.
-        reason: Why there is none; empty where there is one.
-        added: For each controllable event what the supervisor adds, in words.
-        findings: What only synthesis can find.
-    """
-
-    unknown: str = ""
-    states: int | None = None
-    reason: str = ""
-    added: dict[str, str] = {}
-    findings: tuple[Finding, ...] = ()
-
-
-class _Asked(msgspec.Struct, frozen=True):
-    """A bundle on its way to the process."""
-
-    main: tuple[str, str]
-    libraries: tuple[tuple[str, str], ...]
-    known: tuple[str, ...]
+_PROGRAM = "robosc_lsp.synthesizer"
 
 
 class Turns:
@@ -116,7 +70,7 @@ async def synthesized(bundle: Bundle, known: frozenset[str], limit_s: float) -> 
         known: Codes of findings that the checks have told already.
         limit_s: Longest time; after it, nothing is known.
     """
-    asked = _Asked(
+    asked = Asked(
         (bundle.main.name, bundle.main.text),
         tuple((file.name, file.text) for file in bundle.libraries),
         tuple(sorted(known)),
@@ -124,7 +78,7 @@ async def synthesized(bundle: Bundle, known: frozenset[str], limit_s: float) -> 
     try:
         process = await asyncio.create_subprocess_exec(
             # -P: the editor's folder may be a stranger's, and nothing in it is to be run.
-            *(sys.executable, "-P", "-m", __name__),
+            *(sys.executable, "-P", "-m", _PROGRAM),
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.DEVNULL,
@@ -153,54 +107,3 @@ async def _answer(process: asyncio.subprocess.Process, request: bytes) -> bytes:
     process.stdin.write(request)
     await process.stdin.drain()
     return await process.stdout.read()
-
-
-def _outcome(asked: _Asked) -> Outcome:
-    bundle = Bundle(SourceFile(*asked.main), tuple(SourceFile(*file) for file in asked.libraries))
-    try:
-        made = make_supervisor(
-            bundle, deployment=Deployment.CONTROLLER, engine=EngineOptions(maximum_nodes=_MOST_NODES)
-        )
-    except NodeLimitError:
-        return Outcome("synthesis needs more memory than it may have beside an editor")
-    except RoboscError as error:
-        return Outcome(reason=str(error))
-    findings = tuple(
-        Finding(
-            str(item.severity),
-            item.code,
-            item.message,
-            item.mend,
-            item.location,
-            tuple((place.message, place.location) for place in item.related),
-        )
-        for item in made.diagnostics
-        if item.code not in asked.known
-    )
-    if made.supervisor is None:
-        return Outcome(reason=made.reason, findings=findings)
-    system = to_automata(made.supervisor.model, made.supervisor.deployment)
-    states = made.supervisor.certificate.states
-    return Outcome(states=int(states), added=added_texts(made.supervisor, system), findings=findings)
-
-
-def _end_with(server: IO[bytes]) -> None:
-    """End this process when what it is asked from is gone."""
-    server.read()
-    os._exit(1)
-
-
-def main() -> NoReturn:
-    """Answer one request."""
-    # Who types goes before.
-    os.nice(10)
-    asked = msgspec.json.decode(sys.stdin.buffer.readline(), type=_Asked)
-    threading.Thread(target=_end_with, args=(sys.stdin.buffer,), daemon=True).start()
-    sys.stdout.buffer.write(msgspec.json.encode(_outcome(asked)))
-    sys.stdout.buffer.flush()
-    # Not by the interpreter's end: the thread holds a lock of the input.
-    os._exit(0)
-
-
-if __name__ == "__main__":
-    main()

@@ -11,7 +11,8 @@ import pytest
 from lsprotocol import types as lsp
 
 from robosc import __version__
-from robosc_lsp import synthesis
+from robosc_lsp import synthesizer
+from robosc_lsp.outcome import Asked
 from support.background import children_of, eventually, is_running
 from support.editor import Editor
 from support.hostile_models import bounded_products, products
@@ -158,10 +159,10 @@ def test_a_synthesis_that_takes_too_long_is_given_up(tmp_path: Path) -> None:
 
 
 def test_a_synthesis_takes_no_more_memory_than_it_may(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = synthesis._Asked(("small.rscd", bounded_products(4)), (), ())
-    assert synthesis._outcome(asked).states
-    monkeypatch.setattr(synthesis, "_MOST_NODES", 10)
-    told = synthesis._outcome(asked)
+    asked = Asked(("small.rscd", bounded_products(4)), (), ())
+    assert synthesizer.outcome(asked).states
+    monkeypatch.setattr(synthesizer, "_MOST_NODES", 10)
+    told = synthesizer.outcome(asked)
     assert "memory" in told.unknown and not told.reason and told.states is None
 
 

@@ -1,0 +1,51 @@
+"""What the language server and the process that synthesizes for it tell each other."""
+
+import msgspec
+
+from robosc.source import Location
+
+
+class Finding(msgspec.Struct, frozen=True):
+    """A finding of synthesis, as `robosc.errors.Diagnostic`."""
+
+    severity: str
+    code: str
+    message: str
+    mend: str
+    location: Location | None
+    related: tuple[tuple[str, Location], ...] = ()
+
+
+class Outcome(msgspec.Struct, frozen=True):
+    """What synthesis tells of a robot.
+
+    Attributes:
+        unknown: Why nothing is known; empty where something is.
+        states: States of the controlled robot; None where there is no supervisor.
+        reason: Why there is none; empty where there is one.
+        added: For each controllable event what the supervisor adds, in words.
+        findings: What only synthesis can find.
+    """
+
+    unknown: str = ""
+    states: int | None = None
+    reason: str = ""
+    added: dict[str, str] = {}
+    findings: tuple[Finding, ...] = ()
+
+
+class Asked(msgspec.Struct, frozen=True):
+    """A robot on its way to the process.
+
+    Attributes:
+        main: Name and text of its file.
+        libraries: Those of each library.
+        known: Codes of findings that the checks have told already.
+    """
+
+    main: tuple[str, str]
+    libraries: tuple[tuple[str, str], ...]
+    known: tuple[str, ...]
+
+
+__all__ = ["Asked", "Finding", "Outcome"]

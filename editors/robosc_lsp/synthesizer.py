@@ -1,0 +1,76 @@
+"""The program that synthesizes beside an editor: `python -m robosc_lsp.synthesizer`.
+
+It reads a bundle as a line of JSON and writes as JSON what synthesis tells of it. It ends when its input does: nothing
+goes on when the language server is gone.
+"""
+
+import os
+import sys
+import threading
+from typing import IO, NoReturn
+
+import msgspec
+
+from robosc.automata import to_automata
+from robosc.errors import NodeLimitError, RoboscError
+from robosc.model.structure import Deployment
+from robosc.source import Bundle, SourceFile
+from robosc.supervisor import make_supervisor
+from robosc.supervisor.summary import added_texts
+from robosc.synthesis.engines import EngineOptions
+from robosc_lsp.outcome import Asked, Finding, Outcome
+
+_MOST_NODES = 4_000_000
+"""Of decision diagrams, for which CUDD takes a gigabyte at most: who types wants to go on with other work."""
+
+
+def outcome(asked: Asked) -> Outcome:
+    """What synthesis tells of a robot."""
+    bundle = Bundle(SourceFile(*asked.main), tuple(SourceFile(*file) for file in asked.libraries))
+    try:
+        made = make_supervisor(
+            bundle, deployment=Deployment.CONTROLLER, engine=EngineOptions(maximum_nodes=_MOST_NODES)
+        )
+    except NodeLimitError:
+        return Outcome("synthesis needs more memory than it may have beside an editor")
+    except RoboscError as error:
+        return Outcome(reason=str(error))
+    findings = tuple(
+        Finding(
+            str(item.severity),
+            item.code,
+            item.message,
+            item.mend,
+            item.location,
+            tuple((place.message, place.location) for place in item.related),
+        )
+        for item in made.diagnostics
+        if item.code not in asked.known
+    )
+    if made.supervisor is None:
+        return Outcome(reason=made.reason, findings=findings)
+    system = to_automata(made.supervisor.model, made.supervisor.deployment)
+    states = made.supervisor.certificate.states
+    return Outcome(states=int(states), added=added_texts(made.supervisor, system), findings=findings)
+
+
+def _end_with(server: IO[bytes]) -> None:
+    """End this process when what it is asked from is gone."""
+    server.read()
+    os._exit(1)
+
+
+def main() -> NoReturn:
+    """Answer one request."""
+    # Who types goes before.
+    os.nice(10)
+    asked = msgspec.json.decode(sys.stdin.buffer.readline(), type=Asked)
+    threading.Thread(target=_end_with, args=(sys.stdin.buffer,), daemon=True).start()
+    sys.stdout.buffer.write(msgspec.json.encode(outcome(asked)))
+    sys.stdout.buffer.flush()
+    # Not by the interpreter's end: the thread holds a lock of the input.
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()

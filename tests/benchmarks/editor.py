@@ -16,7 +16,7 @@ from lsprotocol import types as lsp
 
 from figures import text_table
 from language import model_of
-from support.editor import Editor
+from support.editor import Editor, ProcessEditor
 
 SIZES = (100, 1_000, 10_000)
 NEIGHBOURS = 40
@@ -44,7 +44,7 @@ def _percentiles(samples_s: Sequence[float]) -> tuple[str, str]:
 
 
 def _measured(lines: int, neighbours: int = 0) -> tuple[str, ...]:
-    with TemporaryDirectory() as folder, Editor(Path(folder), "--synthesis-seconds", "0") as editor:
+    with TemporaryDirectory() as folder, ProcessEditor(Path(folder), "--synthesis-seconds", "0") as editor:
         for number in range(neighbours):
             (Path(folder) / f"neighbour_{number}.rscd").write_text(model_of(lines))
         name = "model.rscd"
@@ -84,7 +84,7 @@ def _measured(lines: int, neighbours: int = 0) -> tuple[str, ...]:
 
 def _memory() -> str:
     """Of a server with a text of 1,000 lines, after many edits."""
-    with TemporaryDirectory() as folder, Editor(Path(folder), "--synthesis-seconds", "0") as editor:
+    with TemporaryDirectory() as folder, ProcessEditor(Path(folder), "--synthesis-seconds", "0") as editor:
         name = "model.rscd"
         editor.open(name, model_of(1_000))
         editor.findings(name)

@@ -1,6 +1,5 @@
 """The language server over real JSON-RPC: what it finds, tells, offers and changes."""
 
-import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -48,8 +47,8 @@ TRAP = """robot Trap {
 
 @pytest.fixture
 def editor(tmp_path: Path) -> Iterator[Editor]:
-    """An editor with a robot and its library, none of which is saved."""
-    with Editor(tmp_path) as editor:
+    """An editor with a robot and its library, none of which is saved; without synthesis, so that findings are final."""
+    with Editor(tmp_path, "--synthesis-seconds", "0") as editor:
         editor.open("parts.rscd", LIBRARY)
         editor.open("walker.rscd", ROBOT)
         yield editor
@@ -97,7 +96,7 @@ def test_an_unsaved_library_is_what_counts(editor: Editor, tmp_path: Path) -> No
     assert editor.codes("walker.rscd", bool) == ["unknown-name"]
     editor.save("parts.rscd", LIBRARY)
     editor.close("parts.rscd")
-    assert editor.codes("walker.rscd", lambda codes: "unknown-name" not in codes) in ([], ["never-enabled"])
+    assert editor.codes("walker.rscd", lambda codes: "unknown-name" not in codes) == []
 
 
 def test_a_text_that_is_odd_keeps_nobody_else_from_findings(editor: Editor) -> None:
@@ -153,30 +152,30 @@ def test_related_places_are_told(editor: Editor) -> None:
     assert part_of(editor.texts["walker.rscd"], place.range) == "off"
 
 
-def test_warnings_of_synthesis_follow(editor: Editor) -> None:
-    found = editor.findings("walker.rscd", lambda found: any(item.code == "unused-requirement" for item in found))
-    unused = next(item for item in found if item.code == "unused-requirement")
-    assert unused.severity is lsp.DiagnosticSeverity.Warning
-    assert unused.range.start.line == ROBOT[: ROBOT.index("requirement {")].count("\n")
-    # What is in the library is told there, too: here it has no line.
-    assert any("parts.rscd:" in item.message for item in found if item.code == "never-enabled")
+def test_warnings_of_synthesis_follow_and_are_those_of_the_text(tmp_path: Path) -> None:
+    with Editor(tmp_path) as editor:
+        editor.open("parts.rscd", LIBRARY)
+        editor.open("walker.rscd", ROBOT)
+        found = editor.findings("walker.rscd", lambda found: any(item.code == "unused-requirement" for item in found))
+        unused = next(item for item in found if item.code == "unused-requirement")
+        assert unused.severity is lsp.DiagnosticSeverity.Warning
+        assert unused.range.start.line == ROBOT[: ROBOT.index("requirement {")].count("\n")
+        # What is in the library is told there, too: here it has no line.
+        assert any("parts.rscd:" in item.message for item in found if item.code == "never-enabled")
+        editor.replace("walker.rscd", "robot Empty { }")
+        codes = editor.codes("walker.rscd")
+        assert "unused-requirement" not in codes and "never-enabled" not in codes
 
 
-def test_the_next_edit_cancels_synthesis(editor: Editor) -> None:
-    editor.findings("walker.rscd", bool)
-    editor.replace("walker.rscd", "robot Empty { }")
-    codes = editor.codes("walker.rscd", lambda codes: "unused-requirement" not in codes)
-    assert "unused-requirement" not in codes and "never-enabled" not in codes
-
-
-def test_that_there_is_no_supervisor_is_told_at_the_robot(editor: Editor) -> None:
-    editor.open("fall.rscd", FALL)
-    found = editor.findings("fall.rscd", lambda found: any(item.code == "no-supervisor" for item in found))
-    place = next(item.range for item in found if item.code == "no-supervisor")
-    assert part_of(FALL, place) == "Fall"
-    parameters = lsp.CodeLensParams(editor.document("fall.rscd"))
-    (lens,) = editor.run(editor.client.text_document_code_lens_async(parameters))
-    assert lens.command.title == "no supervisor"
+def test_that_there_is_no_supervisor_is_told_at_the_robot(tmp_path: Path) -> None:
+    with Editor(tmp_path) as editor:
+        editor.open("fall.rscd", FALL)
+        found = editor.findings("fall.rscd", lambda found: any(item.code == "no-supervisor" for item in found))
+        place = next(item.range for item in found if item.code == "no-supervisor")
+        assert part_of(FALL, place) == "Fall"
+        parameters = lsp.CodeLensParams(editor.document("fall.rscd"))
+        (lens,) = editor.run(editor.client.text_document_code_lens_async(parameters))
+        assert lens.command.title == "no supervisor"
 
 
 def test_without_synthesis_there_are_the_findings_of_the_checks(tmp_path: Path) -> None:
@@ -556,7 +555,7 @@ def test_what_can_be_imported_is_offered(editor: Editor) -> None:
     ]
 
 
-def test_types_of_an_installed_ament_index_are_offered(tmp_path: Path) -> None:
+def test_types_of_an_installed_ament_index_are_offered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     share = tmp_path / "ros" / "share"
     for package, kind, name in (
         ("robot_msgs", "msg", "Wheel"),
@@ -569,8 +568,8 @@ def test_types_of_an_installed_ament_index_are_offered(tmp_path: Path) -> None:
         index = share / "ament_index" / "resource_index" / "packages"
         index.mkdir(parents=True, exist_ok=True)
         (index / package).write_text("")
-    variables = {**os.environ, "AMENT_PREFIX_PATH": str(tmp_path / "ros")}
-    with Editor(tmp_path, variables=variables) as editor:
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "ros"))
+    with Editor(tmp_path) as editor:
         editor.open("r.rscd", "robot R {\n    interface w use Wh from robot_msgs\n}\n")
         assert {"Wheel", "Turn", "Joint"} <= set(complete(editor, "r.rscd", "use Wh| from"))
         editor.replace("r.rscd", "robot R {\n    interface w use Wheel from \n}\n")

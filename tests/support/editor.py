@@ -1,4 +1,4 @@
-"""An editor without a screen: it starts the language server and speaks to it as editors do, over its standard streams.
+"""An editor without a screen: it speaks to the language server as editors do, in its own process or over a pipe.
 
 What it knows of texts and positions is its own, slow and obvious: it cuts texts in the units of the protocol.
 """
@@ -7,19 +7,28 @@ import asyncio
 import os
 import re
 import signal
+import socket
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import cache
 from pathlib import Path
+from threading import Event
 from types import TracebackType
 from typing import Any, Self
 
 from lsprotocol import types as lsp
+from pygls.io_ import run_async
 from pygls.lsp.client import LanguageClient
+from pygls.protocol import default_converter
 
 from robosc import __version__
+from robosc_lsp.command import parser
+from robosc_lsp.server import make_server
 
-LIMIT_S = 30.0
+LIMIT_S = 120.0
+"""What has not come by then does not come, however slow the machine is."""
+
 _UNITS = {"utf-8": ("utf-8", 1), "utf-16": ("utf-16-le", 2), "utf-32": ("utf-32-le", 4)}
 
 
@@ -56,40 +65,34 @@ def with_edits(text: str, edits: Sequence[lsp.TextEdit]) -> str:
     return text
 
 
-async def _all_of(stream: asyncio.StreamReader | None) -> bytes:
-    return b"" if stream is None else await stream.read()
+_converter = cache(default_converter)
+"""Of messages to what they mean: nothing is kept in it, and each new one would learn all of the protocol again."""
 
 
 class Editor:
-    """An editor that works on a folder; leaving its block ends the server, which must end well.
+    """An editor that works on a folder, with a server in this process; leaving its block ends it, and it must end well.
+
+    The two exchange the bytes of the protocol over a pair of sockets. While the test does not wait, none of them runs.
 
     Args:
         folder: With the files.
         options: Of the server's command line.
         encodings: What it can count columns in, in its order.
-        variables: The server's environment; None: that of the tests.
     """
 
-    def __init__(
-        self,
-        folder: Path,
-        *options: str,
-        encodings: Sequence[str] = ("utf-16",),
-        variables: Mapping[str, str] | None = None,
-    ) -> None:
+    def __init__(self, folder: Path, *options: str, encodings: Sequence[str] = ("utf-16",)) -> None:
         self.folder = folder
         self.texts: dict[str, str] = {}
         self.told: dict[str, lsp.PublishDiagnosticsParams] = {}
+        self.faults: list[str] = []
         self.lenses_refreshed = 0
         self.watched: list[lsp.Registration] = []
         self._options = options
         self._encodings = [lsp.PositionEncodingKind(item) for item in encodings]
-        self._variables = variables
         self._versions: dict[str, int] = {}
-        self._is_killed = False
         self._runner = asyncio.Runner()
         self._news = asyncio.Event()
-        self.client = LanguageClient("editor", __version__)
+        self.client = LanguageClient("editor", __version__, converter_factory=_converter)
         self._listen()
 
     def _listen(self) -> None:
@@ -108,6 +111,10 @@ class Editor:
             self.watched += asked.registrations
             self._news.set()
 
+        @self.client.feature(lsp.WINDOW_SHOW_MESSAGE)  # type: ignore[untyped-decorator]
+        def fault(told: lsp.ShowMessageParams) -> None:
+            self.faults.append(told.message)
+
     def run(self, coroutine: Any) -> Any:
         """Wait for something, at most `LIMIT_S`."""
 
@@ -117,21 +124,38 @@ class Editor:
 
         return self._runner.run(limited())
 
-    @property
-    def pid(self) -> int:
-        """The server's process."""
-        process = self.client._server
-        assert process is not None
-        return process.pid
+    async def _start(self) -> None:
+        arguments = parser().parse_args(self._options)
+        self.server = make_server(arguments.library_path, arguments.interface_path, arguments.synthesis_seconds)
+        ours, its = socket.socketpair()
+        reader, self._writer = await asyncio.open_connection(sock=ours)
+        self._served = asyncio.create_task(self._serve(*await asyncio.open_connection(sock=its)))
+        self.client.protocol.set_writer(self._writer)
+        self.client._async_tasks.append(
+            asyncio.create_task(run_async(self.client._stop_event, reader, self.client.protocol))
+        )
 
-    def kill(self, number: signal.Signals) -> None:
-        """End the server by a signal."""
-        self._is_killed = True
-        os.kill(self.pid, number)
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> int:
+        """The status that the server ends with."""
+        self.server.protocol.set_writer(writer)
+        try:
+            await run_async(Event(), reader, self.server.protocol, error_handler=self.server.report_server_error)
+        except SystemExit as end:
+            return int(end.code or 0)
+        finally:
+            writer.close()
+        return 0
+
+    async def _ended(self) -> None:
+        """Wait for the end of the server, which has been told to."""
+        status = await self._served
+        await self.client.stop()  # type: ignore[no-untyped-call]
+        self._writer.close()
+        await self._writer.wait_closed()
+        assert status == 0 and not self.faults, (status, self.faults)
 
     def __enter__(self) -> Self:
-        command = (sys.executable, "-P", "-m", "robosc_lsp.command", "--stdio", *self._options)
-        self.run(self.client.start_io(*command, env=self._variables, cwd=self.folder))
+        self.run(self._start())
         capabilities = lsp.ClientCapabilities(
             general=lsp.GeneralClientCapabilities(position_encodings=self._encodings),
             workspace=lsp.WorkspaceClientCapabilities(
@@ -154,20 +178,16 @@ class Editor:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        process = self.client._server
-        assert process is not None
         try:
-            if not self._is_killed:
+            if self._is_running():
                 self.run(self.client.shutdown_async(None))
                 self.client.exit(None)
-                status = self.run(process.wait())
-                assert kind is not None or status == 0, self.run(_all_of(process.stderr))
+                self.run(self._ended())
         finally:
-            if process.returncode is None:
-                process.kill()
-            with suppress(RuntimeError) if self._is_killed else nullcontext():  # That it has ended.
-                self.run(self.client.stop())  # type: ignore[no-untyped-call]
             self._runner.close()
+
+    def _is_running(self) -> bool:
+        return True
 
     # Texts
 
@@ -277,3 +297,54 @@ class Editor:
         """The codes of what is found; see `findings`."""
         found = self.findings(name, lambda found: such([str(item.code) for item in found]))
         return [str(item.code) for item in found]
+
+
+class ProcessEditor(Editor):
+    """The same with a server that is a process of its own, on its standard streams."""
+
+    async def _start(self) -> None:
+        command = (sys.executable, "-P", "-m", "robosc_lsp.command", "--stdio", *self._options)
+        await self.client.start_io(*command, cwd=self.folder)
+
+    async def _ended(self) -> None:
+        process = self._process
+        try:
+            status = await process.wait()
+            assert process.stderr is not None
+            assert status == 0 and not self.faults, (await process.stderr.read(), self.faults)
+        finally:
+            await self.client.stop()  # type: ignore[no-untyped-call]
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            super().__exit__(kind, error, trace)
+        finally:
+            with suppress(ProcessLookupError):
+                self._process.kill()
+
+    def _is_running(self) -> bool:
+        return self._process.returncode is None
+
+    @property
+    def _process(self) -> asyncio.subprocess.Process:
+        process = self.client._server
+        assert process is not None
+        return process
+
+    @property
+    def pid(self) -> int:
+        """The server's process."""
+        return self._process.pid
+
+    def kill(self, number: signal.Signals) -> None:
+        """End the server by a signal."""
+
+        async def end() -> None:
+            os.kill(self.pid, number)
+            await self._process.wait()
+            with suppress(RuntimeError):  # That it has ended.
+                await self.client.stop()  # type: ignore[no-untyped-call]
+
+        self.run(end())

@@ -115,7 +115,8 @@ def symbol(part: Part, text: Text) -> lsp.DocumentSymbol:
     """A part with what stands in it."""
     definition = part.definition
     return lsp.DocumentSymbol(
-        definition.name,
+        # Editors refuse what has no name.
+        definition.name or str(definition.kind),
         SYMBOLS[definition.kind],
         text.range(part.begin, part.end),
         text.range_of(definition.location),

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from functools import cached_property
 
 from robosc.editing.definitions import Definition, definitions
-from robosc.language.tokens import Kind, tokenize
+from robosc.language.tokens import Kind, tokenize_broken
 from robosc.model.check import Inspected
 from robosc.source import Location, SourceFile
 
@@ -24,8 +24,8 @@ class Names:
 
     @cached_property
     def definitions(self) -> dict[Location, Definition]:
-        """Every definition by its place, the main file's first."""
-        return {item.location: item for tree in self._trees for item in definitions(tree)}
+        """Every definition by its place, the main file's first; a robot or library without a name is none."""
+        return {item.location: item for tree in self._trees for item in definitions(tree) if item.name}
 
     @cached_property
     def _by_line(self) -> dict[tuple[str, int], list[Location]]:
@@ -90,7 +90,7 @@ class Names:
             name: The name, without what keeps it from being a word of the language.
         """
         known = {(place.line, place.column) for places in self._lines_of(file.name) for place in places}
-        texts, kinds, starts = tokenize(file.text)
+        texts, kinds, starts = tokenize_broken(file.text)
         line_begins = [0, *(match.end() for match in re.finditer("\n", file.text))]
         found = []
         for text, kind, start in zip(texts, kinds, starts, strict=True):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from robosc.editing.definitions import Definition, DefinitionKind, definitions
 from robosc.language import Parsed, syntax
-from robosc.language.tokens import Kind, tokenize
+from robosc.language.tokens import Kind, tokenize_broken
 
 _INSIDE = frozenset({DefinitionKind.ELEMENT})
 """What is no part of a text that anybody looks for."""
@@ -64,7 +64,7 @@ def parts(part: Part) -> Iterator[Part]:
 
 def folds(text: str) -> Iterator[tuple[int, int, bool]]:
     """What can be folded: offsets of the first and the last character, and whether it is a comment."""
-    texts, kinds, starts = tokenize(text)
+    texts, kinds, starts = tokenize_broken(text)
     opened: list[int] = []
     for token, start in zip(texts, starts, strict=True):
         if token == "{":

@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from robosc.language.tokens import Kind, tokenize
+from robosc.language.tokens import Kind, is_open_comment, is_open_string, tokenize_broken
 
 _ITEMS = frozenset(
     """
@@ -49,14 +49,17 @@ class Place:
 def place_at(text: str, offset: int) -> Place | None:
     """The place of a cursor; None inside a comment or a text in quotes, where no word of the language is typed."""
     before = text[:offset]
-    texts, kinds, starts = tokenize(before)
+    texts, kinds, starts = tokenize_broken(before)
     count = kinds.index(Kind.END)
     end = starts[count - 1] + len(texts[count - 1]) if count else 0
     # Of what stands behind the last token, comments that are closed do not hold the cursor.
     if "//" in _CLOSED.sub("", before[end:]).rpartition("\n")[2]:
         return None
-    if count and kinds[count - 1] == Kind.OTHER and texts[count - 1][:2] in ("/*", *_quoted(texts[count - 1])):
-        return None
+    if count and kinds[count - 1] == Kind.OTHER:
+        token = texts[count - 1]
+        # One in quotes holds the cursor to the end of its line.
+        if is_open_comment(token) or (is_open_string(token) and end == offset):
+            return None
     begin = offset
     # A `^` alone is the begin of a name, too.
     if count and end == offset and (kinds[count - 1] in _NAMED or texts[count - 1] == "^"):
@@ -82,7 +85,3 @@ def place_at(text: str, offset: int) -> Place | None:
 def name_of(token: str) -> str:
     """The name that a token is, without what keeps it from being a word of the language."""
     return token.removeprefix("^")
-
-
-def _quoted(token: str) -> tuple[str, ...]:
-    return (token[:2],) if token[:1] in "\"'" else ()

@@ -14,7 +14,7 @@ from robosc.language import syntax
 from robosc.language.cursor import Extent, Fault, TooManyFaults
 from robosc.language.expressions import ExpressionParser
 from robosc.language.limits import FRAMES_PER_LEVEL, MAXIMUM_NESTING
-from robosc.language.tokens import Kind, Places, Tokens, obstacle, tokenize
+from robosc.language.tokens import Kind, Places, Tokens, obstacle, readable_tokens, tokenize
 from robosc.recursion import allow_depth
 from robosc.source import SourceFile
 
@@ -30,7 +30,8 @@ class Parsed:
     Attributes:
         tree: The syntax tree, or None where there are errors.
         diagnostics: Everything that is wrong with the text, by place.
-        sound: The syntax tree of the items that are sound, or None where not even the first words are.
+        sound: The syntax tree of the items that are sound, or None where not even the first words are; a name of the
+            file that is missing is empty.
         extents: Where each sound item that stands in a list begins and ends, inner ones first.
         expected: What could stand at the end of a text that ends too early, such as `'goto'` or `a name`.
     """
@@ -47,14 +48,15 @@ def parse(file: SourceFile) -> Parsed:
     tokens, places = tokenize(file.text), Places(file)
     hidden = obstacle(file, tokens, places)
     if hidden is not None:
-        return Parsed(None, (hidden,))
+        # What else is found may come of it: it is told alone, and the rest read for the sake of what is sound.
+        tokens = readable_tokens(file.text)
     # Whoever works with the tree walks it recursively too.
     allow_depth(MAXIMUM_NESTING, FRAMES_PER_LEVEL)
     parser = _Parser(file, tokens, places)
     tree = None
     with suppress(Fault, TooManyFaults):
         tree = parser.file()
-    diagnostics = sorted_diagnostics(parser.diagnostics)
+    diagnostics = sorted_diagnostics(parser.diagnostics) if hidden is None else (hidden,)
     return Parsed(None if diagnostics else tree, diagnostics, tree, tuple(parser.extents), parser.expected)
 
 
@@ -92,9 +94,13 @@ class _Parser(ExpressionParser):
         """A robot or a library."""
         index = self.place
         if self.texts[index] not in ("robot", "library"):
-            raise self.fault("'robot'", "'library'")
-        self.place += 1
-        name = self.name()
+            fault = self.fault("'robot'", "'library'")
+            begin = self._begin_of_file()
+            if begin is None:
+                raise fault
+            index = begin
+        self.place = index + 1
+        name = self._name_of_file()
         words = [f"'{word}'" for word in self._library_items]
         items = self.items(self._library_items, *words)
         if self.kinds[self.place] != _END and self.is_whole:
@@ -103,6 +109,24 @@ class _Parser(ExpressionParser):
         while self.texts[self.place] in ("}", *self._library_items):
             self.go_on(self._library_items, *words)
         return syntax.File(self.texts[index] == "library", name, items)
+
+    def _begin_of_file(self) -> int | None:
+        """Where a robot or library begins behind what should not be before it."""
+        for index in range(self.place, len(self.texts) - 2):
+            if self.texts[index] in ("robot", "library") and "{" in self.texts[index + 1 : index + 3]:
+                return index
+        return None
+
+    def _name_of_file(self) -> syntax.Name:
+        """The name of a robot or library; empty where it is missing or a word: what stands in it is to be known."""
+        try:
+            return self.name()
+        except Fault:
+            if self.texts[self.place] != "{":
+                if self.texts[self.place + 1] != "{":
+                    raise
+                self.place += 1
+            return syntax.Name("", self.at(self.place - 1))
 
     def body_of(self, word: str, following: str) -> Callable[[], object] | None:
         """What reads the list in braces of an item that begins with these words, or None if it has none."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from robosc.language.tokens import Kind, tokenize
+from robosc.language.tokens import Kind, is_open_comment, tokenize_broken
 
 
 def declared_libraries(text: str) -> frozenset[str]:
@@ -19,7 +19,10 @@ def _triples(text: str, word: str) -> Iterator[tuple[str, str, str]]:
     """Every use of `word` with a name behind it, and what follows."""
     if word not in text:
         return
-    texts, kinds, _ = tokenize(text)
+    texts, kinds, _ = tokenize_broken(text)
     for index, token in enumerate(texts):
         if token == word and kinds[index + 1] in (Kind.NAME, Kind.WORD):
             yield token, texts[index + 1].removeprefix("^"), texts[index + 2]
+        elif kinds[index] == Kind.OTHER and is_open_comment(token):
+            # There is no end of a comment in it: without their begins, there are none.
+            yield from _triples(token.replace("/*", "  "), word)

@@ -17,18 +17,26 @@ _BLOCK_COMMENT = r"/\*[^*]*+\*++(?:[^/*][^*]*+\*++)*+/"
 _LINE_COMMENT = r"//[^\n]*+"
 _BLANK = r"[ \t\r\n]++"
 _STRING = r""""[^"\\]*+(?:\\[\s\S][^"\\]*+)*+"|'[^'\\]*+(?:\\[\s\S][^'\\]*+)*+'"""
+_STRING_OF_A_LINE = r""""[^"\\\n]*+(?:\\.[^"\\\n]*+)*+"|'[^'\\\n]*+(?:\\.[^'\\\n]*+)*+'"""
 
-_TOKEN = re.compile(
-    rf"(?:{_BLANK}|{_LINE_COMMENT}|{_BLOCK_COMMENT})*+"
-    r"(?:(\^?[A-Za-z_][A-Za-z_0-9]*+)"
-    r"|(->|\.\.|:=|=>|!=|<=|>=|/(?!\*)|[{}()\[\],.:=<>+\-*!])"
-    r"|([0-9]++(?:\.[0-9]++)?)"
-    rf"|({_STRING})"
-    # What is never closed takes the rest of the text: no later quote of it needs to look for its end again.
-    r"|([\"'][\s\S]*+|/\*[\s\S]*+|[\s\S])"
-    # Without the end as an alternative, blanks before it would be tried once more from each of them.
-    r"|(\Z))"
-)
+
+def _pattern(string: str, open_string: str) -> re.Pattern[str]:
+    """One token with the blanks and comments before it."""
+    return re.compile(
+        rf"(?:{_BLANK}|{_LINE_COMMENT}|{_BLOCK_COMMENT})*+"
+        r"(?:(\^?[A-Za-z_][A-Za-z_0-9]*+)"
+        r"|(->|\.\.|:=|=>|!=|<=|>=|/(?!\*)|[{}()\[\],.:=<>+\-*!])"
+        r"|([0-9]++(?:\.[0-9]++)?)"
+        rf"|({string})"
+        # What is never closed takes the rest: no later quote of it needs to look for its end again.
+        rf"|({open_string}|/\*[\s\S]*+|[\s\S])"
+        # Without the end as an alternative, blanks before it would be tried once more from each of them.
+        r"|(\Z))"
+    )
+
+
+_TOKEN = _pattern(_STRING, r"[\"'][\s\S]*+")
+_TOKEN_BY_LINE = _pattern(_STRING_OF_A_LINE, r"[\"'][^\n]*+")
 
 COMMENT = re.compile(f"{_LINE_COMMENT}|{_BLOCK_COMMENT}")
 """One comment of either kind."""
@@ -88,11 +96,26 @@ _ENDS = 3
 
 def tokenize(text: str) -> Tokens:
     """The tokens of a text; never fails."""
+    return _tokens(text, _TOKEN)
+
+
+def tokenize_broken(text: str) -> Tokens:
+    """As `tokenize`; if a text in quotes is never closed, each ends with its line at last.
+
+    One quote too many turns all behind it inside out: this way it spoils its own line alone.
+    """
+    tokens = tokenize(text)
+    last = len(tokens.texts) - _ENDS - 1
+    is_open = last >= 0 and tokens.kinds[last] == Kind.OTHER and is_open_string(tokens.texts[last])
+    return _tokens(text, _TOKEN_BY_LINE) if is_open else tokens
+
+
+def _tokens(text: str, pattern: re.Pattern[str]) -> Tokens:
     texts: list[str] = []
     kinds: list[int] = []
     starts: list[int] = []
     words = RESERVED_WORDS
-    for match in _TOKEN.finditer(text):
+    for match in pattern.finditer(text):
         kind = match.lastindex or 0
         if kind == _END:
             break
@@ -107,8 +130,36 @@ def tokenize(text: str) -> Tokens:
     return Tokens(texts, kinds, starts)
 
 
+def is_open_comment(token: str) -> bool:
+    """Whether a token of kind `OTHER` is a comment that is never closed."""
+    return token.startswith("/*")
+
+
+def is_open_string(token: str) -> bool:
+    """Whether a token of kind `OTHER` is a text in quotes that is never closed."""
+    return token[:1] in ("'", '"')
+
+
+def readable_tokens(text: str) -> Tokens:
+    """The tokens of a text that has an obstacle, as a grammar can read them.
+
+    A text in quotes that is never closed is closed at the end of its line, and a comment that is never closed ends
+    everything.
+    """
+    found = tokenize_broken(text)
+    count = found.kinds.index(_END)
+    if count and found.kinds[count - 1] == Kind.OTHER and is_open_comment(found.texts[count - 1]):
+        for column in found:
+            del column[count - 1]
+    kinds = [
+        int(Kind.STRING) if kind == Kind.OTHER and is_open_string(token) else kind
+        for token, kind in zip(found.texts, found.kinds, strict=True)
+    ]
+    return Tokens(found.texts, kinds, found.starts)
+
+
 def obstacle(file: SourceFile, tokens: Tokens, places: Places) -> Diagnostic | None:
-    """What hides the rest of a text, so that no grammar can read it: NUL, a comment or string that never ends."""
+    """What hides the rest of a text from the grammar: NUL, a comment or text in quotes that is never closed."""
     text = file.text
 
     def found(code: str, message: str, offset: int, mend: str) -> Diagnostic:
@@ -125,8 +176,8 @@ def obstacle(file: SourceFile, tokens: Tokens, places: Places) -> Diagnostic | N
         if kind != Kind.OTHER:
             continue
         token, start = tokens.texts[index], tokens.starts[index]
-        if token.startswith("/*"):
+        if is_open_comment(token):
             return found("unclosed-comment", "this comment is never closed", start, "Close it with '*/'.")
-        if token[0] in "\"'":
+        if is_open_string(token):
             return found("unclosed-string", "this text is never closed", start, f"Close it with {token[0]}.")
     return None

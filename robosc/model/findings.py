@@ -1,18 +1,21 @@
 """Collects what the checks find."""
 
 import difflib
+import re
 from collections.abc import Collection, Iterable
 
 from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.language.words import spelled
 from robosc.model.bindings import Bindings
-from robosc.source import Location
+from robosc.source import Location, SourceFile
 
 _MAXIMUM_COMPARISONS = 20_000
 """Names that are compared in one check at most: to look for every unknown name among all names is quadratic."""
 
 _MAXIMUM_COMPARED = 64
 """Characters of a name that is compared."""
+
+_WORD = re.compile("[A-Za-z_][A-Za-z_0-9]*+")
 
 
 class Findings:
@@ -28,18 +31,45 @@ class Findings:
         self.bindings = Bindings()
         self._comparisons = _MAXIMUM_COMPARISONS
         self._broken_communications: set[str] = set()
+        self._broken_files: set[str] = set()
+        self._broken_words: set[str] = set()
+
+    def file_is_broken(self, file: SourceFile, diagnostics: Iterable[Diagnostic]) -> None:
+        """Add what the grammar finds in a library; what only its missing parts bring about is not told.
+
+        That is all that is found in the file beyond its grammar, and unknown names elsewhere that stand in it.
+        """
+        self.diagnostics.extend(diagnostics)
+        self._broken_files.add(file.name)
+        self._broken_words.update(_WORD.findall(file.text))
+
+    def is_broken(self, file: str) -> bool:
+        """Whether a file is a library with errors of its grammar."""
+        return file in self._broken_files
 
     def error(self, code: str, message: str, location: Location, mend: str, *related: RelatedPlace) -> None:
         """Add an error."""
-        self.diagnostics.append(Diagnostic(Severity.ERROR, code, message, location, mend, related))
+        self._add(Severity.ERROR, code, message, location, mend, related)
 
     def warning(self, code: str, message: str, location: Location, mend: str, *related: RelatedPlace) -> None:
         """Add a warning."""
-        self.diagnostics.append(Diagnostic(Severity.WARNING, code, message, location, mend, related))
+        self._add(Severity.WARNING, code, message, location, mend, related)
 
     def note(self, code: str, message: str, location: Location, mend: str, *related: RelatedPlace) -> None:
         """Add a note."""
-        self.diagnostics.append(Diagnostic(Severity.NOTE, code, message, location, mend, related))
+        self._add(Severity.NOTE, code, message, location, mend, related)
+
+    def _add(
+        self,
+        severity: Severity,
+        code: str,
+        message: str,
+        location: Location,
+        mend: str,
+        related: tuple[RelatedPlace, ...],
+    ) -> None:
+        if not self.is_broken(location.file):
+            self.diagnostics.append(Diagnostic(severity, code, message, location, mend, related))
 
     def unknown(
         self,
@@ -60,6 +90,8 @@ class Findings:
             mend: What to do instead of writing the nearest one.
             words: What the language itself has there.
         """
+        if name in self._broken_words:
+            return
         near = self._near(name, [*known, *words])
         written = near if near is None or near in words else spelled(near)
         self.error(
@@ -75,7 +107,7 @@ class Findings:
 
     def explain(self, communication: str) -> bool:
         """Whether an error that has been reported explains why a communication is not known."""
-        return communication in self._broken_communications
+        return communication in self._broken_communications or communication in self._broken_words
 
     def unknown_communication(self, name: str, location: Location, known: Iterable[str]) -> None:
         """Add an `unknown-name` error, unless another error explains it."""

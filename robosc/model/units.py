@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from robosc.errors import RelatedPlace
-from robosc.language import parse, syntax
+from robosc.language import Parsed, parse, syntax
 from robosc.language.scan import declared_libraries
 from robosc.model.findings import Findings
 from robosc.source import Bundle, Location, SourceFile
@@ -101,7 +101,7 @@ class Libraries:
         self._findings = findings
         self._units: dict[str, Unit] = {main.tree.name.text: main} if main.tree.is_library else {}
         self._broken = set[str]()
-        self._parsed: dict[str, syntax.File | None] = {}
+        self._parsed: dict[str, Parsed] = {}
         self._origins: dict[tuple[Unit, str], tuple[Unit, str]] = {}
         self._declaring: dict[str, list[SourceFile]] = {}
         for file in bundle.libraries:
@@ -155,17 +155,19 @@ class Libraries:
 
     def _find(self, name: syntax.Name) -> Unit | None:
         found: dict[str, syntax.File] = {}
+        partly: dict[str, syntax.File] = {}
         # A broken library that nothing imports is nobody's error, so only those that are asked for are parsed.
         for file in self._declaring.get(name.text, ()):
             if file.name not in self._parsed:
-                parsed = parse(file)
-                self._parsed[file.name] = parsed.tree
-                self._findings.diagnostics.extend(parsed.diagnostics)
-            tree = self._parsed[file.name]
-            if tree is None:
+                self._parsed[file.name] = parsed = parse(file)
+                if parsed.tree is None:
+                    self._findings.file_is_broken(file, parsed.diagnostics)
+            parsed = self._parsed[file.name]
+            tree = parsed.sound
+            if tree is not None and tree.is_library and tree.name.text == name.text:
+                (partly if parsed.tree is None else found)[file.name] = tree
+            elif parsed.tree is None:
                 self._broken.add(name.text)
-            elif tree.is_library and tree.name.text == name.text:
-                found[file.name] = tree
         if len({file.text for file in self._declaring.get(name.text, ()) if file.name in found}) > 1:
             self._broken.add(name.text)
             self._findings.error(
@@ -175,8 +177,9 @@ class Libraries:
                 "Remove or rename one of the files, or do not search its folder.",
             )
             return None
-        if found:
-            return make_unit(next(iter(found.values())), self._findings)
+        # What is sound of a broken one is better known than nothing: its errors are told.
+        for tree in (*found.values(), *partly.values()):
+            return make_unit(tree, self._findings)
         if name.text not in self._broken:
             self._unknown(name)
         return None
@@ -245,9 +248,10 @@ def _follow(
         findings.bindings.bind(component.imported.library, library.tree.name.location)
         wanted = component.imported.component
         if wanted.text not in library.components:
-            findings.unknown(
-                f"component of library '{library.tree.name.text}'", wanted.text, wanted.location, library.components
-            )
+            # What a broken library would have is not known.
+            if not findings.is_broken(library.tree.name.location.file):
+                what = f"component of library '{library.tree.name.text}'"
+                findings.unknown(what, wanted.text, wanted.location, library.components)
             return None
         findings.bindings.bind(wanted, library.components[wanted.text].name.location)
         unit, component = library, library.components[wanted.text]

@@ -618,13 +618,63 @@ def test_what_is_offered_replaces_what_is_typed(editor: Editor) -> None:
 def test_what_is_sound_is_known(editor: Editor, broken: str) -> None:
     editor.replace("walker.rscd", broken)
     assert "syntax-error" in editor.codes("walker.rscd", bool)
+    check_button_is_known(editor)
+
+
+def check_button_is_known(editor: Editor) -> None:
     (whole,) = editor.run(
         editor.client.text_document_document_symbol_async(lsp.DocumentSymbolParams(editor.document("walker.rscd")))
     )
+    assert whole.name
     button = next(item for item in whole.children if item.name == "Button")
     assert {item.name for item in button.children} >= {"pressed", "off", "on_"}
     assert "outgoing message pressed" in hover(editor, "walker.rscd", "response from pre|ssed")
     assert definition(editor, "walker.rscd", "goto on|_") == editor.where("walker.rscd", "state |on_| {")
+
+
+@pytest.mark.parametrize(
+    ("broken", "code"),
+    [
+        (ROBOT.replace("provide walk", '" provide walk'), "unclosed-string"),
+        (ROBOT.replace('"/button"', '"/button'), "unclosed-string"),
+        (f'"\n{ROBOT}', "unclosed-string"),
+        (ROBOT.replace("constant most", "constant 'most"), "unclosed-string"),
+        (ROBOT.replace("provide walk", "/* provide walk"), "unclosed-comment"),
+        (ROBOT.replace("variable last", "\0 variable last"), "invalid-character"),
+        (ROBOT.replace("robot Walker", "robot"), "syntax-error"),
+        (ROBOT.replace("robot Walker", "robot state"), "syntax-error"),
+    ],
+)
+def test_what_hides_the_rest_is_one_error_and_hides_nothing(editor: Editor, broken: str, code: str) -> None:
+    editor.replace("walker.rscd", broken)
+    assert editor.codes("walker.rscd", bool) == [code]
+    if '"/button"' in broken:
+        check_button_is_known(editor)
+    assert "incoming message walk" in hover(editor, "walker.rscd", "requirement wa|lk")
+    found = complete(editor, "walker.rscd", "do last := |value")
+    assert found[:2] == ["high", "low"]
+    word = editor.position(broken, broken.index("robot") + 3)
+    parameters = lsp.HoverParams(editor.document("walker.rscd"), word)
+    assert editor.run(editor.client.text_document_hover_async(parameters)) is None
+
+
+@pytest.mark.parametrize(
+    ("broken", "code"),
+    [
+        (LIBRARY.replace("state calm", '" state calm'), "unclosed-string"),
+        (LIBRARY.replace("library", "'\nlibrary"), "unclosed-string"),
+        (LIBRARY.replace("message level", "/* message level"), "unclosed-comment"),
+        (f"/*{LIBRARY}", "unclosed-comment"),
+        (f"\0{LIBRARY}", "invalid-character"),
+        (LIBRARY.replace("message walk", "mesage walk"), "syntax-error"),
+        (LIBRARY.replace("linear: Vector", "linear Vector"), "syntax-error"),
+        (LIBRARY.replace("initial marked state calm", "initial marked stat calm"), "syntax-error"),
+    ],
+)
+def test_what_is_wrong_in_a_library_is_nothing_else_in_the_robot(editor: Editor, broken: str, code: str) -> None:
+    editor.replace("parts.rscd", broken)
+    (found,) = editor.findings("walker.rscd", bool)
+    assert found.code == code and "parts.rscd:" in found.message
 
 
 # Faults

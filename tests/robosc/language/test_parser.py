@@ -344,3 +344,28 @@ def test_mutated_models_never_raise(text: str, data: st.DataObject) -> None:
     )
     parsed = parse(SourceFile("model.rscd", text[:begin] + inserted + text[end:]))
     assert (parsed.tree is None) == bool(parsed.diagnostics)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "robot R { component C { } ' component D { }\n component E { } }",
+        'robot R { component C { }\n component E { "\n } requirement x needs "\n } \' }',
+        "robot R { component C { } \0 component E { } }",
+        "robot R { component C { } component E { } /* component D { }",
+        "'\n robot R { component C { } component E { } }",
+        "robot { component C { } component E { } }",
+        "robot robot { component C { } component E { } }",
+    ],
+)
+def test_what_hides_the_rest_is_one_error_and_what_is_sound_is_known(text: str) -> None:
+    parsed = parse(SourceFile("model.rscd", text))
+    assert parsed.tree is None and len(parsed.diagnostics) == 1
+    assert parsed.sound is not None
+    assert [item.name.text for item in parsed.sound.items if isinstance(item, syntax.Component)] == ["C", "E"]
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("piece", ["'\\\n", "\\'\n", "/*'\n", '"x\n', "'\"\n", "robot "])
+def test_what_is_never_closed_is_looked_at_once(piece: str) -> None:
+    assert parse(SourceFile("model.rscd", piece * 300_001)).tree is None

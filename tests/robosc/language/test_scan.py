@@ -14,7 +14,10 @@ from robosc.language.scan import declared_libraries, imported_libraries
         ("// library Not {\nlibrary /* x */ Lib { component }", {"Lib"}),
         ('robot R { component C { incoming message m with identifier: "library Not {" } }', set()),
         ("'it\\'s library Not' library Lib {", {"Lib"}),
-        ("/* library Not", set()),
+        ("/* library Not */", set()),
+        # Where something is never closed, more may have been meant.
+        ("/* library /* Lib", {"Lib"}),
+        ("'\nlibrary Lib { 'it' }", {"Lib"}),
         ("mylibrary Not { ^library Not", set()),
     ],
 )

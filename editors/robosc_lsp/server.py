@@ -308,6 +308,8 @@ class Server(LanguageServer):
         if not (wanted.isascii() and wanted.isidentifier()) or len(wanted) > _LONGEST_NAME:
             raise JsonRpcInvalidParams(f"'{name}' is no name: letters, digits and '_', not a digit first")
         analysis, _, definition = found
+        if wanted == definition.name:
+            return lsp.WorkspaceEdit(changes={})
         self._see_all_uses(analysis, definition)
         changes: dict[str, list[lsp.TextEdit]] = {}
         for place in self.everywhere(analysis, definition, declared=True):
@@ -327,12 +329,16 @@ class Server(LanguageServer):
             JsonRpcInvalidParams: Its name stands in what cannot be understood.
         """
         home = place_of(analysis, self.project, definition.location)
+        is_shared = analysis.whole is not None and analysis.whole.definition.kind is DefinitionKind.LIBRARY
         for other in (analysis, *self.project.analyses()):
-            if home is not None and home.uri in other.uris.values() and other.errors:
+            is_here = home is not None and home.uri in other.uris.values()
+            # Errors may also hide that a file imports from the one with the definition.
+            if other.errors and (is_here or is_shared or definition.location.file != analysis.file):
                 for place in other.names.not_understood(SourceFile(other.file, other.text.text), definition.name):
                     line = other.text.range_of(place).start.line + 1
+                    name = other.file or unquote(other.uri.rpartition("/")[2])
                     raise JsonRpcInvalidParams(
-                        f"'{definition.name}' stands in line {line} of {other.file}, where errors hide what it means"
+                        f"'{definition.name}' stands in line {line} of {name}, where errors hide what it means"
                     )
         for path in self.project.unreadable():
             if definition.name.encode() in path.read_bytes():

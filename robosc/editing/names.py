@@ -90,15 +90,20 @@ class Names:
             name: The name, without what keeps it from being a word of the language.
         """
         known = {(place.line, place.column) for places in self._lines_of(file.name) for place in places}
-        texts, kinds, starts = tokenize_broken(file.text)
         line_begins = [0, *(match.end() for match in re.finditer("\n", file.text))]
+        word = re.compile(rf"\b{re.escape(name)}\b")
         found = []
-        for text, kind, start in zip(texts, kinds, starts, strict=True):
-            if kind == Kind.NAME and text.removeprefix("^") == name:
-                line = bisect_right(line_begins, start)
-                column = start - line_begins[line - 1] + 1
+        for text, kind, start in zip(*tokenize_broken(file.text), strict=True):
+            if kind == Kind.OTHER or (kind == Kind.STRING and "\n" in text):
+                # A quote or the begin of a comment that is there by mistake hides names.
+                offsets = [start + match.start() for match in word.finditer(text)]
+            else:
+                offsets = [start] if kind == Kind.NAME and text.removeprefix("^") == name else []
+            for offset in offsets:
+                line = bisect_right(line_begins, offset)
+                column = offset - line_begins[line - 1] + 1
                 if (line, column) not in known:
-                    found.append(Location(file.name, line, column, len(text)))
+                    found.append(Location(file.name, line, column, len(name)))
         return found
 
     def _lines_of(self, file: str) -> Iterable[list[Location]]:

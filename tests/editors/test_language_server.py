@@ -348,6 +348,43 @@ def test_nothing_is_renamed_while_a_use_may_be_hidden(editor: Editor, tmp_path: 
         rename(editor, "walker.rscd", "Base.|calm", "quiet")
 
 
+@pytest.mark.parametrize(
+    "broken",
+    [
+        # What the file imports from is not to be seen.
+        ROBOT.replace("from parts import", "from parts imprt"),
+        ROBOT.replace("from parts import", "from parst import"),
+        ROBOT.replace("from parts import", "from 'parts import"),
+        ROBOT.replace("component Base from parts import Base", ""),
+        # Nor is what stands behind a quote or a comment that is there by mistake.
+        ROBOT.replace("requirement walk", '" requirement walk'),
+        ROBOT.replace("requirement walk", "' requirement walk").replace("Button.off", "Button.off '"),
+        ROBOT.replace("requirement walk", "/* requirement walk"),
+    ],
+)
+def test_nothing_is_renamed_while_errors_hide_a_use_in_another_file(
+    editor: Editor, tmp_path: Path, broken: str
+) -> None:
+    editor.replace("walker.rscd", broken)
+    with pytest.raises(JsonRpcException, match=r"'calm' stands in line \d+ of walker\.rscd, where errors hide"):
+        rename(editor, "parts.rscd", "marked state |calm", "quiet")
+    # So it is with one that is saved, and from a third file.
+    editor.close("walker.rscd")
+    (tmp_path / "walker.rscd").write_text(broken, "utf-8")
+    editor.open("other.rscd", ROBOT)
+    with pytest.raises(JsonRpcException, match=r"'calm' stands in line \d+ of walker\.rscd, where errors hide"):
+        rename(editor, "other.rscd", "Base.|calm", "quiet")
+    # A name of the third file alone is nothing to it.
+    assert "running" in rename(editor, "other.rscd", "goto |on_", "running")["other.rscd"]
+
+
+def test_the_name_that_it_has_changes_nothing(editor: Editor) -> None:
+    place = editor.at("walker.rscd", "Base.|calm")
+    parameters = lsp.RenameParams(place.text_document, place.position, "calm")
+    found = editor.run(editor.client.text_document_rename_async(parameters))
+    assert found is not None and found.changes == {}
+
+
 def test_a_word_of_the_language_becomes_a_name(editor: Editor) -> None:
     texts = rename(editor, "walker.rscd", "|most: integer", "state")
     assert texts["walker.rscd"] == ROBOT.replace("most", "^state")

@@ -1,5 +1,6 @@
 """What can be written at a place of a text, also of one that is broken elsewhere."""
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -7,6 +8,7 @@ from robosc.editing.definitions import DefinitionKind
 from robosc.editing.place import Place, name_of, place_at
 from robosc.expressions import ArrayType, EnumType, ObjectType, Type, type_text
 from robosc.language import parse
+from robosc.language.tokens import tokenize
 from robosc.language.words import RESERVED_WORDS, spelled
 from robosc.model.check import Inspected
 from robosc.model.scope import ComponentNames, Scope
@@ -16,6 +18,11 @@ from robosc.source import SourceFile
 _TYPES = ("boolean", "integer", "double", "string", "none", "array")
 _FUNCTIONS = ("abs", "all", "any", "clamp", "double", "integer", "length", "max", "min")
 _OPERATORS = ("and", "or")
+_COMPARISONS = ("=", "!=")
+_AHEAD = 1000
+"""Characters behind the cursor in which the other side of a comparison is looked for."""
+
+_BEGUN = re.compile(r"\A\w+")
 _KEYS = frozenset("identifier type request response feedback qos depth max_age stamped when".split())
 _KINDS = {
     CommunicationKind.INCOMING_MESSAGE: DefinitionKind.INCOMING,
@@ -23,6 +30,10 @@ _KINDS = {
     CommunicationKind.SERVICE: DefinitionKind.SERVICE,
     CommunicationKind.ACTION: DefinitionKind.ACTION,
 }
+
+
+type _Elements = Sequence[tuple[str, Sequence[str]]]
+"""Names of elements, the innermost first, with the tokens that name the array."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +92,8 @@ def complete(
     if place.item in (("requirement", "always"), ("requirement", "never")):
         # They may be names of communications, too, and were taken for such.
         expected = (*expected, "an expression")
-    found = [*_Names(place, inspected, surroundings).candidates(expected), *_words(place, expected)]
+    behind = _BEGUN.sub("", text[offset : offset + _AHEAD], count=1)
+    found = [*_Names(place, behind, inspected, surroundings).candidates(expected), *_words(place, expected)]
     chosen: dict[str, Candidate] = {}
     for item in found:
         chosen.setdefault(item.text, item)
@@ -112,8 +124,11 @@ def _words(place: Place, expected: Iterable[str]) -> Iterator[Candidate]:
 class _Names:
     """The names that fit at a place."""
 
-    def __init__(self, place: Place, inspected: Inspected, surroundings: Callable[[], Surroundings]) -> None:
+    def __init__(
+        self, place: Place, behind: str, inspected: Inspected, surroundings: Callable[[], Surroundings]
+    ) -> None:
         self._place = place
+        self._behind = behind
         self._inspected = inspected
         self._surroundings = surroundings
         part = next((part for part in inspected.parts if part.name == place.component), None)
@@ -247,8 +262,9 @@ class _Names:
         if isinstance(wanted, EnumType):
             for name in wanted.values:
                 yield Candidate(spelled(name), DefinitionKind.ENUM_VALUE, wanted.name, is_wanted=True)
-        for name in _elements(self._place.before):
-            yield Candidate(spelled(name), DefinitionKind.ELEMENT)
+        elements = _elements(self._place.before)
+        for number, (name, array) in enumerate(elements, 1):
+            yield Candidate(spelled(name), DefinitionKind.ELEMENT, _shown(self._element_of(array, elements[number:])))
         if self._received() is not None:
             yield Candidate("value", None, _shown(self._received()))
         yield from self._variables(scope.own)
@@ -268,7 +284,9 @@ class _Names:
         scope = self._scope
         if not chain or scope is None:
             return
-        if len(chain) == 1 and chain[0] in scope.components:
+        if any(name == chain[0] for name, _ in _elements(self._place.before)):
+            yield from self._properties(self._type_of(chain))
+        elif len(chain) == 1 and chain[0] in scope.components:
             yield from self._states(scope.components[chain[0]])
             yield from self._variables(scope.components[chain[0]])
         elif len(chain) == 1 and chain[0] in scope.enums:
@@ -287,19 +305,37 @@ class _Names:
 
     # Types
 
-    def _type_of(self, chain: Sequence[str]) -> Type | None:
-        """The type of an access; `[` stands for an index."""
+    def _type_of(self, chain: Sequence[str], elements: _Elements | None = None) -> Type | None:
+        """The type of an access; `[` stands for an index.
+
+        Args:
+            chain: The access.
+            elements: The elements that can be named; None: those at the place.
+        """
         scope = self._scope
         if scope is None or not chain:
             return None
         first, *rest = chain
         if first == "value":
             return self._below(self._received(), rest)
+        elements = _elements(self._place.before) if elements is None else elements
+        for number, (name, array) in enumerate(elements, 1):
+            if name == first:
+                return self._below(self._element_of(array, elements[number:]), rest)
         if rest and first in scope.components:
-            return scope.components[first].variables.get(rest[0])
+            return self._below(scope.components[first].variables.get(rest[0]), rest[1:])
         if scope.own is not None and first in scope.own.variables:
-            return scope.own.variables[first]
-        return None
+            return self._below(scope.own.variables[first], rest)
+        constant = scope.constants.get(first)
+        return None if constant is None else self._below(constant.type, rest)
+
+    def _element_of(self, array: Sequence[str], elements: _Elements) -> Type | None:
+        """The type of the elements of an array, or of a slice of one, that some tokens name among outer elements."""
+        type_ = self._type_of(_chain(array), elements)
+        # A slice looks like an element.
+        if ".." in array:
+            return type_
+        return type_.element if isinstance(type_, ArrayType) else None
 
     def _below(self, type_: Type | None, steps: Iterable[str]) -> Type | None:
         for step in steps:
@@ -324,23 +360,35 @@ class _Names:
                 return communication.received_type(EventKind(item[1]))
         if item[:2] == ("incoming", "message") and len(item) > 2:
             communication = self._inspected.communications.get(name_of(item[2]))
-            return None if communication is None else communication.request
+            if communication is not None:
+                return communication.request
+            # It is broken where somebody types.
+            return self._named(name_of(item[item.index("type") + 2])) if "type" in item[:-2] else None
         return None
+
+    def _named(self, name: str) -> Type | None:
+        """The object or enum of a name."""
+        if self._scope is None:
+            return None
+        key = self._inspected.units[0].type_name(name)
+        return ObjectType(key) if key in self._scope.types.objects else self._scope.enums.get(name)
 
     def _wanted(self) -> Type | None:
         """The type that is needed, as far as what stands before tells it."""
-        place = self._place
-        if place.last() in ("=", "!="):
-            if place.item[:1] in (("variable",), ("constant",)):
-                return self._declared(place.item)
-            return self._type_of(_chain(place.before[:-1]))
-        if place.last() == ":=":
-            return self._type_of(_chain(place.before[:-1])[-1:])
-        if place.last() == ":" and self._is_in_value():
-            return self._below(self._provided(), [name_of(place.last(2))])
-        if place.last() == "with" and place.item[:1] == ("provide",):
-            return self._request(place.item)
-        return None
+        before = _up_to_expression(self._place.before)
+        item = self._place.item[: len(self._place.item) - (len(self._place.before) - len(before))]
+        last = before[-1] if before else ""
+        found = None
+        if last in _COMPARISONS:
+            is_given = item[:1] in (("variable",), ("constant",)) and item.count("=") == 1
+            found = self._declared(item) if is_given else self._type_of(_chain(before[:-1]))
+        elif last == ":=":
+            found = self._type_of(_chain(before[:-1]))
+        elif last == ":" and self._is_in_value() and item.count("(") == item.count(")"):
+            found = self._below(self._provided(), [name_of(before[-2])])
+        elif last == "with" and item[:1] == ("provide",):
+            found = self._request(item)
+        return found if found is not None else self._type_of(_compared_with(self._behind))
 
     def _declared(self, item: Sequence[str]) -> Type | None:
         """The type of a variable or constant whose value is missing still: nothing but its words tells it."""
@@ -364,13 +412,61 @@ class _Names:
         return type_
 
 
+def _up_to_expression(tokens: Sequence[str]) -> Sequence[str]:
+    """The tokens before an expression that as a whole has the value of what comes next, in parentheses or an `if`."""
+    end = len(tokens)
+    while end:
+        word = tokens[end - 1]
+        if word == "(" and (end < 2 or tokens[end - 2] not in _FUNCTIONS):
+            end -= 1
+        elif word in ("then", "else"):
+            # Every other `if` behind the one that it belongs to has such a word of its own.
+            depth = 0
+            while end:
+                end -= 1
+                depth += (tokens[end] == word) - (tokens[end] == "if")
+                if not depth:
+                    break
+        else:
+            break
+    return tokens[:end]
+
+
+def _compared_with(behind: str) -> list[str]:
+    """The access that an expression is compared with which ends where some text begins; empty where it is not."""
+    tokens = tokenize(behind).texts
+    if tokens[0] not in _COMPARISONS:
+        return []
+    begin = 1
+    while tokens[begin] == "(":
+        begin += 1
+    end = begin
+    while tokens[end] and (end == begin or tokens[end] in (".", "[") or tokens[end - 1] == "."):
+        end = _closing(tokens, end) + 1
+    return _chain(tokens[begin:end])
+
+
+def _closing(tokens: Sequence[str], index: int) -> int:
+    """The end of what begins at a token: behind a `[` its `]`, or itself."""
+    depth = 0
+    for place in range(index, len(tokens)):
+        depth += (tokens[place] == "[") - (tokens[place] == "]")
+        if depth <= 0:
+            return place
+    return len(tokens) - 1
+
+
 def _chain(tokens: Sequence[str]) -> list[str]:
     """The access that some tokens end with; `[` stands for an index."""
     found: list[str] = []
     index = len(tokens) - 1
     while index >= 0:
         if tokens[index] == "]":
-            while index > 0 and tokens[index] != "[":
+            depth = 0
+            while index > 0:
+                depth += (tokens[index] == "]") - (tokens[index] == "[")
+                if not depth:
+                    break
                 index -= 1
             found.append("[")
             index -= 1
@@ -384,16 +480,22 @@ def _chain(tokens: Sequence[str]) -> list[str]:
     return found[::-1]
 
 
-def _elements(tokens: Sequence[str]) -> list[str]:
-    """What `all` and `any` that are open name the elements, the innermost first."""
+def _elements(tokens: Sequence[str]) -> _Elements:
+    """What `all` and `any` that are open name the elements, the innermost first; with what names the array."""
     opened: list[int] = []
     for index, token in enumerate(tokens):
         if token == "(":
             opened.append(index)
         elif token == ")" and opened:
             opened.pop()
-    starts = [index for index in reversed(opened) if index and tokens[index - 1] in ("all", "any")]
-    return [name_of(tokens[index + 1]) for index in starts if tokens[index + 2 : index + 3] == ("in",)]
+    found: list[tuple[str, Sequence[str]]] = []
+    for index in reversed(opened):
+        if index and tokens[index - 1] in ("all", "any") and tokens[index + 2 : index + 3] == ("in",):
+            array = tokens[index + 3 :]
+            # They have no name in what names the array.
+            if ":" in array:
+                found.append((name_of(tokens[index + 1]), array[: array.index(":")]))
+    return found
 
 
 def _communication(item: Communication) -> Candidate:

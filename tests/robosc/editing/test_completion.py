@@ -83,3 +83,87 @@ def test_comments_that_have_ended_hold_nothing() -> None:
         assert "s" in offered(text.format(before)), before
     for before in ("// |", "/* a */ // |", "// /* a */ |", "/* |", "/* a */ /* // |", "/* a */ // /* |"):
         assert not offered(text.format(before)), before
+
+
+TYPED = """robot R {{
+    datatype enum Level from double to {{ value > 0.5 -> high  default -> low }}
+    datatype enum Mode from double to {{ value > 0.5 -> calm  default -> hurried }}
+    datatype object Sector {{ near: double level: Level }}
+    datatype object Scan {{ sectors: array(Sector) levels: array(Level) grid: array(array(Sector)) scanned: Mode }}
+    interface scan use Scan from robot_msgs
+    constant usual: Level = low
+    component C {{
+        incoming message sent with type: Scan links scan
+        incoming message told with type: Level
+        outgoing message seen with type: Scan links scan
+        behaviour {{
+            variable last: Level = low
+            variable mode: Mode
+            on response from seen do {update}
+            initial marked state s {{ }}
+        }}
+    }}
+    requirement told needs {condition}
+    provide told with 0.1
+}}
+"""
+SOUND = {"update": "last := low", "condition": "C.last = low"}
+
+
+@pytest.mark.parametrize(
+    ("part", "words", "first"),
+    [
+        ("update", "last := |", ["high", "low"]),
+        ("update", "last := if C.s then |", ["high", "low"]),
+        ("update", "last := if C.s then low else |", ["high", "low"]),
+        ("update", "last := if C.s then (if C.s then low else high) else |", ["high", "low"]),
+        ("update", "last := if (if C.s then true else false) then |", ["high", "low"]),
+        ("update", "last := if C.s then low else if C.s then |", ["high", "low"]),
+        ("update", "last := (|", ["high", "low"]),
+        ("update", "last := ((|)", ["high", "low"]),
+        ("update", "last := if mode = |", ["calm", "hurried"]),
+        ("update", "last := if mode = (if C.s then |", ["calm", "hurried"]),
+        ("update", "mode := h|", ["calm", "hurried"]),
+        ("condition", "| = C.last", ["high", "low"]),
+        ("condition", "C.s and | != C.mode or C.s", ["calm", "hurried"]),
+        ("condition", "hi|gh = (C.mode)", ["calm", "hurried"]),
+        ("condition", "C.s or (| = usual)", ["high", "low"]),
+        ("condition", "usual = |", ["high", "low"]),
+        ("update", "last := if any(x in value.levels: x = |", ["high", "low"]),
+        ("update", "last := if any(x in value.levels: | = x) then low else high", ["high", "low"]),
+        ("update", "last := if all(x in value.levels[1..2]: x = |", ["high", "low"]),
+        ("update", "last := if all(x in value.sectors: x.level = |", ["high", "low"]),
+        ("update", "last := if any(x in value.sectors: x.|", ["near", "level"]),
+        ("update", "last := if any(x in value.sectors[1..3]: x.|", ["near", "level"]),
+        ("update", "last := if any(x in value.grid[1]: x.|", ["near", "level"]),
+        ("update", "last := if any(r in value.grid: any(x in r: x.|", ["near", "level"]),
+        ("update", "last := if value.sectors[length(value.grid[1])].|", ["near", "level"]),
+        ("update", "last := if any(mode in mode: mode.|", []),
+    ],
+)
+def test_what_has_the_needed_type_comes_first(part: str, words: str, first: list[str]) -> None:
+    found = [*offered(TYPED.format(**{**SOUND, part: words}))]
+    assert found[: len(first)] == first and (first or not found)
+
+
+def test_nothing_but_what_has_the_needed_type_comes_first() -> None:
+    for condition in ("max(|", "C.s and |", "C.s = true or |", "any(x in value.levels: |", "| < C.last"):
+        found = offered(TYPED.format(**{**SOUND, "condition": condition}))
+        assert found and not any(item.is_wanted for item in found.values()), condition
+
+
+def test_what_a_condition_of_a_message_is_about_is_known() -> None:
+    text = TYPED.format(**SOUND)
+    for words, first in (
+        ("type: Scan, when: value.|", ["sectors", "levels", "grid", "scanned"]),
+        ("type: Scan, when: value.scanned = |", ["calm", "hurried"]),
+        ("type: Scan, when: any(x in value.sectors: x.|", ["near", "level"]),
+        ("type: Level, when: value = |", ["high", "low"]),
+        ("type: integer, when: value.|", []),
+    ):
+        found = [*offered(text.replace("sent with type: Scan", f"sent with {words}"))]
+        assert found[: len(first)] == first and (first or not found), words
+
+
+def test_the_text_that_is_completed_is_sound() -> None:
+    assert check(bundle_of(TYPED.format(**SOUND))).model is not None

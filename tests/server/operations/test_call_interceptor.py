@@ -123,9 +123,66 @@ def test_what_handlers_say_themselves_stays() -> None:
 
 
 def test_a_deadline_that_passes() -> None:
+    """Only the server has a timer: it is told a deadline that its caller has not set."""
     with logged() as log:
-        assert outcome(b"stuck", timeout=0.2).code is grpc.StatusCode.DEADLINE_EXCEEDED
+        ended = outcome(b"stuck", metadata=[("grpc-timeout", "1m")], timeout=None)
+    assert ended.code is grpc.StatusCode.DEADLINE_EXCEEDED
     assert [line["code"] for line in log.lines("call")] == ["DEADLINE_EXCEEDED"]
+
+
+class CancelledContext:
+    """The context of a call that is cancelled while its handler waits.
+
+    Args:
+        given_s: What is left of its time when it begins; None: it has no deadline.
+        left_s: The same when it is cancelled.
+    """
+
+    def __init__(self, given_s: float | None, left_s: float | None) -> None:
+        self._remaining = iter((given_s, left_s))
+
+    def time_remaining(self) -> float | None:
+        return next(self._remaining)
+
+    def set_trailing_metadata(self, metadata: Any) -> None:
+        pass
+
+    def trailing_metadata(self) -> tuple[()]:
+        return ()
+
+    def peer(self) -> str:
+        return "ipv4:127.0.0.1:4711"
+
+
+@pytest.mark.parametrize(
+    ("given_s", "left_s", "code"),
+    [
+        (None, None, "CANCELLED"),
+        (0.2, 0.0, "DEADLINE_EXCEEDED"),
+        (0.2, 0.003, "DEADLINE_EXCEEDED"),  # The caller's timer was the first one.
+        (1.01, 0.007, "DEADLINE_EXCEEDED"),  # 1.003 s, rounded up on the line.
+        (600.0, 6.0, "DEADLINE_EXCEEDED"),
+        (600.0, 7.0, "CANCELLED"),
+        (60.0, 0.8, "CANCELLED"),
+        (0.2, 0.15, "CANCELLED"),
+        (0.01, 0.009, "CANCELLED"),
+    ],
+)
+def test_a_call_that_is_cancelled_where_its_deadline_passes_has_reached_it(
+    given_s: float | None, left_s: float | None, code: str
+) -> None:
+    async def stuck(request: bytes, context: Any) -> bytes:
+        raise asyncio.CancelledError
+
+    async def run() -> None:
+        handler = CallInterceptor(Metrics("1")).around(grpc.unary_unary_rpc_method_handler(stuck), f"/{SERVICE}/Unary")
+        with pytest.raises(asyncio.CancelledError):
+            await handler.unary_unary(b"", CancelledContext(given_s, left_s))
+
+    REQUEST_ID.set("")
+    with logged() as log:
+        asyncio.run(run())
+    assert [line["code"] for line in log.lines("call")] == [code]
 
 
 def test_a_caller_that_goes_away_is_counted_and_no_longer_under_way() -> None:

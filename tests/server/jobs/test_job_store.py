@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sqlalchemy import Connection, text
 
-from robosc_server.store import StoreError, StoreUnavailableError, open_store
+from robosc_server.store import Store, StoreError, StoreUnavailableError, open_store
 from robosc_server.store.records import blocks_of, messages_of
 from support.job_parts import PATIENCE_S, in_loop
 
@@ -130,6 +130,23 @@ def test_a_transaction_that_takes_too_long_is_cut_off_and_the_next_one_is_served
 
     in_loop(test)
     store.close()
+
+
+def test_a_connection_for_reading_is_made_without_writing(tmp_path: Path) -> None:
+    """Else it could not be made while the disk is full, or while somebody else writes."""
+    store = open_store(tmp_path)
+    writer = sqlite3.connect(tmp_path / "jobs.sqlite", isolation_level=None)
+    try:
+        writer.execute("BEGIN IMMEDIATE")
+        store._database._engine.dispose()  # Those that there were.
+        in_loop(lambda: find(store, "x"))
+    finally:
+        writer.close()
+        store.close()
+
+
+async def find(store: Store, job_id: str) -> None:
+    assert await store.find(job_id) is None
 
 
 def test_the_log_of_changes_stays_short(tmp_path: Path) -> None:

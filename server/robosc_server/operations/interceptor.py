@@ -4,7 +4,6 @@ One interceptor for all of it, since each costs every call some microseconds.
 """
 
 import asyncio
-import time
 from typing import Any
 
 import grpc
@@ -15,6 +14,7 @@ from robosc_api.failures import reason_of
 from robosc_api.layers import Layer, behaviour_of, with_behaviour
 from robosc_api.security import CALLER
 from robosc_api.streams import writing
+from robosc_server.clock import monotonic
 from robosc_server.failures import RefusedError, abort, code_of, fault_words
 from robosc_server.operations.logs import tell_fault
 from robosc_server.operations.metrics import MethodMetrics, Metrics
@@ -85,7 +85,7 @@ class CallInterceptor(Layer):
             inner = self._traced(inner, method)
 
         async def observed(request: Any, context: Any) -> Any:
-            begun_s = time.perf_counter()
+            begun_s = monotonic()
             given_s = context.time_remaining()
             metrics.under_way += 1
             code = grpc.StatusCode.OK
@@ -114,7 +114,7 @@ class CallInterceptor(Layer):
                 await abort(context, fault_of(error))
             finally:
                 metrics.under_way -= 1
-                self._ended(method, metrics, context, code, time.perf_counter() - begun_s)
+                self._ended(method, metrics, context, code, monotonic() - begun_s)
 
         return observed
 

@@ -12,7 +12,6 @@ import os
 import socket
 import sqlite3
 import threading
-import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -21,6 +20,7 @@ from sqlalchemy import Connection, Engine
 from sqlalchemy.exc import DataError, DBAPIError, IntegrityError, ProgrammingError
 from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 
+from robosc_server.clock import monotonic
 from robosc_server.store.errors import StoreUnavailableError
 
 _log = logging.getLogger(__name__)
@@ -124,7 +124,7 @@ class Database:
         readers: int,
         writers: int,
         answer_s: float = 8.0,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = monotonic,
     ) -> None:
         self._engine = engine
         self._readers = ThreadPoolExecutor(readers, thread_name_prefix="store-reader")

@@ -20,7 +20,8 @@ from support.background import children_of, cpu_ticks
 from support.hostile_models import all_different, products
 from support.refusals import reason_of
 from support.requests import small_request
-from support.service import PATIENCE_S, eventually, server_process
+from support.service import server_process
+from support.waiting import PATIENCE_S, eventually
 
 _NODES = ("--task-nodes", "1000000000")
 _SMALL = "robot Small {{ component C{} {{ incoming message a with type: none }} }}"

@@ -9,7 +9,8 @@ import grpc
 import pytest
 
 from robosc_api.prompt import PromptRequests
-from support.small_server import PATIENCE_S, SERVICE, call, small_server
+from support.small_server import SERVICE, call, small_server
+from support.waiting import PATIENCE_S
 
 LIMIT_S = 0.2
 LONG_S = 60.0

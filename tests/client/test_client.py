@@ -3,7 +3,6 @@
 import asyncio
 import inspect
 import threading
-import time
 from collections.abc import AsyncGenerator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
@@ -62,7 +61,8 @@ from support.answers import (
 from support.both_clients import KINDS, client_of
 from support.certificates import Authority
 from support.models import bundle_of
-from support.scripted_service import PATIENCE_S, Refusal, scripted
+from support.scripted_service import Refusal, held, scripted
+from support.waiting import PATIENCE_S, eventually
 
 NOWHERE = "127.0.0.1:1"
 BUNDLE = bundle_of("robot R { }")
@@ -92,15 +92,17 @@ def test_public_names() -> None:
 def test_servers_behind_one_name_take_turns(connect: Any) -> None:
     answers = {"Check": [[pb.CheckResponse()]]}
     # The first calls may come before there are both connections.
-    until_s = time.monotonic() + PATIENCE_S
     with (
         scripted(**answers) as (one, first),
         scripted(**answers) as (two, second),
         connect(f"ipv4:{one},{two}") as client,
     ):
-        while not (first.of("Check") and second.of("Check")):
-            assert time.monotonic() < until_s
+
+        def have_both() -> bool:
             client.check(BUNDLE)
+            return bool(first.of("Check") and second.of("Check"))
+
+        assert eventually(have_both)
         before = len(first.of("Check")), len(second.of("Check"))
         for _ in range(10):
             client.check(BUNDLE)
@@ -455,13 +457,8 @@ class TestWatch:
             assert [item.after_revision for item in script.of("WatchJob")] == [0, 0, 4, 5, 5, 5]
 
     def test_resumed_with_a_server_that_was_started_anew(self, connect: Any) -> None:
-        def held(context: Any) -> Any:
-            yield from watched(job(1))
-            while context.is_active():
-                time.sleep(0.01)
-
         with ExitStack() as first:
-            address, _ = first.enter_context(scripted(WatchJob=[[held]]))
+            address, _ = first.enter_context(scripted(WatchJob=[[*watched(job(1)), held]]))
             with connect(address, retries=RetryPolicy(first_s=0.05, watch_attempts=50)) as client:
                 items = iter(client.watch("job-1"))
                 assert next(items).revision == 1
@@ -491,12 +488,11 @@ class TestWatch:
             list(client.watch("job-1"))
 
     def test_deadline(self, connect: Any) -> None:
-        def held(context: Any) -> Any:
-            yield from watched(job(1))
-            while context.is_active():
-                time.sleep(0.01)
-
-        with scripted(WatchJob=[[held]]) as (address, _), connect(address) as client, pytest.raises(DeadlineError):
+        with (
+            scripted(WatchJob=[[*watched(job(1)), held]]) as (address, _),
+            connect(address) as client,
+            pytest.raises(DeadlineError),
+        ):
             client.wait("job-1", deadline_s=0.4)
 
     def test_wait(self, connect: Any) -> None:
@@ -507,12 +503,11 @@ class TestWatch:
     def test_an_unread_watch_is_ended(self, connect: Any) -> None:
         ended = threading.Event()
 
-        def held(context: Any) -> Any:
+        def noted(context: Any) -> Any:
             context.add_callback(ended.set)
-            yield from watched(job(1))
-            ended.wait(PATIENCE_S)
+            return held(context)
 
-        with scripted(WatchJob=[[held]]) as (address, _), connect(address) as client:
+        with scripted(WatchJob=[[*watched(job(1)), noted]]) as (address, _), connect(address) as client:
             items = client.watch("job-1")
             next(items)
             items.close()

@@ -23,6 +23,7 @@ from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.main import main as robosc_client
 from support.answers import exploration, job, supervisor, synthesis, verification
+from support.background import is_running
 from support.certificates import Authority
 from support.fake_tasks import TASK_FUNCTION
 from support.health_servers import answering
@@ -31,7 +32,8 @@ from support.models import EXAMPLE_DEPLOYMENTS, UNSUPPORTED
 from support.models import EXAMPLES as EXAMPLES_FOLDER
 from support.mutants import change
 from support.scripted_service import scripted
-from support.service import PATIENCE_S, eventually, is_running, logged_server_process, served, server_process
+from support.service import logged_server_process, served, server_process
+from support.waiting import PATIENCE_S, eventually
 
 EXAMPLES = sorted(EXAMPLES_FOLDER.glob("*/*.rscd"))
 NAVIGATION = EXAMPLES_FOLDER / "navigation" / "navigation.rscd"

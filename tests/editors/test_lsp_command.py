@@ -12,9 +12,10 @@ from lsprotocol import types as lsp
 
 from robosc import __version__
 from robosc_lsp import synthesis
-from support.background import children_of, eventually, is_running
+from support.background import children_of, is_running
 from support.editor import Editor
 from support.hostile_models import bounded_products, products
+from support.waiting import eventually
 
 COMMAND = (sys.executable, "-m", "robosc_lsp.command")
 

@@ -16,8 +16,9 @@ from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server import application
 from robosc_server.tasks.requests import RequestLimits
 from support.fake_tasks import TASK_FUNCTION as FAKE
-from support.service import PATIENCE_S, eventually, served
+from support.service import served
 from support.strangers import END_OF_HEADERS, END_OF_STREAM, SETTINGS, strangers
+from support.waiting import PATIENCE_S, eventually
 
 STUB: Any = synthesis_pb2_grpc.SynthesisServiceStub
 MAXIMUM_CONCURRENT_STREAMS = 3

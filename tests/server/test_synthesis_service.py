@@ -21,9 +21,11 @@ from robosc_api.v1 import synthesis_pb2_grpc
 from robosc_server import application
 from robosc_server.application import StartError
 from robosc_server.main import main
+from support.background import is_running
 from support.fake_tasks import TASK_FUNCTION as FAKE
-from support.service import PATIENCE_S, eventually, is_running, served
+from support.service import served
 from support.strangers import strangers
+from support.waiting import PATIENCE_S, eventually
 
 INITIAL_WINDOW = 4
 """HTTP/2's setting of that name, by its number."""

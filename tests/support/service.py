@@ -8,8 +8,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -21,9 +20,7 @@ from robosc_api.security import ServerSecurity
 from robosc_server.application import running_server
 from robosc_server.operations.settings import Settings
 from robosc_server.workers.local import TASK_FUNCTION, LocalWorkers
-
-PATIENCE_S = 60.0
-"""How long a test waits for what must happen; only a failing test waits so long."""
+from support.waiting import PATIENCE_S
 
 
 @contextmanager
@@ -139,25 +136,6 @@ def logged_server_process(
                 reader.join(PATIENCE_S)
                 process.stdout.close()
                 process.stderr.close()
-
-
-def eventually(condition: Callable[[], bool]) -> bool:
-    """Whether a condition becomes true; asks often, and long enough for a slow machine."""
-    end = time.monotonic() + PATIENCE_S
-    while time.monotonic() < end:
-        if condition():
-            return True
-        time.sleep(0.005)
-    return False
-
-
-def is_running(pid: int) -> bool:
-    """Whether there is a process of that number."""
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    return True
 
 
 def bundle_of(text: str, name: str = "robot.rscd", **libraries: str) -> Bundle:

@@ -15,9 +15,10 @@ import pytest
 
 from robosc_server.tasks.task import Report
 from robosc_server.workers.supply import Supply
-from support.background import cpu_ticks, eventually, is_running, parent_of
+from support.background import cpu_ticks, is_running, parent_of
 from support.descriptors import open_descriptors
 from support.fake_tasks import TASK_FUNCTION, said
+from support.waiting import eventually
 from support.worker_runs import LIMITS, Running
 
 KILLED_WITHIN_S = 0.2

@@ -15,9 +15,10 @@ from robosc_server.tasks.requests import RequestLimits, accepted
 from robosc_server.tasks.run import run_task
 from robosc_server.tasks.task import Failure, Outcome, Reason, Result, Task, TaskKind, TaskLimits
 from robosc_server.workers.local import LocalWorkers
-from support.background import BackgroundLoop, cpu_ticks, eventually, is_running
+from support.background import BackgroundLoop, cpu_ticks, is_running
 from support.hostile_models import buttons, products
 from support.requests import MESSAGES, bundle_at, small_request
+from support.waiting import eventually
 
 ROOT = Path(__file__).parents[3]
 LIMITS = TaskLimits(seconds=100, cpu_seconds=100, nodes=10**9)

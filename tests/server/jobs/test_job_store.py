@@ -16,7 +16,8 @@ from sqlalchemy import Connection, text
 
 from robosc_server.store import Store, StoreError, StoreUnavailableError, open_store
 from robosc_server.store.records import blocks_of, messages_of
-from support.job_parts import PATIENCE_S, in_loop
+from support.job_parts import in_loop
+from support.waiting import PATIENCE_S
 
 _HOLD = """
 import sys

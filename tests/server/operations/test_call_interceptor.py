@@ -19,7 +19,8 @@ from robosc_server.operations.request_ids import REQUEST_ID
 from robosc_server.operations.settings import LogLevel
 from robosc_server.operations.tracing import SentTracing
 from robosc_server.tasks.task import Reason
-from support.small_server import PATIENCE_S, SERVICE, Ended, call, logged, small_server
+from support.small_server import SERVICE, Ended, call, logged, small_server
+from support.waiting import PATIENCE_S, limited, until
 
 MARKER = "a_word_of_the_model"
 
@@ -44,12 +45,11 @@ def outcome(request: bytes, metrics: Metrics | None = None, **more: Any) -> Ende
         calls = CallInterceptor(metrics or Metrics("1"))
         async with small_server(interceptors=[calls], unary=answer) as (channel, _):
             ended = await call(channel, request, **more)
-            while calls.under_way():
-                await asyncio.sleep(0.001)
+            await until(lambda: not calls.under_way())
             assert isinstance(ended, Ended)
             return ended
 
-    return asyncio.run(asyncio.wait_for(run(), PATIENCE_S))
+    return limited(run())
 
 
 def counted(metrics: Metrics, text: str) -> bool:
@@ -193,14 +193,12 @@ def test_a_caller_that_goes_away_is_counted_and_no_longer_under_way() -> None:
         async with small_server(interceptors=[calls], unary=answer) as (channel, _):
             method: Any = channel.unary_unary(f"/{SERVICE}/Unary")
             made = method(b"stuck")
-            while calls.under_way() != 1:
-                await asyncio.sleep(0.001)
+            await until(lambda: calls.under_way() == 1)
             assert counted(metrics, "robosc_server_calls_under_way 1.0")
             made.cancel()
-            while calls.under_way():
-                await asyncio.sleep(0.001)
+            await until(lambda: not calls.under_way())
 
-    asyncio.run(asyncio.wait_for(run(), PATIENCE_S))
+    limited(run())
     assert counted(metrics, f'robosc_server_calls_total{{code="CANCELLED",method="/{SERVICE}/Unary"}} 1.0')
 
 
@@ -231,12 +229,11 @@ def test_streams_of_either_kind_and_a_generator_is_closed_with_its_call() -> Non
                 stuck = made(b"long")
                 await stuck.read()
                 stuck.cancel()
-                while calls.under_way():
-                    await asyncio.sleep(0.001)
+                await until(lambda: not calls.under_way())
                 assert closed == ["closed"] * 2
 
     for handler in (generator, writer):
-        asyncio.run(asyncio.wait_for(run(handler), PATIENCE_S))
+        limited(run(handler))
 
 
 def test_methods_that_there_are_not_are_counted_without_their_names() -> None:

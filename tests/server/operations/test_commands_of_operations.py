@@ -25,7 +25,8 @@ from robosc_server.store.opening import DATABASE_FILE
 from robosc_server.store.schema import VERSION
 from support.certificates import Authority
 from support.postgresql import postgresql
-from support.service import eventually, logged_server_process, server_process
+from support.service import logged_server_process, server_process
+from support.waiting import eventually
 
 
 @pytest.fixture(autouse=True)

@@ -16,8 +16,9 @@ from robosc_server.failures import RefusedError
 from robosc_server.operations.open_calls import HEALTH_CALLS_PER_CALLER, CallLimits, OpenCalls
 from robosc_server.tasks.task import Reason
 from support.fake_tasks import TASK_FUNCTION as FAKE
-from support.service import PATIENCE_S, eventually, served
+from support.service import served
 from support.strangers import Stranger, strangers
+from support.waiting import PATIENCE_S, eventually
 
 STUB: Any = synthesis_pb2_grpc.SynthesisServiceStub
 JOBS: Any = jobs_pb2_grpc.JobServiceStub

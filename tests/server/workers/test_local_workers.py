@@ -13,8 +13,9 @@ import pytest
 from robosc_server.tasks.task import Failure, Reason, Report, Result, TaskKind
 from robosc_server.workers import WorkerLostError, WorkersError
 from robosc_server.workers.local import LocalWorkers
-from support.background import BackgroundLoop, eventually, is_running, is_stopped, parent_of
+from support.background import BackgroundLoop, is_running, is_stopped, parent_of
 from support.fake_tasks import TASK_FUNCTION, said
+from support.waiting import eventually
 from support.worker_runs import LIMITS, Running
 
 

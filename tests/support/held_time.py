@@ -5,7 +5,7 @@ while a slow machine computes. What comes from outside, of sockets, threads and 
 """
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from concurrent.futures import Future
 from typing import Any
 
@@ -53,3 +53,18 @@ class HeldLoop(asyncio.SelectorEventLoop):
                 return
             self._now_s = max(self._now_s, next_s)
         self.call_soon(self._pass, until_s, done)
+
+
+def on_held_time[T](test: Callable[[HeldLoop], Coroutine[Any, Any, T]]) -> T:
+    """What a test gives that is run on such a loop."""
+    loops: list[HeldLoop] = []
+
+    def made() -> HeldLoop:
+        loops.append(HeldLoop())
+        return loops[0]
+
+    async def run() -> T:
+        return await test(loops[0])
+
+    with asyncio.Runner(loop_factory=made) as runner:
+        return runner.run(run())

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from robosc_server.operations.ending import Ending
-from support.held_time import HeldLoop
+from support.held_time import HeldLoop, on_held_time
 from support.waiting import PATIENCE_S, until
 
 
@@ -34,19 +34,13 @@ def forced(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     return found
 
 
-def on_held_time(test: Callable[[HeldLoop, Ending], Coroutine[Any, Any, None]], ending: Ending) -> None:
-    loops: list[HeldLoop] = []
-
-    def made() -> HeldLoop:
-        loops.append(HeldLoop())
-        return loops[0]
-
-    async def run() -> None:
+def told(test: Callable[[HeldLoop, Ending], Coroutine[Any, Any, None]]) -> None:
+    async def run(loop: HeldLoop) -> None:
+        ending = Ending(30.0)
         ending.listen()
-        await test(loops[0], ending)
+        await test(loop, ending)
 
-    with asyncio.Runner(loop_factory=made) as runner:
-        runner.run(run())
+    on_held_time(run)
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
@@ -70,7 +64,7 @@ def test_an_end_that_hangs_is_told_and_will_be_forced(
         assert not forced
 
     with caplog.at_level(logging.ERROR):
-        on_held_time(test, Ending(30.0))
+        told(test)
 
 
 def test_a_second_interrupt_ends_it_at_once(forced: dict[str, Any], caplog: pytest.LogCaptureFixture) -> None:
@@ -84,7 +78,7 @@ def test_a_second_interrupt_ends_it_at_once(forced: dict[str, Any], caplog: pyte
         await until(lambda: "status" in forced)
         assert (forced["status"], ending._interrupts) == (128 + signal.SIGINT, 2)
 
-    on_held_time(test, Ending(30.0))
+    told(test)
     assert "ended at once, by a second interrupt" in caplog.text
 
 

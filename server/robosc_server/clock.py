@@ -4,20 +4,21 @@ What passes is measured by the clock of the event loop that runs, which asyncio'
 `timeout`, `wait`, `call_later`): a test has all of it pass as it likes with a loop of its own.
 """
 
-import asyncio
+import sys
 import time
 
 
 def monotonic() -> float:
-    """Seconds that never go back; in a thread without an event loop, those of the computer.
+    """Seconds that never go back; where no event loop runs, those of the computer.
 
     They are the same ones: asyncio's loops read that clock.
     """
+    # A worker's process has no loop, and need not load what has.
+    asyncio = sys.modules.get("asyncio")
     try:
-        loop = asyncio.get_running_loop()
+        return time.monotonic() if asyncio is None else asyncio.get_running_loop().time()
     except RuntimeError:
         return time.monotonic()
-    return loop.time()
 
 
 def wall() -> float:

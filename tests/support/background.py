@@ -14,10 +14,16 @@ from support.waiting import PATIENCE_S
 
 
 class BackgroundLoop:
-    """Runs coroutines while the test does something else; a context."""
+    """Runs coroutines while the test does something else; a context.
+
+    Args:
+        loop: Such as a `HeldLoop`; None: a new one.
+    """
+
+    def __init__(self, loop: asyncio.AbstractEventLoop | None = None) -> None:
+        self._loop = loop or asyncio.new_event_loop()
 
     def __enter__(self) -> Self:
-        self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever)
         self._thread.start()
         return self

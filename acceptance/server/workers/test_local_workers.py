@@ -47,6 +47,9 @@ class TestSpending:
         running.run("sleep 1")
         assert self.spent(running)[0] < time.monotonic() - begun_s - 0.5
 
+    def test_waiting_is_not_limited_as_work_is(self, running: Running) -> None:
+        assert said(running.run("sleep 1.2\nsleep 0", replace(LIMITS, cpu_seconds=1))) == "done"
+
     @pytest.mark.parametrize(
         "text", ["raise", "die 9", "exit 3", "refuse it", "claim 18446744073709551615", "garbage", "stop", "spin"]
     )

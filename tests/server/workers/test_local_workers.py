@@ -1,10 +1,14 @@
 """Processes of this machine: they do what they are told, die of what they may not, and are killed in time."""
 
+import asyncio
 import contextlib
 import os
 import signal
 import socket
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,7 +16,9 @@ import pytest
 from robosc_server.tasks.task import Failure, Reason, Report, Result, TaskKind
 from robosc_server.workers import WorkerLostError, WorkersError
 from robosc_server.workers.local import LocalWorkers
+from robosc_server.workers.supply import Supply
 from support.background import BackgroundLoop, has_ended, is_stopped, parent_of
+from support.descriptors import open_descriptors
 from support.fake_tasks import TASK_FUNCTION, said
 from support.held_time import HeldLoop
 from support.waiting import PATIENCE_S, eventually
@@ -225,3 +231,57 @@ class TestDeaths:
                 future.result(60)
             with pytest.raises(WorkersError, match="have ended"):
                 running.run("echo")
+
+
+class TestNothingIsLeft:
+    def test_nothing_outlives_a_server_that_is_killed(self, tmp_path: Path) -> None:
+        program = tmp_path / "program.py"
+        program.write_text(
+            "import asyncio\n"
+            "from robosc_server.tasks.task import TaskLimits\n"
+            "from robosc_server.workers.local import LocalWorkers\n"
+            "from support.fake_tasks import TASK_FUNCTION, fake_task\n"
+            "async def tell(report):\n"
+            "    print(report.message, flush=True)\n"
+            "async def main():\n"
+            "    async with LocalWorkers(2, TASK_FUNCTION) as workers:\n"
+            "        tasks = map(fake_task, ('pid\\nstuck', 'pid\\nstop'))\n"
+            "        await asyncio.gather(*(workers.run(task, TaskLimits(), tell) for task in tasks))\n"
+            "asyncio.run(main())\n"
+        )
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+        with subprocess.Popen([sys.executable, program], stdout=subprocess.PIPE, text=True, env=environment) as server:
+            assert server.stdout is not None
+            pids = [int(server.stdout.readline()) for _ in range(2)]
+            template = parent_of(pids[0])
+            children = Path(f"/proc/{template}/task/{template}/children")
+            pids += [template, *map(int, children.read_text().split())]
+            server.kill()
+        assert len(set(pids)) >= 3
+        assert eventually(lambda: all(map(has_ended, pids)))
+
+    def test_nothing_is_left_after_many_tasks(self, running: Running) -> None:
+        def is_at_rest() -> bool:
+            # Also of the last one, whose descriptors are closed when it is gone.
+            return len(running.local.pids) == 2 and not running.local._supply._burials
+
+        running.run("echo")
+        assert eventually(is_at_rest)
+        before = open_descriptors()
+        for text in ("echo", "exit 1", "die 11", "garbage", "raise") * 4:
+            running.run(text)
+        assert eventually(is_at_rest)
+        assert eventually(lambda: open_descriptors() == before)
+
+    def test_workers_end_also_where_a_burial_ends_that_very_moment(self) -> None:
+        async def run() -> None:
+            supply = Supply(TASK_FUNCTION, 1, must_be_confined=False)
+            burial = supply._begin(asyncio.sleep(0))
+            while not burial.done():
+                await asyncio.sleep(0)
+            # It is done, and what follows from that is at its turn only when this here waits.
+            assert supply._burials == {burial}
+            await supply.__aexit__()
+            assert not supply._burials
+
+        asyncio.run(run())

@@ -61,8 +61,8 @@ def waits(prompt: PromptRequests, stream: str = "") -> int:
     return len((prompt._next[stream] if stream else prompt._first)._since_s)
 
 
-def is_waiting(prompt: PromptRequests, stream: str = "") -> bool:
-    return waits(prompt, stream) == 1
+def is_waiting(prompt: PromptRequests, stream: str = "", count: int = 1) -> bool:
+    return waits(prompt, stream) == count
 
 
 async def refusal(made: Any) -> tuple[Any, str]:
@@ -208,7 +208,7 @@ def test_those_that_begin_while_others_wait_are_looked_for_later() -> None:
             made = []
             for number in range(1, 4):
                 made.append(silent(channel, "Unary"))
-                await until(lambda number=number: waits(prompt) == number)
+                await until(partial(is_waiting, prompt, count=number))
                 await loop.passed(LIMIT_S / 4)
             assert waits(prompt) == 3
             for left in (2, 1, 0):

@@ -4,8 +4,6 @@ import asyncio
 import os
 import sqlite3
 import stat
-import subprocess
-import sys
 import threading
 from pathlib import Path
 
@@ -16,17 +14,9 @@ from sqlalchemy import Connection, text
 
 from robosc_server.store import Store, StoreError, StoreUnavailableError, open_store
 from robosc_server.store.records import blocks_of, messages_of
+from support.held_store import held_store
 from support.job_parts import in_loop
 from support.waiting import PATIENCE_S
-
-_HOLD = """
-import sys
-from pathlib import Path
-from robosc_server.store import open_store
-store = open_store(Path(sys.argv[1]))
-print("open", flush=True)
-sys.stdin.read()
-"""
 
 
 @given(st.lists(st.one_of(st.binary(max_size=50), st.integers(0, 2**20).map(bytes)), max_size=12))
@@ -38,16 +28,10 @@ def test_messages_are_found_again_in_their_blocks(messages: list[bytes]) -> None
 
 def test_a_folder_is_for_one_server_and_free_after_a_kill(tmp_path: Path) -> None:
     folder = tmp_path / "deep" / "state"
-    holder = subprocess.Popen(
-        [sys.executable, "-c", _HOLD, str(folder)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
-    try:
-        assert holder.stdout is not None and holder.stdout.readline() == "open\n"
+    with held_store(folder) as told:
+        assert told == "open"
         with pytest.raises(StoreError, match="in use by another robosc-server"):
             open_store(folder)
-    finally:
-        holder.kill()
-        holder.communicate(timeout=PATIENCE_S)
     store = open_store(folder)
     with pytest.raises(StoreError, match="in use by another robosc-server"):
         open_store(folder)

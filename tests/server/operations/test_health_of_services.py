@@ -116,7 +116,7 @@ def test_conditions_are_asked_for_again_and_again_and_who_raises_says_no() -> No
 
 
 async def is_draining(channel: Any) -> bool:
-    return await status(channel) != SERVING
+    return bool(await status(channel) != SERVING)
 
 
 def test_draining_says_no_first_then_refuses_and_lets_calls_end() -> None:

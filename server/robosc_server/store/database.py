@@ -31,6 +31,9 @@ _PENDING = 2048
 _TRIES = 3
 """Of a change that meets another one of the same rows."""
 
+_STEPS = 100_000
+"""Of SQLite's machine, some milliseconds, after which a statement asks whether its transaction was given up."""
+
 _PAUSE_S = 0.5
 """After a connection has failed: for how long nothing is tried."""
 
@@ -80,14 +83,21 @@ class _Transaction[T]:
             raise PoolTimeoutError
         with self._engine.connect() as connection:
             connection = connection.execution_options(robosc_write=self._is_write)
+            driver_connection: Any = connection.connection.driver_connection
+            is_sqlite = isinstance(driver_connection, sqlite3.Connection)
+            if is_sqlite:
+                # An interrupt between two statements is lost: the next one is to end as well.
+                driver_connection.set_progress_handler(lambda: self._is_abandoned, _STEPS)
             with self._lock:
-                self._driver_connection = connection.connection.driver_connection
+                self._driver_connection = driver_connection
             try:
                 with connection.begin():
                     return self._work(connection)
             finally:
                 with self._lock:
                     self._driver_connection = None
+                if is_sqlite:
+                    driver_connection.set_progress_handler(None, 0)
 
 
 def _cut_off(driver_connection: Any) -> None:

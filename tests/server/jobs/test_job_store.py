@@ -15,6 +15,7 @@ from sqlalchemy import Connection, text
 from robosc_server.store import Store, StoreError, StoreUnavailableError, open_store
 from robosc_server.store.records import blocks_of, messages_of
 from support.held_store import held_store
+from support.held_time import HeldLoop, on_held_time
 from support.job_parts import in_loop
 from support.waiting import PATIENCE_S
 
@@ -93,27 +94,32 @@ def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
 def test_a_transaction_that_takes_too_long_is_cut_off_and_the_next_one_is_served(tmp_path: Path) -> None:
     store = open_store(tmp_path)
     endless = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT count(*) FROM n"
-    ended = threading.Event()
+    begun, ended = threading.Event(), threading.Event()
 
     def work(connection: Connection) -> None:
+        begun.set()
         try:
             connection.execute(text(endless))
         finally:
             ended.set()
 
-    async def test() -> None:
-        store._database._answer_s = 0.2
+    async def test(loop: HeldLoop) -> None:
         for _ in range(5):  # More than there are threads.
+            reading = asyncio.create_task(store._database.read(work))
+            assert await asyncio.to_thread(begun.wait, PATIENCE_S)
+            await loop.passed(7.0)
+            assert not reading.done()
+            await loop.passed(1.0)
             with pytest.raises(StoreUnavailableError):
-                await store._database.read(work)
+                await reading
             assert await asyncio.to_thread(ended.wait, PATIENCE_S)
+            begun.clear()
             ended.clear()
         assert not store.is_available
-        store._database._answer_s = PATIENCE_S
         assert await store.find("x") is None
         assert store.is_available
 
-    in_loop(test)
+    on_held_time(test)
     store.close()
 
 

@@ -13,6 +13,7 @@ from robosc_server.operations.health import Health
 from robosc_server.operations.interceptor import CallInterceptor
 from robosc_server.operations.metrics import Metrics
 from robosc_server.outgoing import Outgoing
+from support.held_time import HeldLoop, on_held_time
 from support.small_server import SERVICE, call, logged, small_server
 from support.waiting import PATIENCE_S, limited, until
 
@@ -144,10 +145,21 @@ def test_draining_says_no_first_then_refuses_and_lets_calls_end() -> None:
     limited(run())
 
 
+async def passes(loop: HeldLoop, ending: asyncio.Task[None]) -> None:
+    """Have time pass until a server has ended."""
+
+    async def is_over() -> bool:
+        await loop.passed(2.0)
+        return ending.done()
+
+    await until(is_over)
+    await ending
+
+
 def test_a_large_answer_that_was_sent_is_waited_for() -> None:
     size = 3_000_000
 
-    async def run() -> None:
+    async def test(loop: HeldLoop) -> None:
         outgoing, calls, health = Outgoing(size, size), CallInterceptor(Metrics("1")), Health({})
 
         async def large(request: bytes, context: Any) -> bytes:
@@ -171,11 +183,12 @@ def test_a_large_answer_that_was_sent_is_waited_for() -> None:
                     drain(server, health, calls, PATIENCE_S, unread_bytes=lambda: outgoing.unread_bytes)
                 )
                 # Longer than small answers are given.
-                assert await asyncio.wait([ending], timeout=0.5) == (set(), {ending})
+                await loop.passed(5.0)
+                assert not ending.done()
                 assert [len(message) async for message in reader] == [size]
-                await ending
+                await passes(loop, ending)
 
-    limited(run())
+    on_held_time(test)
 
 
 def test_connections_that_grpc_does_not_let_go_of_keep_nobody_from_ending(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -193,7 +206,7 @@ def test_connections_that_grpc_does_not_let_go_of_keep_nobody_from_ending(monkey
 
 
 def test_what_does_not_end_is_cancelled_and_what_is_idle_is_not_waited_for() -> None:
-    async def run(seconds: float, idle: frozenset[str]) -> None:
+    async def run(loop: HeldLoop, seconds: float, idle: frozenset[str]) -> None:
         cancelled = asyncio.Event()
 
         async def stuck(request: bytes, context: Any) -> bytes:
@@ -207,9 +220,10 @@ def test_what_does_not_end_is_cancelled_and_what_is_idle_is_not_waited_for() -> 
         async with small_server(interceptors=[calls], unary=stuck) as (channel, server):
             under_way = asyncio.create_task(call(channel))
             await until(lambda: calls.under_way() > 0)
-            await drain(server, health, calls, seconds, idle)
+            ending = asyncio.create_task(drain(server, health, calls, seconds, idle))
+            await passes(loop, ending)
             await cancelled.wait()
             assert (await under_way).code is not grpc.StatusCode.OK
 
-    limited(run(0.1, frozenset()))
-    limited(run(10 * PATIENCE_S, frozenset({f"/{SERVICE}/Unary"})))
+    on_held_time(lambda loop: run(loop, 30.0, frozenset()))
+    on_held_time(lambda loop: run(loop, 1e9, frozenset({f"/{SERVICE}/Unary"})))

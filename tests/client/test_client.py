@@ -505,9 +505,9 @@ class TestWatch:
 
         def noted(context: Any) -> Any:
             context.add_callback(ended.set)
-            return held(context)
+            return ()
 
-        with scripted(WatchJob=[[*watched(job(1)), noted]]) as (address, _), connect(address) as client:
+        with scripted(WatchJob=[[noted, *watched(job(1)), held]]) as (address, _), connect(address) as client:
             items = client.watch("job-1")
             next(items)
             items.close()

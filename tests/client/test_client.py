@@ -255,19 +255,21 @@ class TestErrors:
             assert issubclass(error, ClientError)
 
     def test_deadline(self, connect: Any) -> None:
-        ended = threading.Event()
+        begun, ended = threading.Event(), threading.Event()
 
         def stuck(context: Any) -> Any:
-            context.add_callback(ended.set)
-            yield progress()
-            ended.wait(PATIENCE_S)
+            if context.add_callback(ended.set):
+                begun.set()
+                yield progress()
+                ended.wait(PATIENCE_S)
 
         with scripted(Synthesize=[[stuck]]) as (address, _), connect(address) as client:
             told: list[Any] = []
             with pytest.raises(DeadlineError, match=r"within 0\.5 seconds"):
                 client.synthesize(BUNDLE, deadline_s=0.5, on_progress=told.append)
-            assert len(told) == 1
-            assert ended.wait(PATIENCE_S)
+            # On a slow machine the call may not even have begun by then.
+            assert len(told) <= 1
+            assert not begun.is_set() or ended.wait(PATIENCE_S)
 
     def test_what_a_caller_raises_ends_the_work(self, connect: Any) -> None:
         ended = threading.Event()

@@ -262,7 +262,8 @@ class TestEnding:
 
     def test_the_servers_own_limit(self) -> None:
         loop = HeldLoop()
-        with served(FAKE, loop=loop, task_seconds=500.0) as address, grpc.insecure_channel(address) as channel:
+        limits = {"task_seconds": 500.0, "request_seconds": 1e8}
+        with served(FAKE, loop=loop, **limits) as address, grpc.insecure_channel(address) as channel:
             call = STUB(channel).Check.future(pb.CheckRequest(bundle=bundle("stuck")), timeout=PATIENCE_S)
 
             def is_over() -> bool:

@@ -10,7 +10,7 @@ import signal
 
 import pytest
 
-from support.effort import load_profile
+from support.effort import WRONG, load_profile
 
 # Our programs have gRPC's own log off, which is read at its import: in this process, which runs what they run, it would
 # stand among what they tell. Programs that are started hide it themselves.
@@ -26,6 +26,16 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 load_profile()
+
+
+def pytest_configure() -> None:
+    """Run nothing with an effort that cannot be meant.
+
+    Raises:
+        pytest.UsageError: It is none.
+    """
+    if WRONG:
+        raise pytest.UsageError(WRONG)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

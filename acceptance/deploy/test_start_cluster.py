@@ -27,7 +27,8 @@ from support.certificates import Authority
 from support.containers import TOP
 from support.dask_clusters import end
 from support.manifests import container_of, has_kustomize
-from support.service import eventually, server_process
+from support.service import server_process
+from support.waiting import eventually
 
 distributed = pytest.importorskip("distributed")
 

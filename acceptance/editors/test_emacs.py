@@ -9,10 +9,11 @@ import pytest
 
 from robosc.formatting import format_text
 from robosc.language.words import RESERVED_WORDS
-from support.background import children_of, eventually, has_ended
+from support.background import children_of, has_ended
 from support.editor_models import LIBRARY, ROBOT
 from support.hostile_models import products
 from support.installed_editors import EMACS, LIMIT_S, ROOT, Emacs, Home, ended
+from support.waiting import eventually
 
 MODE = ROOT / "editors" / "emacs" / "robosc-mode.el"
 

@@ -8,10 +8,11 @@ import pytest
 
 from robosc.formatting import format_text
 from robosc.language.words import RESERVED_WORDS
-from support.background import children_of, eventually, has_ended
+from support.background import children_of, has_ended
 from support.editor_models import LIBRARY, ROBOT
 from support.hostile_models import products
 from support.installed_editors import NVIM, ROOT, Home, Neovim, ended
+from support.waiting import eventually
 
 needs_neovim = pytest.mark.skipif(NVIM is None, reason="needs Neovim: apt-get install neovim")
 

@@ -17,10 +17,11 @@ import pytest
 
 from robosc_api.v1 import synthesis_pb2_grpc
 from robosc_server.tasks.task import TaskKind
-from support.background import children_of, cpu_ticks, eventually
+from support.background import children_of, cpu_ticks
 from support.hostile_models import products
 from support.job_server import job_server
 from support.requests import small_request
+from support.waiting import eventually
 
 pytestmark = pytest.mark.real_time
 

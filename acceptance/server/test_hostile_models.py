@@ -20,7 +20,8 @@ from support.background import children_of, cpu_ticks
 from support.hostile_models import all_different, products
 from support.refusals import reason_of
 from support.requests import small_request
-from support.service import PATIENCE_S, eventually, server_process
+from support.service import server_process
+from support.waiting import PATIENCE_S, eventually
 
 _NODES = ("--task-nodes", "1000000000")
 _SMALL = "robot Small {{ component C{} {{ incoming message a with type: none }} }}"
@@ -156,25 +157,3 @@ def test_a_job_without_end_fails_by_its_limit_and_one_whose_worker_is_killed_by_
     assert {found.state for found in ended} == {jobs_pb2.JOB_STATE_FAILED}
     assert sorted(found.failure.reason for found in ended) == ["CPU_LIMIT", "WORKER_DIED"]
     assert [found.attempts for found in ended] == [1, 1]
-
-
-def test_a_key_that_is_sent_again_is_one_job_and_not_for_another_task(quick: Server) -> None:
-    served = quick
-
-    def submit(number: int, key: str, **caller: Any) -> Any:
-        task = jobs_pb2.Task(check=small_request(TaskKind.CHECK, _SMALL.format(number)))
-        request = jobs_pb2.SubmitJobRequest(task=task, idempotency_key=key)
-        return served.jobs.SubmitJob(request, timeout=PATIENCE_S, **(caller or served.stranger))
-
-    with ThreadPoolExecutor(8) as threads:
-        answers = list(threads.map(lambda _: submit(1, "key"), range(16)))
-    assert len({answer.job.id for answer in answers}) == 1
-    assert [answer.existed for answer in answers].count(False) == 1
-    with pytest.raises(grpc.RpcError) as refused:
-        submit(2, "key")
-    assert (refused.value.code(), reason_of(refused.value)) == (
-        grpc.StatusCode.ALREADY_EXISTS,
-        "IDEMPOTENCY_KEY_REUSED",
-    )
-    # Keys are each caller's own.
-    assert not submit(2, "key", **served.other).existed

@@ -17,12 +17,13 @@ from robosc_client import Client
 from robosc_client.jobs import JobState
 from robosc_client.results import Generation, Synthesis
 from robosc_client.tasks import Generate, Synthesize, Task
-from support.background import children_of, cpu_ticks, eventually, is_running
+from support.background import children_of, cpu_ticks, is_running
 from support.dask_clusters import Cluster, dask_cluster, kill
 from support.hostile_models import bounded_products, products
 from support.models import EXAMPLES
 from support.postgresql import postgresql
 from support.service import bundle_of, server_process
+from support.waiting import eventually
 
 _WORKERS = 2
 

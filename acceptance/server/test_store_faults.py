@@ -23,12 +23,12 @@ from robosc_api.v1 import jobs_pb2_grpc, synthesis_pb2_grpc
 from robosc_server.jobs import JOB_SERVICE_NAME
 from robosc_server.synthesis_service import SERVICE_NAME
 from robosc_server.tasks.task import TaskKind
-from support.job_parts import PATIENCE_S, until
 from support.job_server import job_server
 from support.job_workers import messages_for, task_message
 from support.postgresql import Postgresql, postgresql
 from support.refusals import reason_of
 from support.small_disks import fill, small_disk
+from support.waiting import PATIENCE_S, until
 
 _REFUSED_WITHIN_S = 12.0
 """What does not answer is given up after 8 seconds."""

@@ -13,8 +13,9 @@ from robosc import __version__
 from robosc.cli.main import main as robosc
 from robosc.targets import ALL, available_targets
 from support.models import EXAMPLES
-from support.service import PATIENCE_S, server_process
+from support.service import server_process
 from support.typescript import compiled_client
+from support.waiting import PATIENCE_S
 
 MODEL = EXAMPLES / "line_follower" / "line_follower.rscd"
 

@@ -8,7 +8,8 @@ import grpc
 from grpc_health.v1 import health_pb2
 
 from robosc_api.malformed import MalformedRequests
-from support.small_server import PATIENCE_S, SERVICE, call, small_server
+from support.small_server import SERVICE, call, small_server
+from support.waiting import PATIENCE_S
 
 Message = health_pb2.HealthCheckRequest
 WRONG = b"\xff\xff"

@@ -1,17 +1,19 @@
 """Calls of each kind that begin and say nothing, or say it late, over real sockets."""
 
 import asyncio
-import time
 from collections.abc import AsyncIterator
+from functools import partial
 from typing import Any
 
 import grpc
 import pytest
 
 from robosc_api.prompt import PromptRequests
-from support.small_server import PATIENCE_S, SERVICE, call, small_server
+from support.held_time import HeldLoop, on_held_time
+from support.small_server import SERVICE, call, small_server
+from support.waiting import PATIENCE_S, until
 
-LIMIT_S = 0.2
+LIMIT_S = 0.25
 LONG_S = 60.0
 
 
@@ -54,6 +56,15 @@ def silent(channel: Any, name: str) -> Any:
     return channel.stream_stream(f"/test.Kinds/{name}")(timeout=PATIENCE_S)
 
 
+def waits(prompt: PromptRequests, stream: str = "") -> int:
+    """How many calls wait for their first request, or those of a kind for a further one."""
+    return len((prompt._next[stream] if stream else prompt._first)._since_s)
+
+
+def is_waiting(prompt: PromptRequests, stream: str = "", count: int = 1) -> bool:
+    return waits(prompt, stream) == count
+
+
 async def refusal(made: Any) -> tuple[Any, str]:
     """Status and words of a call that must end."""
     found = await made.code(), await made.details()
@@ -63,22 +74,25 @@ async def refusal(made: Any) -> tuple[Any, str]:
 
 @pytest.mark.parametrize("name", ["Unary", "Generator", "Writer"])
 def test_a_request_comes_in_time_or_the_call_ends(name: str) -> None:
-    async def run() -> None:
-        async with small_server(interceptors=[PromptRequests(LIMIT_S)], setup=with_all_kinds) as (channel, _):
-            begun_s = time.monotonic()
+    async def test(loop: HeldLoop) -> None:
+        prompt = PromptRequests(LIMIT_S)
+        async with small_server(interceptors=[prompt], setup=with_all_kinds) as (channel, _):
             made = [silent(channel, name) for _ in range(3)]
+            await until(lambda: waits(prompt) == 3)
+            await loop.passed(LIMIT_S / 2)
+            assert waits(prompt) == 3
+            await loop.passed(LIMIT_S / 2)
             for each in made:
                 assert await refusal(each) == (
                     grpc.StatusCode.INVALID_ARGUMENT,
-                    "the request comes within 0.2 seconds",
+                    "the request comes within 0.25 seconds",
                 )
-            assert time.monotonic() - begun_s >= LIMIT_S
             # One that ends its requests without any need not be waited for, and the next ones are answered.
             spoken: Any = channel.stream_stream(f"/test.Kinds/{name}")(timeout=PATIENCE_S)
             await spoken.write(b"said")
             assert await spoken.read() == b"said"
 
-    asyncio.run(run())
+    on_held_time(test)
 
 
 @pytest.mark.parametrize("name", ["Unary", "Writer"])
@@ -94,9 +108,12 @@ def test_an_end_without_a_request_is_told_at_once(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["Both", "Collect"])
 def test_a_stream_of_requests_goes_on_as_long_as_they_come(name: str) -> None:
-    async def run() -> None:
+    async def test(loop: HeldLoop) -> None:
         path = f"/test.Kinds/{name}"
-        for limits, words in (((LIMIT_S, LONG_S), "within 0.2 s"), ((LONG_S, LIMIT_S), "each further one within 0.2")):
+        for limits, words in (
+            ((LIMIT_S, LONG_S), "within 0.25 s"),
+            ((LONG_S, LIMIT_S), "each further one within 0.25"),
+        ):
             prompt = PromptRequests(limits[0], {path: limits[1]})
             async with small_server(interceptors=[prompt], setup=with_all_kinds) as (channel, _):
                 made = silent(channel, name)
@@ -104,6 +121,10 @@ def test_a_stream_of_requests_goes_on_as_long_as_they_come(name: str) -> None:
                     for text in (b"a", b"b"):
                         await made.write(text)
                         assert name == "Collect" or await made.read() == text
+                    await until(partial(is_waiting, prompt, path))
+                else:
+                    await until(partial(is_waiting, prompt))
+                await loop.passed(LIMIT_S)
                 code, told = await refusal(made)
                 assert code is grpc.StatusCode.INVALID_ARGUMENT
                 assert words in told
@@ -111,26 +132,31 @@ def test_a_stream_of_requests_goes_on_as_long_as_they_come(name: str) -> None:
                 whole = open_stream(iter([b"a", b"b"]), timeout=PATIENCE_S)
                 assert b"".join([each async for each in whole]) == b"ab"
 
-    asyncio.run(run())
+    on_held_time(test)
 
 
 def test_streams_that_nothing_is_said_of_are_left_alone() -> None:
-    async def run() -> None:
-        async with small_server(interceptors=[PromptRequests(LIMIT_S)], setup=with_all_kinds) as (channel, _):
+    async def test(loop: HeldLoop) -> None:
+        prompt = PromptRequests(LIMIT_S)
+        async with small_server(interceptors=[prompt], setup=with_all_kinds) as (channel, _):
             quiet, other = silent(channel, "Both"), silent(channel, "Unary")
+            await until(lambda: waits(prompt) == 1)
+            await loop.passed(LIMIT_S)
             await refusal(other)
             await quiet.write(b"at last")
             assert await quiet.read() == b"at last"
 
-    asyncio.run(run())
+    on_held_time(test)
 
 
 def test_the_wait_is_for_the_request_alone() -> None:
     """What is done with a request may take as long as it likes, and a caller may go at any time."""
     goes_on = asyncio.Event()
+    begun: list[str] = []
     cancelled: list[str] = []
 
     async def slow(request: bytes, context: Any) -> bytes:
+        begun.append(request.decode())
         try:
             await goes_on.wait()
         except asyncio.CancelledError:
@@ -138,21 +164,23 @@ def test_the_wait_is_for_the_request_alone() -> None:
             raise
         return request
 
-    async def run() -> None:
-        async with small_server(interceptors=[PromptRequests(LIMIT_S)], unary=slow) as (channel, _):
+    async def test(loop: HeldLoop) -> None:
+        prompt = PromptRequests(LIMIT_S)
+        async with small_server(interceptors=[prompt], unary=slow) as (channel, _):
             made: Any = channel.unary_unary(f"/{SERVICE}/Unary")
             stays, goes = made(b"stays", timeout=PATIENCE_S), made(b"goes", timeout=PATIENCE_S)
             late: Any = channel.stream_unary(f"/{SERVICE}/Unary")(timeout=PATIENCE_S)
+            await until(lambda: len(begun) == 2 and waits(prompt) == 1)
+            await loop.passed(LIMIT_S)
             assert await late.code() is grpc.StatusCode.INVALID_ARGUMENT
             goes.cancel()
-            while not cancelled:
-                await asyncio.sleep(0.01)
+            await until(lambda: bool(cancelled))
             assert cancelled == ["goes"]
             goes_on.set()
             assert await stays == b"stays"
             assert (await call(channel, b"x")).answer == b"x"
 
-    asyncio.run(run())
+    on_held_time(test)
 
 
 def test_who_cancels_at_the_same_moment_is_obeyed() -> None:
@@ -174,13 +202,19 @@ def test_who_cancels_at_the_same_moment_is_obeyed() -> None:
 
 
 def test_those_that_begin_while_others_wait_are_looked_for_later() -> None:
-    async def run() -> None:
-        async with small_server(interceptors=[PromptRequests(LIMIT_S)], setup=with_all_kinds) as (channel, _):
+    async def test(loop: HeldLoop) -> None:
+        prompt = PromptRequests(LIMIT_S)
+        async with small_server(interceptors=[prompt], setup=with_all_kinds) as (channel, _):
             made = []
-            for _ in range(4):
+            for number in range(1, 4):
                 made.append(silent(channel, "Unary"))
-                await asyncio.sleep(LIMIT_S / 3)
+                await until(partial(is_waiting, prompt, count=number))
+                await loop.passed(LIMIT_S / 4)
+            assert waits(prompt) == 3
+            for left in (2, 1, 0):
+                await loop.passed(LIMIT_S / 4)
+                assert waits(prompt) == left
             for each in made:
                 assert (await refusal(each))[0] is grpc.StatusCode.INVALID_ARGUMENT
 
-    asyncio.run(run())
+    on_held_time(test)

@@ -7,7 +7,8 @@ import sys
 from pathlib import Path
 
 from support.models import EXAMPLES
-from support.service import PATIENCE_S, served
+from support.service import served
+from support.waiting import PATIENCE_S
 
 PAGE = (Path(__file__).parents[2] / "docs" / "client.md").read_text()
 _ADDRESS = '"localhost:50051"'

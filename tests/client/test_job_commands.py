@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 import tty
 from fractions import Fraction
 from pathlib import Path
@@ -37,7 +36,8 @@ from support.answers import (
 )
 from support.client_commands import FINDING, MADE, MODEL, NOTHING, SUCCEEDED, job_answers, run
 from support.models import bundle_of
-from support.scripted_service import PATIENCE_S, Refusal, scripted
+from support.scripted_service import Refusal, scripted
+from support.waiting import PATIENCE_S
 
 
 class TestSubmit:
@@ -199,13 +199,15 @@ class TestWatch:
         """And it is markup to nobody, and gone at the end."""
         told = [job(number, progress=pb.Progress(stage="check", message=f"[bold]step {number}")) for number in (1, 2)]
 
-        def slowly(context: grpc.ServicerContext) -> Any:
-            for item in watched(*told, job(3, SUCCEEDED)):
-                yield item
-                time.sleep(0.3)
+        is_shown = threading.Event()
+
+        def until_shown(context: grpc.ServicerContext) -> Any:
+            yield from watched(*told)
+            assert is_shown.wait(PATIENCE_S)
+            yield from watched(job(3, SUCCEEDED))
 
         main_end, other_end = os.openpty()
-        with scripted(WatchJob=[[slowly]]) as (address, _):
+        with scripted(WatchJob=[[until_shown]]) as (address, _):
             command = [sys.executable, "-m", "robosc_client.main", "watch", "job-1", "--server", address]
             process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=other_end, text=True)
             os.close(other_end)
@@ -213,6 +215,8 @@ class TestWatch:
             try:
                 while part := os.read(main_end, 4096):
                     shown += part
+                    if b"[bold]step 2" in shown:
+                        is_shown.set()
             except OSError:  # Linux's way to tell that nobody has the other end any more.
                 pass
             os.close(main_end)

@@ -2,6 +2,7 @@
 
 import io
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -23,6 +24,7 @@ from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.main import main as robosc_client
 from support.answers import exploration, job, supervisor, synthesis, verification
+from support.background import has_ended
 from support.certificates import Authority
 from support.fake_tasks import TASK_FUNCTION
 from support.health_servers import answering
@@ -31,7 +33,8 @@ from support.models import EXAMPLE_DEPLOYMENTS, UNSUPPORTED
 from support.models import EXAMPLES as EXAMPLES_FOLDER
 from support.mutants import change
 from support.scripted_service import scripted
-from support.service import PATIENCE_S, eventually, is_running, logged_server_process, served, server_process
+from support.service import logged_server_process, served, server_process
+from support.waiting import PATIENCE_S, eventually
 
 EXAMPLES = sorted(EXAMPLES_FOLDER.glob("*/*.rscd"))
 NAVIGATION = EXAMPLES_FOLDER / "navigation" / "navigation.rscd"
@@ -99,10 +102,6 @@ library Parts {
     }
 }
 """
-
-
-def has_ended(pid: int) -> bool:
-    return not is_running(pid)
 
 
 @pytest.fixture(scope="module")
@@ -630,13 +629,18 @@ class TestPrograms:
         ],
         ids=" ".join,
     )
-    def test_interrupted_client(self, tmp_path: Path, command: Any) -> None:
+    def test_interrupted_client(self, tmp_path: Path, capfd: pytest.CaptureFixture[str], command: Any) -> None:
+        """In this process; `test_command` has programs that are interrupted at other moments."""
         begun, ended = threading.Event(), threading.Event()
 
         def stuck(context: Any) -> None:
             context.add_callback(ended.set)
             begun.set()
             ended.wait(PATIENCE_S)
+
+        def interrupt() -> None:
+            if begun.wait(PATIENCE_S):
+                os.kill(os.getpid(), signal.SIGINT)
 
         model = write(tmp_path, "robot R { }")
         services = (
@@ -645,15 +649,13 @@ class TestPrograms:
         )
         answers = {method.name: [[stuck]] for service in services for method in service.methods}
         with scripted(**answers) as (address, _):
-            given = [str(model) if word == "MODEL" else word for word in command]
-            words = ["-m", "robosc_client.command", *given, "--server", address]
-            with subprocess.Popen(
-                [sys.executable, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-            ) as process:
-                assert begun.wait(PATIENCE_S)
-                process.send_signal(signal.SIGINT)
-                output, error = process.communicate(timeout=PATIENCE_S)
-            assert (process.returncode, output, error) == (130, "", "robosc-client: interrupted\n")
+            words = [str(model) if word == "MODEL" else word for word in command]
+            interrupting = threading.Thread(target=interrupt)
+            interrupting.start()
+            status = robosc_client([*words, "--server", address])
+            interrupting.join()
+            printed = capfd.readouterr()
+            assert (status, printed.out, printed.err) == (130, "", "robosc-client: interrupted\n")
             assert ended.wait(PATIENCE_S)
 
     @pytest.mark.parametrize("json", [[], ["--json"]])

@@ -17,7 +17,8 @@ from robosc_client.main import make_parser
 from robosc_client.profiles import Profile, add_profile, profiles_file, read_profiles
 from support.certificates import Authority
 from support.client_commands import run
-from support.scripted_service import PATIENCE_S, scripted
+from support.scripted_service import scripted
+from support.waiting import PATIENCE_S
 
 
 @pytest.fixture(autouse=True)

@@ -17,9 +17,10 @@ from robosc import __version__
 from robosc_lsp import synthesizer
 from robosc_lsp.outcome import Asked
 from robosc_lsp.server import make_server
-from support.background import children_of, eventually, has_ended, is_running
+from support.background import children_of, has_ended, is_running
 from support.editor import LIMIT_S, Editor, ProcessEditor
 from support.hostile_models import bounded_products, products
+from support.waiting import eventually
 
 COMMAND = (sys.executable, "-m", "robosc_lsp.command")
 

@@ -1,7 +1,6 @@
 """Where tasks of calls get their results: what is counted, and what is not done twice."""
 
 import asyncio
-from collections.abc import Coroutine
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +13,9 @@ from robosc_server.jobs import QueueLimits
 from robosc_server.operations.metrics import Metrics
 from robosc_server.operations.quotas import Quotas
 from robosc_server.tasks.task import Reason, Report, Result, TaskLimits
-from support.job_parts import PATIENCE_S, Choices, Parts, parts
+from support.job_parts import Choices, Parts, parts
 from support.job_workers import task_of
+from support.waiting import limited, until
 
 
 class OneToken:
@@ -35,17 +35,12 @@ async def drop(report: Report) -> None:
     """Nobody watches."""
 
 
-def limited(test: Coroutine[Any, Any, None]) -> None:
-    asyncio.run(asyncio.wait_for(test, PATIENCE_S))
-
-
 def test_equal_calls_that_wait_are_answered_by_the_first(tmp_path: Path) -> None:
     async def test() -> None:
         async with parts(tmp_path, Choices(capacity=1)) as made:
             desk, task = desk_of(made), task_of(f"until {tmp_path / 'go'}\nthe same")
             calls = [asyncio.create_task(desk.result(task, "me", drop)) for _ in range(3)]
-            while made.scheduler.waiting < 2:
-                await asyncio.sleep(0.001)
+            await until(lambda: made.scheduler.waiting == 2)
             (tmp_path / "go").touch()
             results = await asyncio.gather(*calls)
             assert len(made.workers.begun) == 1
@@ -66,8 +61,7 @@ def test_what_is_refused_since_there_is_too_much_to_do_is_not_counted(tmp_path: 
                 return asyncio.create_task(desk.result(task_of(f"until {tmp_path / 'go'}\n{number}"), "me", drop))
 
             under_way = [call(0), call(1)]
-            while made.scheduler.waiting < 1:
-                await asyncio.sleep(0.001)
+            await until(lambda: made.scheduler.waiting == 1)
             for number in range(2, 7):
                 with pytest.raises(RefusedError) as refused:
                     await call(number)

@@ -15,9 +15,10 @@ from robosc_api.v1 import jobs_pb2, synthesis_pb2, synthesis_pb2_grpc
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server import application
 from robosc_server.tasks.requests import RequestLimits
-from support.fake_tasks import TASK_FUNCTION as FAKE
-from support.service import PATIENCE_S, eventually, served
+from support.job_workers import StartedWorkers
+from support.service import served
 from support.strangers import END_OF_HEADERS, END_OF_STREAM, SETTINGS, strangers
+from support.waiting import PATIENCE_S, eventually
 
 STUB: Any = synthesis_pb2_grpc.SynthesisServiceStub
 MAXIMUM_CONCURRENT_STREAMS = 3
@@ -33,12 +34,12 @@ UNKNOWN_FIELD = b"\x98\x06\x01"
 
 @pytest.fixture(scope="module")
 def quick() -> Iterator[str]:
-    with served(FAKE) as address:
+    with served(given_workers=StartedWorkers()) as address:
         yield address
 
 
 def test_whatever_is_called_the_request_comes_in_time() -> None:
-    with served(FAKE, request_seconds=0.3) as address, strangers(address, 1) as (stranger,):
+    with served(given_workers=StartedWorkers(), request_seconds=0.3) as address, strangers(address, 1) as (stranger,):
         for place, method in enumerate(METHODS):
             stranger.call(2 * place + 1, method)
         assert eventually(lambda: stranger.ended == len(METHODS))
@@ -50,7 +51,7 @@ def test_whatever_is_called_the_request_comes_in_time() -> None:
 
 def test_reflection_is_not_left_open(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(application, "_REFLECTION_IDLE_S", 0.3)
-    with served(FAKE) as address, strangers(address, 1) as (stranger,):
+    with served(given_workers=StartedWorkers()) as address, strangers(address, 1) as (stranger,):
         stranger.call(1, REFLECTION_METHODS[-1])
         stranger.message(1, reflection_pb2.ServerReflectionRequest(list_services="").SerializeToString())
         assert eventually(lambda: stranger.was_told(b"each further one within 0.3"))
@@ -58,7 +59,7 @@ def test_reflection_is_not_left_open(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_connections_without_a_word_are_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(application, "_HANDSHAKE_LIMIT_S", 0.3)
-    with served(FAKE) as address:
+    with served(given_workers=StartedWorkers()) as address:
         host, _, port = address.rpartition(":")
         with socket.create_connection((host, int(port)), PATIENCE_S) as line:
             while line.recv(1024):
@@ -67,12 +68,15 @@ def test_connections_without_a_word_are_ended(monkeypatch: pytest.MonkeyPatch) -
 
 def test_connections_without_a_call_are_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(application, "_IDLE_S", 0.3)
-    with served(FAKE) as address, strangers(address, 1) as (stranger,):
+    with served(given_workers=StartedWorkers()) as address, strangers(address, 1) as (stranger,):
         assert eventually(lambda: not stranger.is_open)
 
 
 def test_calls_of_one_connection_and_their_metadata_are_bounded() -> None:
-    with served(FAKE, open_calls_per_caller=7) as address, strangers(address, 1) as (stranger,):
+    with (
+        served(given_workers=StartedWorkers(), open_calls_per_caller=7) as address,
+        strangers(address, 1) as (stranger,),
+    ):
         assert eventually(lambda: any(kind == SETTINGS and not flags for kind, flags, _ in stranger.frames))
         told = next(content for kind, flags, content in stranger.frames if kind == SETTINGS and not flags)
         settings = {struct.unpack_from(">HI", told, at) for at in range(0, len(told), 6)}
@@ -86,7 +90,10 @@ def test_calls_of_one_connection_and_their_metadata_are_bounded() -> None:
 
 def test_a_request_that_is_too_large_is_refused_with_a_reason() -> None:
     limits = RequestLimits(bundle_bytes=1000)
-    with served(FAKE, bundle_bytes=1000) as address, grpc.insecure_channel(address) as channel:
+    with (
+        served(given_workers=StartedWorkers(), bundle_bytes=1000) as address,
+        grpc.insecure_channel(address) as channel,
+    ):
 
         def refusal(size: int, submits: bool) -> tuple[Any, str]:
             check = pb.CheckRequest(bundle=pb.Bundle(main=pb.SourceFile(name="robot.rscd", text="x" * size)))

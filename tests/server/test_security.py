@@ -32,7 +32,8 @@ from robosc_server.tasks.task import Outcome, Result, Task, TaskLimits
 from robosc_server.workers import OnReport, OnSpent, uncounted
 from support.certificates import Authority
 from support.job_workers import task_message
-from support.service import PATIENCE_S, bundle_of, secured, served, server_process
+from support.service import bundle_of, secured, served, server_process
+from support.waiting import PATIENCE_S
 
 
 class Quick:

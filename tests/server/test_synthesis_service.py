@@ -1,8 +1,9 @@
 """The synthesis service over real sockets, with tasks that behave as their text says."""
 
+import os
+import signal
 import socket
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
@@ -21,9 +22,16 @@ from robosc_api.v1 import synthesis_pb2_grpc
 from robosc_server import application
 from robosc_server.application import StartError
 from robosc_server.main import main
+from robosc_server.synthesis_service import PATIENCE_S as PAUSE_S
+from robosc_server.synthesis_service import _Progress, progress_message
+from robosc_server.tasks.task import Report
+from support.background import is_running, is_stopped
 from support.fake_tasks import TASK_FUNCTION as FAKE
-from support.service import PATIENCE_S, eventually, is_running, served
+from support.held_time import HeldLoop, on_held_time
+from support.job_workers import StartedWorkers
+from support.service import served
 from support.strangers import strangers
+from support.waiting import PATIENCE_S, eventually
 
 INITIAL_WINDOW = 4
 """HTTP/2's setting of that name, by its number."""
@@ -70,6 +78,19 @@ def stuck(channel: Any, text: str = "pid\nstuck", timeout: float | None = None) 
     """A synthesis that has begun and never ends, and its worker's process."""
     call = STUB(channel).Synthesize(pb.SynthesizeRequest(bundle=bundle(text)), timeout=timeout)
     return call, int(next(call).progress.message)
+
+
+def goes_on(pid: int) -> None:
+    """Have a worker's process go on that rests, or is about to."""
+    assert eventually(partial(is_stopped, pid))
+    os.kill(pid, signal.SIGCONT)
+
+
+@pytest.fixture(scope="module")
+def one() -> Iterator[Any]:
+    """A server with one worker."""
+    with served(FAKE) as address, grpc.insecure_channel(address) as channel:
+        yield channel
 
 
 class TestStandardServices:
@@ -128,21 +149,53 @@ class TestRequests:
 
 class TestWork:
     def test_reports_come_in_order_and_one_result_ends_them(self, fake: Any) -> None:
-        request = pb.SynthesizeRequest(bundle=bundle("reports 20\nsleep 1\necho because"))
-        responses = list(STUB(fake).Synthesize(request, timeout=PATIENCE_S))
-        told = [int(response.progress.message.removeprefix("step ")) for response in responses[:-1]]
+        request = pb.SynthesizeRequest(bundle=bundle("pid\nstop\nreports 20\nstop\necho because"))
+        call = STUB(fake).Synthesize(request, timeout=PATIENCE_S)
+        pid = int(next(call).progress.message)
+        goes_on(pid)
+        told: list[int] = []
         # What is newest is told in any case, and nothing is told after what is newer.
-        assert told == sorted(set(told)) and told[-1] == 19
-        assert responses[-1].result.reason == "because"
+        for response in call:
+            told.append(int(response.progress.message.removeprefix("step ")))
+            if told[-1] == 19:
+                break
+        assert told == sorted(set(told))
+        goes_on(pid)
+        (last,) = call
+        assert last.result.reason == "because"
 
-    def test_nobody_is_told_of_work_more_often_than_is_of_use(self, fake: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr("robosc_server.synthesis_service.PATIENCE_S", 0.4)
-        request = pb.SynthesizeRequest(bundle=bundle("sleep 0.5\nreports 300\nsleep 0.5\necho done"))
-        begun_s = time.monotonic()
-        responses = list(STUB(fake).Synthesize(request, timeout=PATIENCE_S))
-        took_s = time.monotonic() - begun_s
-        assert responses[-1].result.reason == "done"
-        assert 1 <= len(responses) - 1 <= took_s / 0.4
+    def test_nobody_is_told_of_work_more_often_than_is_of_use(self) -> None:
+        told: list[bytes] = []
+
+        class Context:
+            async def write(self, message: bytes) -> None:
+                told.append(message)
+
+        def report(number: int) -> Report:
+            return Report("synthesis", f"step {number}")
+
+        async def test(loop: HeldLoop) -> None:
+            context: Any = Context()
+            async with _Progress(context) as progress:
+                for number in range(100):
+                    await progress.tell(report(number))
+                await loop.passed(PAUSE_S / 2)
+                assert told == []
+                await loop.passed(PAUSE_S / 2)
+                assert told == [progress_message(report(99))]
+                await progress.tell(report(100))
+                await progress.tell(report(101))
+                await loop.passed(PAUSE_S / 2)
+                assert len(told) == 1
+                await loop.passed(PAUSE_S / 2)
+                assert told[1:] == [progress_message(report(101))]
+                # After a while without a word, the next one is told at once.
+                await loop.passed(10.0)
+                await progress.tell(report(102))
+                await loop.passed(0.0)
+                assert told[2:] == [progress_message(report(102))]
+
+        on_held_time(test)
 
     def test_what_is_done_at_once_tells_nothing_of_its_progress(
         self, fake: Any, monkeypatch: pytest.MonkeyPatch
@@ -153,8 +206,11 @@ class TestWork:
         assert response.result.reason == "silence"
 
     def test_an_equal_request_is_not_done_again(self, fake: Any) -> None:
-        request = pb.SynthesizeRequest(bundle=bundle("pid\nsleep 1\necho once"))
-        first = list(STUB(fake).Synthesize(request, timeout=PATIENCE_S))
+        request = pb.SynthesizeRequest(bundle=bundle("pid\nstop\necho once"))
+        call = STUB(fake).Synthesize(request, timeout=PATIENCE_S)
+        first = [next(call)]
+        goes_on(int(first[0].progress.message))
+        first += call
         again = list(STUB(fake).Synthesize(request, timeout=PATIENCE_S))
         assert [response.WhichOneof("event") for response in first] == ["progress", "result"]
         assert again == first[1:]
@@ -180,27 +236,42 @@ class TestWork:
 
 
 class TestEnding:
-    @pytest.mark.parametrize("text", ["pid\nstuck", "pid\nspin", "pid\nstop"])
-    def test_cancelling_kills_the_worker_and_frees_its_place(self, record_property: Any, text: str) -> None:
-        with served(FAKE) as address, grpc.insecure_channel(address) as channel:
-            for _ in range(3):
-                call, pid = stuck(channel, text)
-                begun = time.monotonic()
-                call.cancel()
-                assert eventually(partial(has_ended, pid))
-                record_property(f"worker gone after a cancel ({text.split()[1]})", f"{time.monotonic() - begun:.3f} s")
-            assert check(channel, "echo free") == "free"
+    def test_cancelling_kills_the_worker_and_frees_its_place(self, one: Any) -> None:
+        for text in ("pid\nstuck", "pid\nspin", "pid\nstop"):
+            call, pid = stuck(one, text)
+            call.cancel()
+            assert eventually(partial(has_ended, pid))
+        assert check(one, "echo free") == "free"
 
     def test_the_callers_deadline_kills_the_worker(self, fake: Any) -> None:
-        call, pid = stuck(fake, timeout=2.0)
-        with pytest.raises(grpc.RpcError) as caught:
-            next(call)
-        assert caught.value.code() is grpc.StatusCode.DEADLINE_EXCEEDED
-        assert eventually(partial(has_ended, pid))
+        pids: list[int] = []
+
+        def passes(timeout_s: float) -> None:
+            with pytest.raises(grpc.RpcError) as caught:
+                call, pid = stuck(fake, timeout=timeout_s)
+                pids.append(pid)
+                next(call)
+            assert caught.value.code() is grpc.StatusCode.DEADLINE_EXCEEDED
+
+        # Long enough for a task to begin: on this machine, now, that shows.
+        timeout_s = 0.3
+        while not pids:
+            passes(timeout_s)
+            timeout_s *= 2
+        assert eventually(partial(has_ended, pids[0]))
 
     def test_the_servers_own_limit(self) -> None:
-        with served(FAKE, task_seconds=1.0) as address, grpc.insecure_channel(address) as channel:
-            reason, _, error = refusal(partial(check, channel, "stuck"))
+        loop = HeldLoop()
+        limits = {"task_seconds": 500.0, "request_seconds": 1e8}
+        with served(FAKE, loop=loop, **limits) as address, grpc.insecure_channel(address) as channel:
+            call = STUB(channel).Check.future(pb.CheckRequest(bundle=bundle("stuck")), timeout=PATIENCE_S)
+
+            def is_over() -> bool:
+                loop.advance(500.0)
+                return bool(call.done())
+
+            assert eventually(is_over)
+            reason, _, error = refusal(call.result)
             assert (reason, error.code()) == ("TIME_LIMIT", grpc.StatusCode.DEADLINE_EXCEEDED)
 
     def test_too_many_that_wait_are_refused_and_told_when_to_come_again(self) -> None:
@@ -225,12 +296,11 @@ class TestEnding:
             call.cancel()
             assert waiting.result().diagnostics[0].message == "first"
 
-    def test_who_does_not_read_holds_no_worker_up(self) -> None:
-        with served(FAKE) as address, grpc.insecure_channel(address) as channel:
-            # Far more than fits on the way; nobody reads it.
-            unread = STUB(channel).Synthesize(pb.SynthesizeRequest(bundle=bundle("long reports 900\necho done")))
-            assert check(channel, "echo others") == "others"
-            unread.cancel()
+    def test_who_does_not_read_holds_no_worker_up(self, one: Any) -> None:
+        # Far more than fits on the way; nobody reads it.
+        unread = STUB(one).Synthesize(pb.SynthesizeRequest(bundle=bundle("long reports 900\necho done")))
+        assert check(one, "echo others") == "others"
+        unread.cancel()
 
     def test_who_reads_no_results_gets_no_more_of_them(self) -> None:
         # Frames that nobody takes stop the server's end of the connection at this much.
@@ -324,13 +394,13 @@ class TestStopping:
         with ExitStack() as server:
             address = server.enter_context(served(FAKE, worker_processes=2, drain_seconds=PATIENCE_S))
             channel: Any = server.enter_context(grpc.insecure_channel(address))
-            begun = STUB(channel).Synthesize(pb.SynthesizeRequest(bundle=bundle("pid\nsleep 2\necho done")))
-            next(begun)
+            begun = STUB(channel).Synthesize(pb.SynthesizeRequest(bundle=bundle("pid\nstop\necho done")))
+            first = int(next(begun).progress.message)
             ending = threading.Thread(target=server.pop_all().close)
             # The channel is closed first: this one is another.
             with grpc.insecure_channel(address) as other:
-                call = STUB(other).Synthesize(pb.SynthesizeRequest(bundle=bundle("pid\nsleep 3\necho done too")))
-                next(call)
+                call = STUB(other).Synthesize(pb.SynthesizeRequest(bundle=bundle("pid\nstop\necho done too")))
+                second = int(next(call).progress.message)
                 ending.start()
                 refused: list[str] = []
 
@@ -343,6 +413,9 @@ class TestStopping:
 
                 assert eventually(is_refused)
                 assert refused == ["UNAVAILABLE"]
+                # The channel of the first one is gone, and so is it.
+                assert eventually(partial(has_ended, first))
+                goes_on(second)
                 assert [response.result.reason for response in call] == ["done too"]
             ending.join(PATIENCE_S)
             assert not ending.is_alive()
@@ -355,9 +428,9 @@ class TestStopping:
 
 class TestStart:
     def test_port_in_use(self) -> None:
-        with served(FAKE) as address:
+        with served(given_workers=StartedWorkers()) as address:
             port = int(address.rsplit(":", 1)[1])
-            with pytest.raises(StartError, match=str(port)), served(FAKE, port=port):
+            with pytest.raises(StartError, match=str(port)), served(given_workers=StartedWorkers(), port=port):
                 pass
 
     @pytest.mark.parametrize(

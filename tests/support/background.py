@@ -4,21 +4,26 @@ import asyncio
 import contextlib
 import os
 import threading
-import time
-from collections.abc import Callable, Coroutine
+from collections.abc import Coroutine
 from concurrent.futures import Future
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-_PATIENCE_S = 60.0
+from support.waiting import PATIENCE_S
 
 
 class BackgroundLoop:
-    """Runs coroutines while the test does something else; a context."""
+    """Runs coroutines while the test does something else; a context.
+
+    Args:
+        loop: Such as a `HeldLoop`; None: a new one.
+    """
+
+    def __init__(self, loop: asyncio.AbstractEventLoop | None = None) -> None:
+        self._loop = loop or asyncio.new_event_loop()
 
     def __enter__(self) -> Self:
-        self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever)
         self._thread.start()
         return self
@@ -27,7 +32,7 @@ class BackgroundLoop:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join(_PATIENCE_S)
+        self._thread.join(PATIENCE_S)
         self._loop.close()
 
     def start[T](self, work: Coroutine[Any, Any, T]) -> Future[T]:
@@ -36,17 +41,7 @@ class BackgroundLoop:
 
     def run[T](self, work: Coroutine[Any, Any, T]) -> T:
         """What a piece of work gives."""
-        return self.start(work).result(_PATIENCE_S)
-
-
-def eventually(condition: Callable[[], bool]) -> bool:
-    """Whether a condition becomes true; asks often, and long enough for a slow machine."""
-    end = time.monotonic() + _PATIENCE_S
-    while time.monotonic() < end:
-        if condition():
-            return True
-        time.sleep(0.005)
-    return False
+        return self.start(work).result(PATIENCE_S)
 
 
 def is_running(pid: int) -> bool:

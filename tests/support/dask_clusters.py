@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from support.background import eventually
+from support.waiting import eventually
 
 _END_S = 20.0
 

@@ -4,17 +4,45 @@ Without ROBOSC_EFFORT the examples are always the same ones, whatever else the p
 are that many times as many, and others for each ROBOSC_SEED: `make soak`.
 """
 
+import math
 import os
+from collections.abc import Mapping
 from unittest.mock import patch
 
 import hypothesis
 from hypothesis.internal.conjecture import providers
 
-EFFORT = float(os.environ.get("ROBOSC_EFFORT", "0"))
-"""Examples for each one of `make test`; 0: those of `make test` itself."""
 
-SEED = int(os.environ.get("ROBOSC_SEED", "0"))
-"""First seed of tests that go through seeds one by one."""
+def effort_of(variables: Mapping[str, str]) -> tuple[float, int]:
+    """The effort and the seed that an environment asks for; an effort of 0 where it asks for none.
+
+    Raises:
+        ValueError: It asks for what cannot be; one sentence.
+    """
+    effort, seed = variables.get("ROBOSC_EFFORT"), variables.get("ROBOSC_SEED", "0")
+    try:
+        number = 0.0 if effort is None else float(effort)
+    except ValueError:
+        number = math.nan
+    # Fewer examples than those of `make test` would pass for a run of it.
+    if effort is not None and not 1 <= number < math.inf:
+        raise ValueError(f"ROBOSC_EFFORT is how many times the examples are tried, at least 1; it is {effort!r}")
+    try:
+        return number, int(seed)
+    except ValueError:
+        raise ValueError(f"ROBOSC_SEED is a whole number; it is {seed!r}") from None
+
+
+def _asked() -> tuple[float, int, str]:
+    try:
+        return *effort_of(os.environ), ""
+    except ValueError as error:
+        return 0.0, 0, str(error)
+
+
+EFFORT, SEED, WRONG = _asked()
+"""Examples for each one of `make test` (0: those of `make test` itself); the first seed of tests that go through seeds
+one by one; and why nothing is to be run, in one sentence, or nothing."""
 
 
 def examples(number: int) -> int:

@@ -50,6 +50,9 @@ __all__ = ["TASK_FUNCTION", "fake_task", "rehearse", "run_task", "said"]
 
 TASK_FUNCTION = "support.fake_tasks:run_task"
 
+# A worker may read its programs; all that is in them is for tasks that do something.
+PRELOADED, NOT_PRELOADED = ("robosc",), ("robosc.",)
+
 _REQUESTS: dict[TaskKind, Any] = {
     TaskKind.CHECK: pb.CheckRequest,
     TaskKind.SYNTHESIZE: pb.SynthesizeRequest,

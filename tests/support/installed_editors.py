@@ -27,7 +27,8 @@ from typing import Any
 
 import msgspec
 
-from support.background import eventually, has_ended
+from support.background import has_ended
+from support.waiting import eventually
 
 ROOT = Path(__file__).parents[2]
 MANUAL = ROOT / "docs" / "editors.md"

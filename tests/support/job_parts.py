@@ -1,8 +1,7 @@
 """The parts of a server that have to do with jobs, put together in this process, with scripted workers."""
 
 import asyncio
-import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
+from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -31,9 +30,7 @@ from robosc_server.operations.metrics import Metrics
 from robosc_server.store import JobRecord, JobState, Store, open_store
 from robosc_server.tasks.task import TaskLimits
 from support.job_workers import ScriptedWorkers, accepted
-
-PATIENCE_S = 60.0
-"""How long a test waits for what must happen; only a failing test waits so long."""
+from support.waiting import PATIENCE_S
 
 ME = Caller("me")
 
@@ -128,14 +125,6 @@ async def ended(manager: JobManager, job_id: str, caller: Caller = ME) -> JobRec
             if record.state.has_ended:
                 return record
     raise AssertionError("it never ended")
-
-
-async def until(condition: Callable[[], Awaitable[bool]]) -> None:
-    """Wait until a condition holds."""
-    end_s = time.monotonic() + PATIENCE_S
-    while not await condition():
-        assert time.monotonic() < end_s, "it never came true"
-        await asyncio.sleep(0.005)
 
 
 async def has_begun(made: Parts, job_id: str, tasks: int = 1) -> bool:

@@ -13,31 +13,16 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from robosc_server.application import running_server
 from robosc_server.operations.logs import set_up_logs
 from robosc_server.operations.settings import Settings
 from robosc_server.workers.local import LocalWorkers
 from support.fake_tasks import TASK_FUNCTION
-from support.job_workers import ScriptedWorkers
+from support.job_workers import StartedWorkers
 
 _PREFIX = "listening on "
-
-
-class StartedWorkers(ScriptedWorkers):
-    """Scripted workers that a server starts."""
-
-    restarts = 0
-
-    async def __aenter__(self) -> Self:
-        return self
-
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        pass
 
 
 async def serve(folder: str, url: str, workers: str) -> None:

@@ -8,6 +8,8 @@ seconds of a processor's time; `lose` takes what starts workers with it. Without
 import asyncio
 import hashlib
 from pathlib import Path
+from types import TracebackType
+from typing import Self
 
 from robosc_api.v1 import jobs_pb2 as jobs
 from robosc_api.v1 import synthesis_pb2 as pb
@@ -73,6 +75,20 @@ class ScriptedWorkers:
                 case ["fault"]:
                     raise ZeroDivisionError
         return Result(messages_for(kind, text, size))
+
+
+class StartedWorkers(ScriptedWorkers):
+    """Scripted workers that a server starts."""
+
+    restarts = 0
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        pass
 
 
 def main_text(request: bytes) -> str:

@@ -13,9 +13,7 @@ from google.protobuf.message_factory import GetMessageClass
 from google.rpc import error_details_pb2, status_pb2
 
 from robosc_api.v1 import jobs_pb2, synthesis_pb2
-
-PATIENCE_S = 60.0
-"""How long a test waits for what must happen; only a failing test waits so long."""
+from support.waiting import PATIENCE_S
 
 _SERVICES = (
     synthesis_pb2.DESCRIPTOR.services_by_name["SynthesisService"],
@@ -62,6 +60,14 @@ def _packed(message: Any) -> any_pb2.Any:
 
 type Step = Any
 """A message of the answer (bytes: as they are), a Refusal, or a function that is called with the call's context."""
+
+
+def held(context: grpc.ServicerContext) -> Iterator[Any]:
+    """A step that ends when its caller is gone."""
+    is_over = threading.Event()
+    if context.add_callback(is_over.set):
+        is_over.wait(PATIENCE_S)
+    yield from ()
 
 
 @dataclass

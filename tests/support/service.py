@@ -8,8 +8,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -21,18 +20,25 @@ from robosc_api.security import ServerSecurity
 from robosc_server.application import running_server
 from robosc_server.operations.settings import Settings
 from robosc_server.workers.local import TASK_FUNCTION, LocalWorkers
-
-PATIENCE_S = 60.0
-"""How long a test waits for what must happen; only a failing test waits so long."""
+from support.waiting import PATIENCE_S
 
 
 @contextmanager
-def served(task_function: str = TASK_FUNCTION, /, *, given_workers: Any = None, **settings: Any) -> Iterator[str]:
+def served(
+    task_function: str = TASK_FUNCTION,
+    /,
+    *,
+    given_workers: Any = None,
+    loop: asyncio.AbstractEventLoop | None = None,
+    **settings: Any,
+) -> Iterator[str]:
     """A server in a thread of this process; yields its address.
 
     Args:
         task_function: What does the tasks, such as `fake_tasks.TASK_FUNCTION`.
-        given_workers: Who does the tasks instead, not started yet; None: processes of this machine.
+        given_workers: Who does the tasks instead, not started yet; None: processes of this machine, which take most of
+            the time until it serves.
+        loop: What it runs on, such as a `HeldLoop`; None: a new one.
         **settings: Those that are not as usual.
     """
     # Its log goes where pytest hears it, and not to whatever was standard output when the first line was written.
@@ -41,7 +47,7 @@ def served(task_function: str = TASK_FUNCTION, /, *, given_workers: Any = None, 
         usual: dict[str, Any] = {"port": 0, "worker_processes": 1, "state_dir": Path(folder), "drain_seconds": 0.5}
         chosen = Settings(**(usual | settings))
         workers = given_workers or LocalWorkers(chosen.worker_processes, task_function)
-        with _served(chosen, workers) as address:
+        with _served(chosen, workers, loop or asyncio.new_event_loop()) as address:
             yield address
 
 
@@ -57,11 +63,10 @@ def secured(security: ServerSecurity) -> dict[str, Any]:
 
 
 @contextmanager
-def _served(chosen: Settings, workers: Any) -> Iterator[str]:
+def _served(chosen: Settings, workers: Any, loop: asyncio.AbstractEventLoop) -> Iterator[str]:
     address: list[str] = []
     failure: list[BaseException] = []
     ready = threading.Event()
-    loop = asyncio.new_event_loop()
     stop = asyncio.Event()
 
     async def run() -> None:
@@ -139,25 +144,6 @@ def logged_server_process(
                 reader.join(PATIENCE_S)
                 process.stdout.close()
                 process.stderr.close()
-
-
-def eventually(condition: Callable[[], bool]) -> bool:
-    """Whether a condition becomes true; asks often, and long enough for a slow machine."""
-    end = time.monotonic() + PATIENCE_S
-    while time.monotonic() < end:
-        if condition():
-            return True
-        time.sleep(0.005)
-    return False
-
-
-def is_running(pid: int) -> bool:
-    """Whether there is a process of that number."""
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    return True
 
 
 def bundle_of(text: str, name: str = "robot.rscd", **libraries: str) -> Bundle:

@@ -14,9 +14,9 @@ from google.rpc import error_details_pb2, status_pb2
 
 from robosc_server.operations.logs import set_up_logs
 from robosc_server.operations.settings import LogFormat, LogLevel
+from support.waiting import PATIENCE_S
 
 SERVICE = "test.Service"
-PATIENCE_S = 30.0
 
 
 @asynccontextmanager

@@ -8,8 +8,9 @@ import pytest
 from robosc_server.tasks.task import Failure, Outcome, Report, TaskKind, TaskLimits
 from robosc_server.workers import Workers
 from robosc_server.workers.local import LocalWorkers
-from support.background import BackgroundLoop, eventually
+from support.background import BackgroundLoop
 from support.fake_tasks import TASK_FUNCTION, fake_task
+from support.waiting import eventually
 
 LIMITS = TaskLimits(seconds=60, cpu_seconds=20, memory_bytes=512 * 2**20, result_bytes=10**6)
 

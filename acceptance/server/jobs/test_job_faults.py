@@ -16,10 +16,11 @@ from robosc_api.v1 import jobs_pb2_grpc
 from robosc_server.failures import RefusedError
 from robosc_server.store import JobState
 from robosc_server.tasks.task import Reason, TaskKind
-from support.job_parts import ME, PATIENCE_S, Choices, ended, in_loop, is_in, parts, until
+from support.job_parts import ME, Choices, ended, in_loop, is_in, parts
 from support.job_server import job_server
 from support.job_workers import messages_for, task_message, task_of
 from support.small_disks import fill, small_disk
+from support.waiting import PATIENCE_S, until
 
 _JOBS = 50
 

@@ -12,21 +12,10 @@ from robosc_server.jobs import Caller, JobLimits
 from robosc_server.store import JobFilter, JobState, job_rows, store
 from robosc_server.store.job_rows import take_orphans
 from robosc_server.tasks.task import Reason, TaskKind
-from support.job_parts import (
-    ME,
-    Choices,
-    Parts,
-    Times,
-    ended,
-    has_begun,
-    in_loop,
-    is_in,
-    messages_of_job,
-    parts,
-    until,
-)
+from support.job_parts import ME, Choices, Parts, Times, ended, has_begun, in_loop, is_in, messages_of_job, parts
 from support.job_workers import messages_for, task_of
 from support.postgresql import Postgresql
+from support.waiting import until
 
 _NEVER = "until /nowhere/never"
 _LIMITS = JobLimits(look_s=0.02, lease_s=15.0, sweep_s=3600.0)

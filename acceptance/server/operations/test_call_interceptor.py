@@ -44,6 +44,9 @@ def test_the_interceptor_costs_little(record_property: Any) -> None:
         def code(self) -> None:
             return None
 
+        def time_remaining(self) -> None:
+            return None
+
         def peer(self) -> str:
             return "ipv4:127.0.0.1:4711"
 

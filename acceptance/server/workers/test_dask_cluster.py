@@ -25,9 +25,10 @@ from robosc_server.workers.dask_task import answer, outcome_of
 from robosc_server.workers.frames import FrameError, too_large
 from robosc_server.workers.local import LocalWorkers
 from robosc_server.workers.opening import open_workers
-from support.background import BackgroundLoop, eventually, is_running, parent_of
+from support.background import BackgroundLoop, is_running, parent_of
 from support.dask_clusters import Cluster, dask_cluster, kill
 from support.fake_tasks import TASK_FUNCTION, fake_task, said
+from support.waiting import eventually
 
 LIMITS = TaskLimits(seconds=60, cpu_seconds=20, memory_bytes=512 * 2**20, result_bytes=10**6)
 KILLED_WITHIN_S = 1.0

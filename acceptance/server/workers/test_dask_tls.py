@@ -16,7 +16,8 @@ from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_api.v1 import synthesis_pb2_grpc
 from support.certificates import Authority
 from support.dask_clusters import Cluster, dask_cluster
-from support.service import PATIENCE_S, eventually, logged_server_process
+from support.service import logged_server_process
+from support.waiting import PATIENCE_S, eventually
 
 _PREFIX = "DASK_DISTRIBUTED__COMM__TLS__"
 _MODEL = pb.Bundle(main=pb.SourceFile(name="robot.rscd", text="robot Small {}"))

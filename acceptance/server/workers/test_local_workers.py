@@ -3,21 +3,17 @@
 import asyncio
 import os
 import signal
-import subprocess
-import sys
 import threading
 import time
 from concurrent.futures import CancelledError
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
 from robosc_server.tasks.task import Report
-from robosc_server.workers.supply import Supply
-from support.background import cpu_ticks, eventually, is_running, parent_of
-from support.descriptors import open_descriptors
-from support.fake_tasks import TASK_FUNCTION, said
+from support.background import cpu_ticks, is_running, parent_of
+from support.fake_tasks import said
+from support.waiting import eventually
 from support.worker_runs import LIMITS, Running
 
 KILLED_WITHIN_S = 0.2
@@ -45,6 +41,9 @@ class TestSpending:
         begun_s = time.monotonic()
         running.run("sleep 1")
         assert self.spent(running)[0] < time.monotonic() - begun_s - 0.5
+
+    def test_waiting_is_not_limited_as_work_is(self, running: Running) -> None:
+        assert said(running.run("sleep 1.2\nsleep 0", replace(LIMITS, cpu_seconds=1))) == "done"
 
     @pytest.mark.parametrize(
         "text", ["raise", "die 9", "exit 3", "refuse it", "claim 18446744073709551615", "garbage", "stop", "spin"]
@@ -80,59 +79,6 @@ class TestKills:
         assert time.monotonic() - begin < KILLED_WITHIN_S
         with pytest.raises(CancelledError):
             future.result(60)
-
-    def test_nothing_outlives_a_server_that_is_killed(self, tmp_path: Path) -> None:
-        program = tmp_path / "program.py"
-        program.write_text(
-            "import asyncio\n"
-            "from robosc_server.tasks.task import TaskLimits\n"
-            "from robosc_server.workers.local import LocalWorkers\n"
-            "from support.fake_tasks import TASK_FUNCTION, fake_task\n"
-            "async def tell(report):\n"
-            "    print(report.message, flush=True)\n"
-            "async def main():\n"
-            "    async with LocalWorkers(2, TASK_FUNCTION) as workers:\n"
-            "        tasks = map(fake_task, ('pid\\nstuck', 'pid\\nstop'))\n"
-            "        await asyncio.gather(*(workers.run(task, TaskLimits(), tell) for task in tasks))\n"
-            "asyncio.run(main())\n"
-        )
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-        with subprocess.Popen([sys.executable, program], stdout=subprocess.PIPE, text=True, env=environment) as server:
-            assert server.stdout is not None
-            pids = [int(server.stdout.readline()) for _ in range(2)]
-            template = parent_of(pids[0])
-            children = Path(f"/proc/{template}/task/{template}/children")
-            pids += [template, *map(int, children.read_text().split())]
-            server.kill()
-        assert len(set(pids)) >= 3
-        assert eventually(lambda: not any(map(is_running, pids)))
-
-    def test_nothing_is_left_after_many_tasks(self, running: Running) -> None:
-        def is_at_rest() -> bool:
-            # Also of the last one, whose descriptors are closed when it is gone.
-            return len(running.local.pids) == 2 and not running.local._supply._burials
-
-        running.run("echo")
-        assert eventually(is_at_rest)
-        before = open_descriptors()
-        for text in ("echo", "exit 1", "die 11", "garbage", "raise") * 4:
-            running.run(text)
-        assert eventually(is_at_rest)
-        assert eventually(lambda: open_descriptors() == before)
-
-    @pytest.mark.timeout(20)
-    def test_workers_end_also_where_a_burial_ends_that_very_moment(self) -> None:
-        async def run() -> None:
-            supply = Supply(TASK_FUNCTION, 1, must_be_confined=False)
-            burial = supply._begin(asyncio.sleep(0))
-            while not burial.done():
-                await asyncio.sleep(0)
-            # It is done, and what follows from that is at its turn only when this here waits.
-            assert supply._burials == {burial}
-            await supply.__aexit__()
-            assert not supply._burials
-
-        asyncio.run(run())
 
     def test_a_worker_that_reports_too_much_has_to_wait(self, running: Running) -> None:
         reports: list[Report] = []

@@ -302,15 +302,22 @@ class Carrying:
             pause_s: How long, in seconds.
             is_lost: Whether its worker was lost under it; that is counted.
         """
-        ids = [carried.record.id]
         carried.place = None
         with self._scheduler.aside(place):
-            while True:
+            is_noted = await self._put_back(carried, is_lost=is_lost)
+            await asyncio.sleep(pause_s)
+            while not (is_noted or await self._put_back(carried, is_lost=is_lost)):
                 await asyncio.sleep(pause_s)
-                with contextlib.suppress(StoreUnavailableError):
-                    for record in await self._store.put_back(ids, self.replica, self.replica, is_lost=is_lost):
-                        self._set(carried, record)
-                    return
+
+    async def _put_back(self, carried: Carried, *, is_lost: bool) -> bool:
+        """Note in the database that a job waits; whether that was possible."""
+        try:
+            back = await self._store.put_back([carried.record.id], self.replica, self.replica, is_lost=is_lost)
+        except StoreUnavailableError:
+            return False
+        for record in back:
+            self._set(carried, record)
+        return True
 
     async def _end(self, carried: Carried, outcome: Outcome) -> None:
         """Have the end of a job kept, however long that takes."""

@@ -9,11 +9,11 @@ Here callers are answered; `carrying` has the jobs of this server, `lookout` loo
 
 import asyncio
 import logging
-import time
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from types import TracebackType
 from typing import Self
 
+from robosc_server.clock import monotonic
 from robosc_server.failures import RefusedError
 from robosc_server.jobs.callers import Caller
 from robosc_server.jobs.carrying import Carrying, new_id
@@ -55,7 +55,7 @@ class JobManager:
         results: Results,
         task_limits: TaskLimits,
         limits: JobLimits,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = monotonic,
         tracing: Tracing = NO_TRACING,
     ) -> None:
         self._store, self._scheduler, self._results, self._limits = store, scheduler, results, limits

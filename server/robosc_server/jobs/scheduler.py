@@ -6,7 +6,6 @@ Round-Robin", IEEE/ACM Transactions on Networking 4(3), 1996, pages 375-385; her
 """
 
 import asyncio
-import time
 from collections import Counter, OrderedDict, deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,6 +14,7 @@ from functools import partial
 from typing import Protocol
 
 from robosc_api.security.callers import network_of
+from robosc_server.clock import monotonic
 from robosc_server.failures import RefusedError
 from robosc_server.tasks.task import Failure, Outcome, Reason, Task, TaskLimits
 from robosc_server.workers import OnReport, WorkerLostError, Workers, WorkersError
@@ -103,7 +103,7 @@ class Scheduler:
         self,
         workers: Workers,
         limits: QueueLimits,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = monotonic,
         accounts: Accounts | None = None,
     ) -> None:
         self._workers, self._limits, self._clock, self._accounts = workers, limits, clock, accounts

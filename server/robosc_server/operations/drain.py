@@ -1,12 +1,12 @@
 """How the server ends without taking anything out of a caller's hands that it could still give."""
 
 import asyncio
-import time
 from collections.abc import Callable
 from typing import Any
 
 import structlog
 
+from robosc_server.clock import monotonic
 from robosc_server.operations.health import Health
 from robosc_server.operations.interceptor import CallInterceptor
 
@@ -56,12 +56,12 @@ async def drain(
         unread_bytes: Of large answers that were sent and are not read yet; they are waited for like calls.
     """
     log = structlog.get_logger()
-    begun_s = time.monotonic()
+    begun_s = monotonic()
     health.drain()
     calls.refuse_new()
     log.info("draining", calls=calls.under_way(idle_methods))
-    while (calls.under_way(idle_methods) or unread_bytes()) and time.monotonic() - begun_s < seconds:
+    while (calls.under_way(idle_methods) or unread_bytes()) and monotonic() - begun_s < seconds:
         await asyncio.sleep(_LOOK_S)
     left = calls.under_way(idle_methods)
     await stop(server, _LAST_WORDS_S)
-    log.info("drained", seconds=round(time.monotonic() - begun_s, 3), cancelled=left)
+    log.info("drained", seconds=round(monotonic() - begun_s, 3), cancelled=left)

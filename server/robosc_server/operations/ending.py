@@ -27,10 +27,11 @@ class Ending:
 
     Args:
         drain_s: How long calls under way are given.
+        end_s: How long the end may take beside.
     """
 
-    def __init__(self, drain_s: float) -> None:
-        self._limit_s = drain_s + END_S
+    def __init__(self, drain_s: float, end_s: float = END_S) -> None:
+        self._limit_s = drain_s + end_s
         self._is_wanted = asyncio.Event()
         self._interrupts = 0
         # Without a standard error, nobody is told of what hangs; it ends all the same.

@@ -4,7 +4,6 @@ One interceptor for all of it, since each costs every call some microseconds.
 """
 
 import asyncio
-import time
 from typing import Any
 
 import grpc
@@ -15,6 +14,7 @@ from robosc_api.failures import reason_of
 from robosc_api.layers import Layer, behaviour_of, with_behaviour
 from robosc_api.security import CALLER
 from robosc_api.streams import writing
+from robosc_server.clock import monotonic
 from robosc_server.failures import RefusedError, abort, code_of, fault_words
 from robosc_server.operations.logs import tell_fault
 from robosc_server.operations.metrics import MethodMetrics, Metrics
@@ -24,6 +24,12 @@ from robosc_server.tasks.task import Reason
 
 _HEALTH = "/grpc.health."
 _REFUSED_RETRY_S = 1.0
+
+_ON_THE_WAY_S = 0.1
+"""So much sooner than our own timer a caller's may tell us that a deadline has passed, beside what was rounded."""
+
+_ROUNDED = 0.01
+"""Share of a call's time by which its deadline is later for us than for its caller."""
 
 
 class CallInterceptor(Layer):
@@ -79,7 +85,8 @@ class CallInterceptor(Layer):
             inner = self._traced(inner, method)
 
         async def observed(request: Any, context: Any) -> Any:
-            begun_s = time.perf_counter()
+            begun_s = monotonic()
+            given_s = context.time_remaining()
             metrics.under_way += 1
             code = grpc.StatusCode.OK
             try:
@@ -96,7 +103,7 @@ class CallInterceptor(Layer):
                 code = code_of(error.reason)
                 await abort(context, error)
             except asyncio.CancelledError:
-                code = _DEADLINE_EXCEEDED if context.time_remaining() == 0 else _CANCELLED
+                code = _DEADLINE_EXCEEDED if _is_at_its_deadline(context, given_s) else _CANCELLED
                 raise
             except grpc.aio.InternalError:
                 # gRPC's way to say that nobody is there to be written to.
@@ -107,7 +114,7 @@ class CallInterceptor(Layer):
                 await abort(context, fault_of(error))
             finally:
                 metrics.under_way -= 1
-                self._ended(method, metrics, context, code, time.perf_counter() - begun_s)
+                self._ended(method, metrics, context, code, monotonic() - begun_s)
 
         return observed
 
@@ -142,6 +149,23 @@ _CANCELLED, _DEADLINE_EXCEEDED = grpc.StatusCode.CANCELLED, grpc.StatusCode.DEAD
 _WITHOUT_REASON = frozenset({grpc.StatusCode.OK, _CANCELLED})
 _FAULTS = frozenset({grpc.StatusCode.INTERNAL, grpc.StatusCode.UNKNOWN, grpc.StatusCode.DATA_LOSS})
 _CODES = {code.value[0]: code for code in grpc.StatusCode}
+
+
+def _is_at_its_deadline(context: Any, given_s: float | None) -> bool:
+    """Whether a call that is cancelled is so because its deadline has passed, by our timer or by its caller's.
+
+    Both count from when they knew of the call, and a deadline goes over the line in units of up to a hundredth of it,
+    rounded up: so the caller's timer is mostly the first one, and all that comes of it here is that the call is
+    cancelled.
+
+    Args:
+        context: Of the call.
+        given_s: What was left of its time when it began; None: it has no deadline.
+    """
+    if given_s is None:
+        return False
+    left_s: float = context.time_remaining()
+    return left_s <= min(_ON_THE_WAY_S + _ROUNDED * given_s, given_s / 2)
 
 
 def _code_of(context: Any) -> grpc.StatusCode:

@@ -1,9 +1,9 @@
 """Workers that are watched: their tasks are counted, and each run is a span."""
 
-import time
 from types import TracebackType
 from typing import Any, Self
 
+from robosc_server.clock import monotonic
 from robosc_server.operations.metrics import Metrics
 from robosc_server.operations.tracing import NO_TRACING, Tracing
 from robosc_server.tasks.task import Failure, Outcome, Task, TaskLimits
@@ -50,7 +50,7 @@ class ObservedWorkers:
     async def run(self, task: Task, limits: TaskLimits, on_report: OnReport, on_spent: OnSpent = uncounted) -> Outcome:
         """The outcome of a task, as `Workers.run`."""
         outcome: Outcome | None = None
-        begun_s = time.monotonic()
+        begun_s = monotonic()
         self._running += 1
         try:
             with self._tracing.span("worker run", {"task.kind": task.kind.value}) as span:
@@ -59,4 +59,4 @@ class ObservedWorkers:
             return outcome
         finally:
             self._running -= 1
-            self._metrics.task_ended(task.kind, outcome, time.monotonic() - begun_s)
+            self._metrics.task_ended(task.kind, outcome, monotonic() - begun_s)

@@ -4,10 +4,10 @@ Token buckets: J. Turner, New directions in communications, IEEE Communications 
 server counts by itself, in memory: after a restart the buckets are full.
 """
 
-import time
 from collections.abc import Callable
 
 from robosc_api.security import Quota, TokenFile
+from robosc_server.clock import monotonic
 from robosc_server.failures import RefusedError
 from robosc_server.tasks.task import Reason
 
@@ -61,7 +61,7 @@ class Quotas:
         clock: Seconds of a monotonic clock.
     """
 
-    def __init__(self, tokens: TokenFile | None, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, tokens: TokenFile | None, clock: Callable[[], float] = monotonic) -> None:
         self._tokens = tokens
         self._clock = clock
         self._accounts: dict[str, _Account] = {}

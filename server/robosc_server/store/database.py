@@ -12,7 +12,6 @@ import os
 import socket
 import sqlite3
 import threading
-import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -21,6 +20,7 @@ from sqlalchemy import Connection, Engine
 from sqlalchemy.exc import DataError, DBAPIError, IntegrityError, ProgrammingError
 from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 
+from robosc_server.clock import monotonic
 from robosc_server.store.errors import StoreUnavailableError
 
 _log = logging.getLogger(__name__)
@@ -30,6 +30,9 @@ _PENDING = 2048
 
 _TRIES = 3
 """Of a change that meets another one of the same rows."""
+
+_STEPS = 100_000
+"""Of SQLite's machine, some milliseconds, after which a statement asks whether its transaction was given up."""
 
 _PAUSE_S = 0.5
 """After a connection has failed: for how long nothing is tried."""
@@ -80,14 +83,21 @@ class _Transaction[T]:
             raise PoolTimeoutError
         with self._engine.connect() as connection:
             connection = connection.execution_options(robosc_write=self._is_write)
+            driver_connection: Any = connection.connection.driver_connection
+            is_sqlite = isinstance(driver_connection, sqlite3.Connection)
+            if is_sqlite:
+                # An interrupt between two statements is lost: the next one is to end as well.
+                driver_connection.set_progress_handler(lambda: self._is_abandoned, _STEPS)
             with self._lock:
-                self._driver_connection = connection.connection.driver_connection
+                self._driver_connection = driver_connection
             try:
                 with connection.begin():
                     return self._work(connection)
             finally:
                 with self._lock:
                     self._driver_connection = None
+                if is_sqlite:
+                    driver_connection.set_progress_handler(None, 0)
 
 
 def _cut_off(driver_connection: Any) -> None:
@@ -124,7 +134,7 @@ class Database:
         readers: int,
         writers: int,
         answer_s: float = 8.0,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = monotonic,
     ) -> None:
         self._engine = engine
         self._readers = ThreadPoolExecutor(readers, thread_name_prefix="store-reader")

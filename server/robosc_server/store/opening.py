@@ -10,7 +10,6 @@ import os
 import sqlite3
 import struct
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from typing import Any
 from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
 
+from robosc_server.clock import wall
 from robosc_server.store.database import Database
 from robosc_server.store.errors import StoreError
 from robosc_server.store.schema import prepare
@@ -26,6 +26,9 @@ from robosc_server.store.store import Store
 DATABASE_FILE = "jobs.sqlite"
 _LOG_BYTES = 16 * 2**20
 _BUSY_S = 5.0
+_INCREMENTAL = 2
+"""PRAGMA auto_vacuum: free pages go back to the disk when they are told to."""
+
 _FLOCK = "hhqqi"
 
 _POSTGRESQL_OPTIONS = {
@@ -43,7 +46,7 @@ _held: set[Path] = set()
 _held_lock = threading.Lock()
 
 
-def open_store(state_dir: Path, database_url: str | None = None, wall_clock: Callable[[], float] = time.time) -> Store:
+def open_store(state_dir: Path, database_url: str | None = None, wall_clock: Callable[[], float] = wall) -> Store:
     """The server's database, with its tables; blocks until it has answered.
 
     Args:
@@ -137,10 +140,12 @@ def _set_up_sqlite(connection: sqlite3.Connection, _record: Any) -> None:
     # Transactions begin where we say so, not where the driver thinks.
     connection.isolation_level = None
     cursor = connection.cursor()
+    cursor.execute(f"PRAGMA busy_timeout = {round(_BUSY_S * 1000)}")
+    # Before there is any table. Later it changes nothing, but is a transaction that writes all the same: a reader's
+    # connection could not be made while the disk is full, or while somebody else writes.
+    if cursor.execute("PRAGMA auto_vacuum").fetchone() != (_INCREMENTAL,):
+        cursor.execute(f"PRAGMA auto_vacuum = {_INCREMENTAL}")
     for setting in (
-        f"busy_timeout = {round(_BUSY_S * 1000)}",
-        # Before there is any table; later it changes nothing.
-        "auto_vacuum = INCREMENTAL",
         "journal_mode = WAL",
         "synchronous = FULL",
         "foreign_keys = ON",

@@ -5,13 +5,13 @@ Each call is one transaction, or, where there may be many jobs, several, each of
 Every call raises StoreUnavailableError where the database is away, full or too slow.
 """
 
-import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from itertools import batched
 
 from sqlalchemy import Connection, func, select
 
+from robosc_server.clock import wall
 from robosc_server.store import job_rows, replica_rows, result_rows
 from robosc_server.store.database import Database
 from robosc_server.store.records import JobFilter, JobRecord, JobState, messages_of
@@ -42,7 +42,7 @@ class Store:
         self,
         database: Database,
         on_close: Callable[[], None] = _nothing,
-        wall_clock: Callable[[], float] = time.time,
+        wall_clock: Callable[[], float] = wall,
     ) -> None:
         self._database = database
         self._on_close = on_close

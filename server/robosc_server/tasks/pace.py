@@ -1,8 +1,8 @@
 """How often somebody is told where the work is."""
 
-import time
 from collections.abc import Callable
 
+from robosc_server.clock import monotonic
 from robosc_server.tasks.task import Report
 
 PAUSE_S = 0.1
@@ -16,7 +16,7 @@ class PacedReports:
         clock: Seconds that never go back.
     """
 
-    def __init__(self, on_report: Callable[[Report], None], clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, on_report: Callable[[Report], None], clock: Callable[[], float] = monotonic) -> None:
         self._on_report = on_report
         self._clock = clock
         self._stage = ""

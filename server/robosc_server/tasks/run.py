@@ -72,6 +72,13 @@ def run_task(kind: TaskKind, request: bytes, limits: TaskLimits, on_report: OnRe
         return Failure(Reason.INTERNAL_FAULT, "a fault of the server", _places(error))
 
 
+PRELOADED = ("robosc",)
+"""Packages that are loaded, with all that is in them, before processes are forked that do tasks."""
+
+NOT_PRELOADED = ("robosc.cli", "robosc.event_logs", "robosc.starter")
+"""No task needs these, and what draws pictures starts threads."""
+
+
 def rehearse() -> None:
     """Do a small task: what is loaded and made on first use is there for every process that is forked from this one."""
     file = pb.SourceFile(name="rehearsal.rscd", text=_REHEARSAL)

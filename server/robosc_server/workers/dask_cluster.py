@@ -6,13 +6,13 @@ The package `distributed` is loaded only where somebody wants this.
 import asyncio
 import contextlib
 import logging
-import time
 import uuid
 from collections import deque
 from concurrent.futures import CancelledError as FutureCancelledError
 from typing import Any, Self
 
 from robosc import __version__
+from robosc_server.clock import monotonic
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Task, TaskLimits
 from robosc_server.workers import OnReport, OnSpent, WorkerLostError, WorkersError, uncounted
 from robosc_server.workers.dask_spending import Spending
@@ -57,7 +57,7 @@ class _Watched:
         """Take an event of the cluster's."""
         if event["is"] == "begun":
             self.begun += 1
-            self.begun_at = time.monotonic()
+            self.begun_at = monotonic()
         elif event["is"] == "reports":
             self._reports.extend(Report(str(stage), str(message)) for stage, message in event["reports"])
         self._news.set()
@@ -177,7 +177,7 @@ class DaskWorkers:
             raise WorkersError(self.fault or f"the Dask cluster at {self._address} has no worker")
         name = f"robosc-{task.kind}-{uuid.uuid4().hex}"
         self._watched[name] = watched
-        self._spending[name] = Spending(on_spent, time.monotonic)
+        self._spending[name] = Spending(on_spent, monotonic)
         named = sorted(self._threads) if self._refused else None
         future = client.submit(
             run_on_cluster,
@@ -258,12 +258,12 @@ class DaskWorkers:
         Raises:
             WorkersError: The cluster is lost, or has had no worker for a while.
         """
-        worked_at = time.monotonic()
+        worked_at = monotonic()
         while True:
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(LOOK_S):
                     await self._is_over.wait()
-            now = time.monotonic()
+            now = monotonic()
             if self._client is not client:
                 raise WorkersError(f"the Dask scheduler at {self._address} was lost")
             if self._threads:

@@ -3,12 +3,12 @@
 import math
 import re
 import signal
-import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from robosc_server.clock import monotonic
 from robosc_server.tasks.task import Failure, Reason, TaskLimits
 from robosc_server.workers.child import OUT_OF_MEMORY
 
@@ -91,9 +91,7 @@ class KillsBefore:
         clock: Seconds that never go back.
     """
 
-    def __init__(
-        self, count: Callable[[], int] = kills_for_memory, clock: Callable[[], float] = time.monotonic
-    ) -> None:
+    def __init__(self, count: Callable[[], int] = kills_for_memory, clock: Callable[[], float] = monotonic) -> None:
         self._count, self._clock = count, clock
         self._known = 0
         self._until_s = -math.inf

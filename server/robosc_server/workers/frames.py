@@ -10,11 +10,11 @@ and must not run code in the server by it. A payload is read only after its leng
 
 import json
 import struct
-import time
 from collections.abc import Callable
 from enum import Enum
 from typing import Any
 
+from robosc_server.clock import monotonic
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, Task, TaskKind, TaskLimits
 
 HEADER = struct.Struct(">cQ")
@@ -122,7 +122,7 @@ class AnswerReader:
         clock: Seconds that never go back.
     """
 
-    def __init__(self, limits: TaskLimits, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, limits: TaskLimits, clock: Callable[[], float] = monotonic) -> None:
         self._limits = limits
         self._clock = clock
         self._begun_s = clock()

@@ -2,9 +2,9 @@
 
 import asyncio
 import contextlib
-import time
 from typing import Self
 
+from robosc_server.clock import monotonic
 from robosc_server.tasks.task import Failure, Outcome, Reason, Task, TaskLimits
 from robosc_server.workers import OnReport, OnSpent, WorkerLostError, uncounted
 from robosc_server.workers.endings import OUT_OF_TIME
@@ -86,7 +86,7 @@ class LocalWorkers:
 
     async def _run_once(self, task: Task, limits: TaskLimits, on_report: OnReport, on_spent: OnSpent) -> Outcome:
         worker = await self._supply.take()
-        begun_s = time.monotonic()
+        begun_s = monotonic()
         limit = asyncio.timeout(limits.seconds)
         is_answered = False
         try:
@@ -100,7 +100,7 @@ class LocalWorkers:
             return Failure(Reason.TIME_LIMIT, OUT_OF_TIME)
         finally:
             burial = self._supply.bury(worker)
-            burial.add_done_callback(lambda _: on_spent(_cpu_s(worker, time.monotonic() - begun_s)))
+            burial.add_done_callback(lambda _: on_spent(_cpu_s(worker, monotonic() - begun_s)))
             if not is_answered:  # Whoever gives a task up can count on its end.
                 await asyncio.wait([burial], timeout=_GONE_S)
 

@@ -7,11 +7,11 @@ import logging
 import os
 import socket
 import sys
-import time
 from collections import deque
 from collections.abc import Coroutine
 from typing import Any, Self
 
+from robosc_server.clock import monotonic
 from robosc_server.tasks.task import Task
 from robosc_server.workers import WorkersError
 from robosc_server.workers.endings import Ending
@@ -105,14 +105,14 @@ class Supply:
         Raises:
             WorkersError: None can be had.
         """
-        end = time.monotonic() + START_S
+        end = monotonic() + START_S
         while (worker := self._living()) is None:
             if self._is_closed:
                 raise WorkersError("the server's workers have ended")
             if self.is_hopeless:
                 raise WorkersError(self.fault)
             try:
-                async with asyncio.timeout(end - time.monotonic()):
+                async with asyncio.timeout(end - monotonic()):
                     await self._change()
             except TimeoutError:
                 raise WorkersError(self.fault or f"no worker process stood ready within {START_S:.0f} s") from None

@@ -30,9 +30,6 @@ PACKET_BYTES = 4096
 MUST_BE_CONFINED = "required"
 """Given to it where workers are not to be without a part of their confinement."""
 
-_PRELOADED_PACKAGE = "robosc"
-# No task needs them, and what draws pictures starts threads.
-_NOT_PRELOADED = ("robosc.cli", "robosc.event_logs", "robosc.starter")
 _FORK_PAUSE_MS = 200
 
 
@@ -123,17 +120,19 @@ class _Template:
 def _load(name: str) -> TaskFunction:
     """The function that does tasks, after everything that it may need was imported, and made on first use.
 
-    The latter by the function `rehearse` beside it, if there is one.
+    What the former is the tuples `PRELOADED` and `NOT_PRELOADED` beside it tell, names of packages and beginnings of
+    names of modules; for the latter there is the function `rehearse`. Each may be missing.
     """
     module_name, _, attribute = name.partition(":")
     tasks = importlib.import_module(module_name)
     function: TaskFunction = getattr(tasks, attribute)
-    package = importlib.import_module(_PRELOADED_PACKAGE)
-    for module in pkgutil.walk_packages(package.__path__, f"{_PRELOADED_PACKAGE}."):
-        if not module.name.startswith(_NOT_PRELOADED) and not module.name.endswith("__main__"):
-            # What is copied into generated packages needs the middleware that those run on.
-            with contextlib.suppress(ImportError):
-                importlib.import_module(module.name)
+    for name in getattr(tasks, "PRELOADED", ()):
+        package = importlib.import_module(name)
+        for module in pkgutil.walk_packages(package.__path__, f"{name}."):
+            if not module.name.startswith(tasks.NOT_PRELOADED) and not module.name.endswith("__main__"):
+                # What is copied into generated packages needs the middleware that those run on.
+                with contextlib.suppress(ImportError):
+                    importlib.import_module(module.name)
     if rehearse := getattr(tasks, "rehearse", None):
         rehearse()
     return function

@@ -23,9 +23,9 @@ from support.job_parts import (
     messages_of_job,
     parts,
     sweep_by_hand,
-    until,
 )
 from support.job_workers import messages_for, task_of
+from support.waiting import until
 
 _NEVER = "until /nowhere/never"
 

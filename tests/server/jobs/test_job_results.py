@@ -9,7 +9,8 @@ import pytest
 from robosc_server.jobs import Results
 from robosc_server.store import Store, StoreUnavailableError, open_store
 from robosc_server.tasks.task import Result, TaskKind
-from support.job_parts import Times, in_loop, until
+from support.job_parts import Times, in_loop
+from support.waiting import until
 
 _KIND = TaskKind.SYNTHESIZE
 

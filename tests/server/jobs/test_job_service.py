@@ -26,6 +26,7 @@ from robosc_server.tasks.task import Reason, TaskKind
 from support.effort import examples
 from support.job_parts import Choices, Parts, in_loop, offered, parts
 from support.job_workers import messages_for, task_message
+from support.waiting import until
 
 _NEVER = "until /nowhere/never"
 
@@ -332,8 +333,6 @@ def test_watchers_that_go_away_leave_nothing_behind(tmp_path: Path) -> None:
             for watch in watching:
                 await anext(aiter(watch))
                 watch.cancel()
-            async with asyncio.timeout(60):
-                while made.manager._watchers.revisions():
-                    await asyncio.sleep(0.005)
+            await until(lambda: not made.manager._watchers.revisions())
 
     in_loop(test)

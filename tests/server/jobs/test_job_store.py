@@ -4,8 +4,6 @@ import asyncio
 import os
 import sqlite3
 import stat
-import subprocess
-import sys
 import threading
 from pathlib import Path
 
@@ -14,18 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sqlalchemy import Connection, text
 
-from robosc_server.store import StoreError, StoreUnavailableError, open_store
+from robosc_server.store import Store, StoreError, StoreUnavailableError, open_store
 from robosc_server.store.records import blocks_of, messages_of
-from support.job_parts import PATIENCE_S, in_loop
-
-_HOLD = """
-import sys
-from pathlib import Path
-from robosc_server.store import open_store
-store = open_store(Path(sys.argv[1]))
-print("open", flush=True)
-sys.stdin.read()
-"""
+from support.held_store import held_store
+from support.held_time import HeldLoop, on_held_time
+from support.job_parts import in_loop
+from support.waiting import PATIENCE_S
 
 
 @given(st.lists(st.one_of(st.binary(max_size=50), st.integers(0, 2**20).map(bytes)), max_size=12))
@@ -37,16 +29,10 @@ def test_messages_are_found_again_in_their_blocks(messages: list[bytes]) -> None
 
 def test_a_folder_is_for_one_server_and_free_after_a_kill(tmp_path: Path) -> None:
     folder = tmp_path / "deep" / "state"
-    holder = subprocess.Popen(
-        [sys.executable, "-c", _HOLD, str(folder)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
-    try:
-        assert holder.stdout is not None and holder.stdout.readline() == "open\n"
+    with held_store(folder) as told:
+        assert told == "open"
         with pytest.raises(StoreError, match="in use by another robosc-server"):
             open_store(folder)
-    finally:
-        holder.kill()
-        holder.communicate(timeout=PATIENCE_S)
     store = open_store(folder)
     with pytest.raises(StoreError, match="in use by another robosc-server"):
         open_store(folder)
@@ -108,28 +94,50 @@ def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
 def test_a_transaction_that_takes_too_long_is_cut_off_and_the_next_one_is_served(tmp_path: Path) -> None:
     store = open_store(tmp_path)
     endless = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT count(*) FROM n"
-    ended = threading.Event()
+    begun, ended = threading.Event(), threading.Event()
 
     def work(connection: Connection) -> None:
+        begun.set()
         try:
             connection.execute(text(endless))
         finally:
             ended.set()
 
-    async def test() -> None:
-        store._database._answer_s = 0.2
+    async def test(loop: HeldLoop) -> None:
         for _ in range(5):  # More than there are threads.
+            reading = asyncio.create_task(store._database.read(work))
+            assert await asyncio.to_thread(begun.wait, PATIENCE_S)
+            await loop.passed(7.0)
+            assert not reading.done()
+            await loop.passed(1.0)
             with pytest.raises(StoreUnavailableError):
-                await store._database.read(work)
+                await reading
             assert await asyncio.to_thread(ended.wait, PATIENCE_S)
+            begun.clear()
             ended.clear()
         assert not store.is_available
-        store._database._answer_s = PATIENCE_S
         assert await store.find("x") is None
         assert store.is_available
 
-    in_loop(test)
+    on_held_time(test)
     store.close()
+
+
+def test_a_connection_for_reading_is_made_without_writing(tmp_path: Path) -> None:
+    """Else it could not be made while the disk is full, or while somebody else writes."""
+    store = open_store(tmp_path)
+    writer = sqlite3.connect(tmp_path / "jobs.sqlite", isolation_level=None)
+    try:
+        writer.execute("BEGIN IMMEDIATE")
+        store._database._engine.dispose()  # Those that there were.
+        in_loop(lambda: find(store, "x"))
+    finally:
+        writer.close()
+        store.close()
+
+
+async def find(store: Store, job_id: str) -> None:
+    assert await store.find(job_id) is None
 
 
 def test_the_log_of_changes_stays_short(tmp_path: Path) -> None:

@@ -15,9 +15,10 @@ from robosc_server.store import JobState, open_store
 from robosc_server.store.fairness import given_back
 from robosc_server.tasks.task import Reason, Result
 from support.effort import examples
-from support.job_parts import ME, Choices, Times, ended, in_loop, is_in, parts, sweep_by_hand, until
+from support.job_parts import ME, Choices, Times, ended, in_loop, is_in, parts, sweep_by_hand
 from support.job_workers import task_of
 from support.sweep_twin import KIND, check_against_twin
+from support.waiting import until
 
 _NEVER = "until /nowhere/never"
 

@@ -19,7 +19,8 @@ from robosc_server.operations.request_ids import REQUEST_ID
 from robosc_server.operations.settings import LogLevel
 from robosc_server.operations.tracing import SentTracing
 from robosc_server.tasks.task import Reason
-from support.small_server import PATIENCE_S, SERVICE, Ended, call, logged, small_server
+from support.small_server import SERVICE, Ended, call, logged, small_server
+from support.waiting import PATIENCE_S, limited, until
 
 MARKER = "a_word_of_the_model"
 
@@ -44,12 +45,11 @@ def outcome(request: bytes, metrics: Metrics | None = None, **more: Any) -> Ende
         calls = CallInterceptor(metrics or Metrics("1"))
         async with small_server(interceptors=[calls], unary=answer) as (channel, _):
             ended = await call(channel, request, **more)
-            while calls.under_way():
-                await asyncio.sleep(0.001)
+            await until(lambda: not calls.under_way())
             assert isinstance(ended, Ended)
             return ended
 
-    return asyncio.run(asyncio.wait_for(run(), PATIENCE_S))
+    return limited(run())
 
 
 def counted(metrics: Metrics, text: str) -> bool:
@@ -123,9 +123,66 @@ def test_what_handlers_say_themselves_stays() -> None:
 
 
 def test_a_deadline_that_passes() -> None:
+    """Only the server has a timer: it is told a deadline that its caller has not set."""
     with logged() as log:
-        assert outcome(b"stuck", timeout=0.2).code is grpc.StatusCode.DEADLINE_EXCEEDED
+        ended = outcome(b"stuck", metadata=[("grpc-timeout", "1m")], timeout=None)
+    assert ended.code is grpc.StatusCode.DEADLINE_EXCEEDED
     assert [line["code"] for line in log.lines("call")] == ["DEADLINE_EXCEEDED"]
+
+
+class CancelledContext:
+    """The context of a call that is cancelled while its handler waits.
+
+    Args:
+        given_s: What is left of its time when it begins; None: it has no deadline.
+        left_s: The same when it is cancelled.
+    """
+
+    def __init__(self, given_s: float | None, left_s: float | None) -> None:
+        self._remaining = iter((given_s, left_s))
+
+    def time_remaining(self) -> float | None:
+        return next(self._remaining)
+
+    def set_trailing_metadata(self, metadata: Any) -> None:
+        pass
+
+    def trailing_metadata(self) -> tuple[()]:
+        return ()
+
+    def peer(self) -> str:
+        return "ipv4:127.0.0.1:4711"
+
+
+@pytest.mark.parametrize(
+    ("given_s", "left_s", "code"),
+    [
+        (None, None, "CANCELLED"),
+        (0.2, 0.0, "DEADLINE_EXCEEDED"),
+        (0.2, 0.003, "DEADLINE_EXCEEDED"),  # The caller's timer was the first one.
+        (1.01, 0.007, "DEADLINE_EXCEEDED"),  # 1.003 s, rounded up on the line.
+        (600.0, 6.0, "DEADLINE_EXCEEDED"),
+        (600.0, 7.0, "CANCELLED"),
+        (60.0, 0.8, "CANCELLED"),
+        (0.2, 0.15, "CANCELLED"),
+        (0.01, 0.009, "CANCELLED"),
+    ],
+)
+def test_a_call_that_is_cancelled_where_its_deadline_passes_has_reached_it(
+    given_s: float | None, left_s: float | None, code: str
+) -> None:
+    async def stuck(request: bytes, context: Any) -> bytes:
+        raise asyncio.CancelledError
+
+    async def run() -> None:
+        handler = CallInterceptor(Metrics("1")).around(grpc.unary_unary_rpc_method_handler(stuck), f"/{SERVICE}/Unary")
+        with pytest.raises(asyncio.CancelledError):
+            await handler.unary_unary(b"", CancelledContext(given_s, left_s))
+
+    REQUEST_ID.set("")
+    with logged() as log:
+        asyncio.run(run())
+    assert [line["code"] for line in log.lines("call")] == [code]
 
 
 def test_a_caller_that_goes_away_is_counted_and_no_longer_under_way() -> None:
@@ -136,14 +193,12 @@ def test_a_caller_that_goes_away_is_counted_and_no_longer_under_way() -> None:
         async with small_server(interceptors=[calls], unary=answer) as (channel, _):
             method: Any = channel.unary_unary(f"/{SERVICE}/Unary")
             made = method(b"stuck")
-            while calls.under_way() != 1:
-                await asyncio.sleep(0.001)
+            await until(lambda: calls.under_way() == 1)
             assert counted(metrics, "robosc_server_calls_under_way 1.0")
             made.cancel()
-            while calls.under_way():
-                await asyncio.sleep(0.001)
+            await until(lambda: not calls.under_way())
 
-    asyncio.run(asyncio.wait_for(run(), PATIENCE_S))
+    limited(run())
     assert counted(metrics, f'robosc_server_calls_total{{code="CANCELLED",method="/{SERVICE}/Unary"}} 1.0')
 
 
@@ -174,12 +229,11 @@ def test_streams_of_either_kind_and_a_generator_is_closed_with_its_call() -> Non
                 stuck = made(b"long")
                 await stuck.read()
                 stuck.cancel()
-                while calls.under_way():
-                    await asyncio.sleep(0.001)
+                await until(lambda: not calls.under_way())
                 assert closed == ["closed"] * 2
 
     for handler in (generator, writer):
-        asyncio.run(asyncio.wait_for(run(handler), PATIENCE_S))
+        limited(run(handler))
 
 
 def test_methods_that_there_are_not_are_counted_without_their_names() -> None:

@@ -24,8 +24,10 @@ from robosc_server.store import StoreError, open_store
 from robosc_server.store.opening import DATABASE_FILE
 from robosc_server.store.schema import VERSION
 from support.certificates import Authority
+from support.held_store import held_store
+from support.job_workers import StartedWorkers
 from support.postgresql import postgresql
-from support.service import eventually, logged_server_process, server_process
+from support.service import served
 
 
 @pytest.fixture(autouse=True)
@@ -205,7 +207,8 @@ def test_a_database_that_a_running_server_has(capsys: pytest.CaptureFixture[str]
     link = tmp_path / "link"
     link.symlink_to(state)
     in_use = f"{DATABASE_FILE} is in use now by another robosc-server"
-    with server_process("--port", "0", "--state-dir", str(state)):
+    with held_store(state) as told:
+        assert told == "open"
         before = {path.name for path in state.iterdir()}
         for place in (state, link):
             checked = Checked(capsys, "--state-dir", str(place))
@@ -227,8 +230,8 @@ def test_a_look_at_a_database_of_this_process_leaves_it_the_lock(
     store = open_store(tmp_path)
     assert Checked(capsys, "--state-dir", str(tmp_path)).grade("database") == "warning"
     try:
-        with pytest.raises(AssertionError), server_process("--port", "0", "--state-dir", str(tmp_path)):
-            pass
+        with held_store(tmp_path) as told:
+            assert told.endswith("is in use by another robosc-server")
     finally:
         store.close()
 
@@ -337,14 +340,14 @@ def test_the_help_says_what_each_scope_is_for(capsys: pytest.CaptureFixture[str]
         assert re.search(rf"{scope}(, besides synthesize)?: [a-z]", told), scope
 
 
-def test_a_server_that_lets_nobody_in_says_so(tmp_path: Path) -> None:
+def test_a_server_that_lets_nobody_in_says_so(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     file = tmp_path / "tokens"
     file.write_text(make_token("watcher", (Scope.WATCH, Scope.ADMIN))[1])
     file.chmod(0o600)
     words = f"{file}: no token has the scope 'synthesize', so nobody is let in"
-    with logged_server_process("--tokens", str(file)) as (_, _, log):
-        assert eventually(lambda: any(words in line for line in log))
-    assert sum(words in line for line in log) == 1
+    with served(given_workers=StartedWorkers(), tokens=file):
+        pass
+    assert caplog.text.count(words) == 1
 
 
 def test_what_is_no_command_means_to_serve() -> None:

@@ -13,7 +13,9 @@ from robosc_server.operations.health import Health
 from robosc_server.operations.interceptor import CallInterceptor
 from robosc_server.operations.metrics import Metrics
 from robosc_server.outgoing import Outgoing
-from support.small_server import PATIENCE_S, SERVICE, call, logged, small_server
+from support.held_time import HeldLoop, on_held_time
+from support.small_server import SERVICE, call, logged, small_server
+from support.waiting import PATIENCE_S, limited, until
 
 SERVING, NOT_SERVING = health_pb2.HealthCheckResponse.SERVING, health_pb2.HealthCheckResponse.NOT_SERVING
 SERVICES = {"robosc.Works": ("workers",), "robosc.Keeps": ("store", "workers")}
@@ -26,10 +28,6 @@ def with_health(health: Health) -> Any:
 async def status(channel: Any, service: str = "") -> Any:
     request = health_pb2.HealthCheckRequest(service=service)
     return (await health_pb2_grpc.HealthStub(channel).Check(request, timeout=PATIENCE_S)).status
-
-
-def limited(coroutine: Any) -> None:
-    asyncio.run(asyncio.wait_for(coroutine, PATIENCE_S))
 
 
 def test_each_service_follows_what_it_needs() -> None:
@@ -107,17 +105,19 @@ def test_conditions_are_asked_for_again_and_again_and_who_raises_says_no() -> No
         async with health.following({name: probe(name) for name in is_there}, every_s=0.001):
             assert health.is_serving("")
             is_there["store"] = ConnectionError("away")
-            while health.is_serving("robosc.Keeps"):
-                await asyncio.sleep(0.001)
+            await until(lambda: not health.is_serving("robosc.Keeps"))
             assert health.is_serving("robosc.Works")
             assert health.conditions() == {"store": False, "workers": True, "accepting": True}
             is_there["store"] = True
-            while not health.is_serving("robosc.Keeps"):
-                await asyncio.sleep(0.001)
+            await until(lambda: health.is_serving("robosc.Keeps") is True)
 
     with logged() as log:
         limited(run())
     assert [line["condition"] for line in log.lines("condition does not hold")] == ["store"]
+
+
+async def is_draining(channel: Any) -> bool:
+    return bool(await status(channel) != SERVING)
 
 
 def test_draining_says_no_first_then_refuses_and_lets_calls_end() -> None:
@@ -134,8 +134,7 @@ def test_draining_says_no_first_then_refuses_and_lets_calls_end() -> None:
             under_way = asyncio.create_task(call(channel))
             await seen.wait()
             ending = asyncio.create_task(drain(server, health, calls, PATIENCE_S))
-            while await status(channel) == SERVING:
-                await asyncio.sleep(0.001)
+            await until(lambda: is_draining(channel))
             refused = await call(channel)
             assert (refused.code, refused.reason) == (grpc.StatusCode.UNAVAILABLE, "SHUTTING_DOWN")
             assert not ending.done()
@@ -146,10 +145,21 @@ def test_draining_says_no_first_then_refuses_and_lets_calls_end() -> None:
     limited(run())
 
 
+async def passes(loop: HeldLoop, ending: asyncio.Task[None]) -> None:
+    """Have time pass until a server has ended."""
+
+    async def is_over() -> bool:
+        await loop.passed(2.0)
+        return ending.done()
+
+    await until(is_over)
+    await ending
+
+
 def test_a_large_answer_that_was_sent_is_waited_for() -> None:
     size = 3_000_000
 
-    async def run() -> None:
+    async def test(loop: HeldLoop) -> None:
         outgoing, calls, health = Outgoing(size, size), CallInterceptor(Metrics("1")), Health({})
 
         async def large(request: bytes, context: Any) -> bytes:
@@ -168,17 +178,17 @@ def test_a_large_answer_that_was_sent_is_waited_for() -> None:
             async with grpc.aio.insecure_channel(f"127.0.0.1:{ports[0]}", options) as slow:
                 method: Any = slow.unary_stream(f"/{SERVICE}/Unary")
                 reader = method(b"")
-                while not outgoing.unread_bytes or calls.under_way():
-                    await asyncio.sleep(0.001)
+                await until(lambda: outgoing.unread_bytes > 0 and not calls.under_way())
                 ending = asyncio.create_task(
                     drain(server, health, calls, PATIENCE_S, unread_bytes=lambda: outgoing.unread_bytes)
                 )
                 # Longer than small answers are given.
-                assert await asyncio.wait([ending], timeout=0.5) == (set(), {ending})
+                await loop.passed(5.0)
+                assert not ending.done()
                 assert [len(message) async for message in reader] == [size]
-                await ending
+                await passes(loop, ending)
 
-    limited(run())
+    on_held_time(test)
 
 
 def test_connections_that_grpc_does_not_let_go_of_keep_nobody_from_ending(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -196,7 +206,7 @@ def test_connections_that_grpc_does_not_let_go_of_keep_nobody_from_ending(monkey
 
 
 def test_what_does_not_end_is_cancelled_and_what_is_idle_is_not_waited_for() -> None:
-    async def run(seconds: float, idle: frozenset[str]) -> None:
+    async def run(loop: HeldLoop, seconds: float, idle: frozenset[str]) -> None:
         cancelled = asyncio.Event()
 
         async def stuck(request: bytes, context: Any) -> bytes:
@@ -209,11 +219,11 @@ def test_what_does_not_end_is_cancelled_and_what_is_idle_is_not_waited_for() -> 
         calls, health = CallInterceptor(Metrics("1")), Health({})
         async with small_server(interceptors=[calls], unary=stuck) as (channel, server):
             under_way = asyncio.create_task(call(channel))
-            while not calls.under_way():
-                await asyncio.sleep(0.001)
-            await drain(server, health, calls, seconds, idle)
+            await until(lambda: calls.under_way() > 0)
+            ending = asyncio.create_task(drain(server, health, calls, seconds, idle))
+            await passes(loop, ending)
             await cancelled.wait()
             assert (await under_way).code is not grpc.StatusCode.OK
 
-    limited(run(0.1, frozenset()))
-    limited(run(10 * PATIENCE_S, frozenset({f"/{SERVICE}/Unary"})))
+    on_held_time(lambda loop: run(loop, 30.0, frozenset()))
+    on_held_time(lambda loop: run(loop, 1e9, frozenset({f"/{SERVICE}/Unary"})))

@@ -15,9 +15,10 @@ from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.failures import RefusedError
 from robosc_server.operations.open_calls import HEALTH_CALLS_PER_CALLER, CallLimits, OpenCalls
 from robosc_server.tasks.task import Reason
-from support.fake_tasks import TASK_FUNCTION as FAKE
-from support.service import PATIENCE_S, eventually, served
+from support.job_workers import StartedWorkers
+from support.service import served
 from support.strangers import Stranger, strangers
+from support.waiting import PATIENCE_S, eventually
 
 STUB: Any = synthesis_pb2_grpc.SynthesisServiceStub
 JOBS: Any = jobs_pb2_grpc.JobServiceStub
@@ -29,7 +30,9 @@ INITIAL_WINDOW = 4
 @pytest.fixture(scope="module")
 def small() -> Iterator[str]:
     """A server with few places, that waits for requests as long as a test takes."""
-    with served(FAKE, open_calls=6, open_calls_per_caller=4, request_seconds=600.0) as address:
+    with served(
+        given_workers=StartedWorkers(), open_calls=6, open_calls_per_caller=4, request_seconds=600.0
+    ) as address:
         yield address
 
 
@@ -135,7 +138,7 @@ def test_nobody_from_elsewhere_takes_the_places_of_this_machines_health_checks()
 
 
 def test_calls_that_are_over_give_their_places_back(small: str) -> None:
-    bundle = pb.Bundle(main=pb.SourceFile(name="robot.rscd", text="stuck"))
+    bundle = pb.Bundle(main=pb.SourceFile(name="robot.rscd", text="until /nowhere/at all"))
     with grpc.insecure_channel(small) as channel:
         stub = STUB(channel)
         jobs = JOBS(channel)
@@ -167,7 +170,7 @@ def test_a_token_says_how_many(tmp_path: Path) -> None:
     file = tmp_path / "tokens"
     file.write_text("\n".join(entries))
     file.chmod(0o600)
-    with served(FAKE, open_calls_per_caller=4, request_seconds=600.0, tokens=file) as address:
+    with served(given_workers=StartedWorkers(), open_calls_per_caller=4, request_seconds=600.0, tokens=file) as address:
         few, usual = (tuple(token.items()) for token in tokens)
         with strangers(address, 1) as (stranger,):
             hold(stranger, 3, metadata=tokens[0])

@@ -16,7 +16,7 @@ import grpc
 from robosc_api.security import Scope, make_token
 from robosc_api.v1 import jobs_pb2, jobs_pb2_grpc, synthesis_pb2_grpc
 from robosc_api.v1 import synthesis_pb2 as pb
-from support.service import PATIENCE_S
+from support.waiting import PATIENCE_S
 
 MARKER = "Marker7391"
 

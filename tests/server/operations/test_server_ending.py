@@ -1,71 +1,107 @@
-"""A server that is told to end does, whatever hangs: whole processes, in which something is made to hang."""
+"""A server that is told to end does, whatever hangs: what its signals set going, on held time."""
 
-import contextlib
+import asyncio
+import faulthandler
+import logging
+import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Callable, Coroutine
+from typing import Any
 
 import pytest
 
-PATIENCE_S = 60.0
-
-# How long the end may take is cut short, and what it begins with never returns.
-_HANGING = """
-import asyncio, sys, time
-import robosc_server.application as application
-import robosc_server.operations.ending as ending
-from robosc_server.main import main
-
-async def waiting(*_):
-    await asyncio.Event().wait()
-
-async def working(*_):
-    time.sleep(3600)
-
-ending.END_S = LIMIT
-application.drain = HOW
-main(["--port", "0", "--worker-processes", "1", "--state-dir", sys.argv[1], "--drain-seconds", "0"])
-"""
+from robosc_server.operations.ending import Ending
+from support.held_time import HeldLoop, on_held_time
+from support.waiting import PATIENCE_S, until
 
 
-@contextmanager
-def hanging(how: str, limit_s: float, folder: Path) -> Iterator[subprocess.Popen[str]]:
-    """A server that has begun to serve, and will hang when it is told to end."""
-    program = _HANGING.replace("LIMIT", str(limit_s)).replace("HOW", how)
-    command = [sys.executable, "-c", program, str(folder)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        try:
-            assert process.stdout is not None
-            assert process.stdout.readline().startswith("robosc-server listening on ")
-            yield process
-        finally:
-            process.kill()
+@pytest.fixture
+def forced(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """What the process would be ended by, instead of that."""
+    found: dict[str, Any] = {}
+
+    def later(seconds: float, *, exit: bool, file: Any) -> None:  # noqa: A002  # its name there
+        found.update(after_s=seconds, exits=exit)
+
+    def leave(status: int) -> None:
+        found["status"] = status
+
+    monkeypatch.setattr(faulthandler, "dump_traceback_later", later)
+    monkeypatch.setattr(faulthandler, "cancel_dump_traceback_later", found.clear)
+    monkeypatch.setattr(os, "_exit", leave)
+    return found
+
+
+def told(test: Callable[[HeldLoop, Ending], Coroutine[Any, Any, None]]) -> None:
+    async def run(loop: HeldLoop) -> None:
+        ending = Ending(30.0)
+        ending.listen()
+        await test(loop, ending)
+
+    on_held_time(run)
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-@pytest.mark.parametrize(("how", "told"), [("waiting", "waits at "), ("working", " in working")])
-def test_an_end_that_hangs_is_forced_and_told(how: str, told: str, number: signal.Signals, tmp_path: Path) -> None:
-    with hanging(how, 1.0, tmp_path) as process:
-        process.send_signal(number)
-        _, log = process.communicate(timeout=PATIENCE_S)
-    assert process.returncode == 1, log
-    assert told in log
-    # Where it hangs is in the program of this test, which is no file.
-    assert "<string>" in log
+def test_an_end_that_hangs_is_told_and_will_be_forced(
+    forced: dict[str, Any], caplog: pytest.LogCaptureFixture, number: signal.Signals
+) -> None:
+    async def hanging() -> None:
+        await asyncio.Event().wait()
+
+    async def test(loop: HeldLoop, ending: Ending) -> None:
+        task = asyncio.create_task(hanging(), name="what hangs")
+        os.kill(os.getpid(), number)
+        await ending.wanted()
+        assert forced == {"after_s": 50.0, "exits": True}
+        await loop.passed(49.4)
+        assert "does not end" not in caplog.text
+        await loop.passed(0.2)
+        assert "the server does not end: what hangs waits at test_server_ending.py:" in caplog.text
+        task.cancel()
+        ending.over()
+        assert not forced
+
+    with caplog.at_level(logging.ERROR):
+        told(test)
 
 
-def test_a_second_interrupt_ends_it_at_once(tmp_path: Path) -> None:
-    with hanging("waiting", 3600.0, tmp_path) as process:
-        process.send_signal(signal.SIGINT)
+def test_a_second_interrupt_ends_it_at_once(forced: dict[str, Any], caplog: pytest.LogCaptureFixture) -> None:
+    async def test(loop: HeldLoop, ending: Ending) -> None:
         # Another request to end gracefully changes nothing, also one that comes while it ends.
-        process.send_signal(signal.SIGTERM)
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(0.3)
-        assert process.poll() is None
-        process.send_signal(signal.SIGINT)
-        _, log = process.communicate(timeout=PATIENCE_S)
-    assert process.returncode == 128 + signal.SIGINT, log
-    assert "ended at once, by a second interrupt" in log
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGTERM):
+            os.kill(os.getpid(), number)
+        await ending.wanted()
+        assert "status" not in forced
+        os.kill(os.getpid(), signal.SIGINT)
+        await until(lambda: "status" in forced)
+        assert (forced["status"], ending._interrupts) == (128 + signal.SIGINT, 2)
+
+    told(test)
+    assert "ended at once, by a second interrupt" in caplog.text
+
+
+_HANGING = """
+import asyncio, os, signal, time
+from robosc_server.operations.ending import Ending
+
+async def main():
+    ending = Ending(0.0, end_s=0.01)
+    ending.listen()
+    os.kill(os.getpid(), signal.SIGTERM)
+    await ending.wanted()
+    time.sleep(3600)
+
+asyncio.run(main())
+"""
+
+
+def test_a_process_that_hangs_is_ended_and_tells_where() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", _HANGING], capture_output=True, text=True, check=False, timeout=PATIENCE_S
+    )
+    assert done.returncode == 1, done.stderr
+    assert "Timeout" in done.stderr
+    # Where it hangs is in this program, which is no file.
+    assert "<string>" in done.stderr

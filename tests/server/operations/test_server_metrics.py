@@ -12,7 +12,7 @@ from robosc_api.security import SecurityError
 from robosc_server.operations.metrics import Metrics, MetricsEndpoint, metric_names
 from robosc_server.operations.observed import ObservedWorkers
 from robosc_server.tasks.task import Failure, Outcome, Reason, Result, Task, TaskKind, TaskLimits
-from support.small_server import PATIENCE_S
+from support.waiting import PATIENCE_S, limited
 
 
 def samples(text: str) -> dict[tuple[str, frozenset[tuple[str, str]]], float]:
@@ -32,7 +32,7 @@ def asked(metrics: Metrics, test: Callable[[str], Awaitable[None]]) -> None:
         async with MetricsEndpoint(metrics, "127.0.0.1:0") as endpoint:
             await test(endpoint.address)
 
-    asyncio.run(asyncio.wait_for(run(), PATIENCE_S))
+    limited(run())
 
 
 async def sent(address: str, request: bytes) -> bytes:

@@ -10,7 +10,8 @@ from opentelemetry.proto.collector.trace.v1 import trace_service_pb2, trace_serv
 
 from robosc_api.v1 import jobs_pb2, jobs_pb2_grpc
 from support.job_workers import ScriptedWorkers, task_message
-from support.service import PATIENCE_S, served
+from support.service import served
+from support.waiting import PATIENCE_S
 
 MARKER = "a_word_of_the_model"
 

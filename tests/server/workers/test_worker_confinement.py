@@ -29,7 +29,8 @@ from robosc_server.workers.system_calls import ALLOW, ARCHITECTURES, KILL, REFUS
 from support.background import BackgroundLoop, is_running, parent_of
 from support.fake_tasks import TASK_FUNCTION as FAKE
 from support.requests import MESSAGES, bundle_at
-from support.service import PATIENCE_S, served
+from support.service import served
+from support.waiting import PATIENCE_S
 
 ROOT = Path(__file__).parents[3]
 STUB: Any = synthesis_pb2_grpc.SynthesisServiceStub

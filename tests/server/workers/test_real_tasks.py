@@ -1,0 +1,49 @@
+"""Real models in processes of their own: what becomes of them is what the function makes of them."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from robosc_server.tasks.run import run_task
+from robosc_server.tasks.task import Reason, Result, TaskKind, TaskLimits
+from support.hostile_models import products
+from support.real_tasks import LIMITS, RealRunning, reason_of, synthesis, task_of
+from support.real_tasks import real as real
+from support.requests import MESSAGES, bundle_at
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.mark.parametrize("kind", [TaskKind.CHECK, TaskKind.SYNTHESIZE, TaskKind.EXPLORE])
+def test_the_outcome_is_that_of_the_function(real: RealRunning, kind: TaskKind) -> None:
+    bundle = bundle_at(ROOT / "examples" / "line_follower" / "line_follower.rscd")
+    task = task_of(MESSAGES[kind](bundle=bundle), kind)
+    outcome = real.run(task)
+    assert isinstance(outcome, Result)
+    assert outcome == run_task(kind, task.request, LIMITS, lambda report: None)
+
+
+def test_processes_find_everything_loaded() -> None:
+    program = (
+        "import sys\n"
+        "from robosc_server.tasks.task import TaskKind, TaskLimits\n"
+        "from robosc_server.workers.template import _load\n"
+        "from support.hostile_models import buttons\n"
+        "from support.requests import small_request\n"
+        "function = _load('robosc_server.tasks.run:run_task')\n"
+        "for kind in TaskKind:\n"
+        "    loaded = set(sys.modules)\n"
+        "    request = small_request(kind, buttons(2)).SerializeToString()\n"
+        "    print(function(kind, request, TaskLimits(), lambda report: None).__class__.__name__, end=' ')\n"
+        "    print(*sorted(set(sys.modules) - loaded))\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    told = subprocess.run([sys.executable, "-c", program], env=environment, check=True, capture_output=True, text=True)
+    assert [line.strip() for line in told.stdout.splitlines()] == ["Result"] * len(TaskKind)
+
+
+def test_a_model_with_too_large_diagrams_reaches_the_limit_of_nodes(real: RealRunning) -> None:
+    assert reason_of(real.run(synthesis(products()), TaskLimits(nodes=20_000))) is Reason.NODE_LIMIT

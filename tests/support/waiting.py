@@ -1,0 +1,55 @@
+"""Waiting for what tells nobody that it has happened; what does is waited for by its event.
+
+It is asked for often, and a limit is there for failing tests alone: nothing is decided by how long it takes.
+"""
+
+import asyncio
+import inspect
+import time
+from collections.abc import Awaitable, Callable, Coroutine
+from typing import Any
+
+PATIENCE_S = 60.0
+"""How long a test waits for what must happen; only a failing test waits so long."""
+
+_PAUSE_S = 0.005
+
+
+def eventually(condition: Callable[[], bool]) -> bool:
+    """Whether a condition becomes true."""
+    end_s = time.monotonic() + PATIENCE_S
+    while not condition():
+        if time.monotonic() > end_s:
+            return False
+        time.sleep(_PAUSE_S)
+    return True
+
+
+async def until(condition: Callable[[], bool | Awaitable[bool]]) -> None:
+    """Let others run until a condition holds.
+
+    Raises:
+        AssertionError: It never does.
+    """
+    end_s = time.monotonic() + PATIENCE_S
+    while True:
+        holds = condition()
+        if await holds if inspect.isawaitable(holds) else holds:
+            return
+        assert time.monotonic() < end_s, "it never came true"
+        # Not by the loop's clock, which a test may hold; and others have no more to do than to get their turn.
+        await asyncio.to_thread(time.sleep, _PAUSE_S) if _is_held() else await asyncio.sleep(_PAUSE_S)
+
+
+def _is_held() -> bool:
+    return hasattr(asyncio.get_running_loop(), "advance")
+
+
+def limited[T](test: Coroutine[Any, Any, T]) -> T:
+    """What a test gives that is run on an event loop of its own, which ends."""
+
+    async def run() -> T:
+        async with asyncio.timeout(PATIENCE_S):
+            return await test
+
+    return asyncio.run(run())

@@ -4,6 +4,7 @@ Programs that they start can be interrupted, random examples are those of the ch
 end of the run.
 """
 
+import gc
 import importlib
 import os
 import signal
@@ -26,6 +27,16 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 load_profile()
+
+
+def pytest_collection_finish() -> None:
+    """Have the collector of garbage leave alone what stays for the whole run, and look seldom for the rest.
+
+    Ten thousand tests and all modules would be looked through again and again, and Hypothesis counts each time.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(20_000, 10, 10)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -14,9 +14,9 @@ from robosc.synthesis import SynthesisStatus, blocks, diagrams, synthesize
 from robosc.synthesis.blocks import blocks_of
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
-from robosc.verification import Outcome, synthesize_explicit, verify
+from robosc.verification import Outcome, verify
 from support.effort import examples
-from support.random_systems import MAXIMUM_STATES, systems
+from support.random_systems import explicit_supervisor, systems
 from support.systems import automaton, edge, operation, read, received, system
 
 WIDE = IntegerType(0, 1000)
@@ -184,7 +184,7 @@ def test_among_each_other_or_not_the_supervisor_is_right(made: System) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(blocks, "MINIMUM_BITS", 1)
         result = synthesize(made, engine="autoref")
-    explicit = synthesize_explicit(made, limit=MAXIMUM_STATES)
+    explicit = explicit_supervisor(made)
     assert explicit is not None
     assert (result.status is SynthesisStatus.EMPTY) == explicit.is_empty
     if not explicit.is_empty:

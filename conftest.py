@@ -8,9 +8,11 @@ import gc
 import importlib
 import os
 import signal
+from collections.abc import Generator
 
 import pytest
 
+from support import failing
 from support.effort import load_profile
 
 # Our programs have gRPC's own log off, which is read at its import: in this process, which runs what they run, it would
@@ -37,6 +39,24 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(20_000, 10, 10)
+
+
+def pytest_runtest_setup() -> None:
+    """Forget what was made for the test before."""
+    failing.forget()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Write down and tell the random models of a test that failed."""
+    report = yield
+    if call.when == "call" and report.failed:
+        told = failing.written(item.name, item.config.rootpath / "out" / "failing")
+        if told:
+            report.sections.append(("random models of this test", told))
+    return report
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -4,12 +4,15 @@ Programs that they start can be interrupted, random examples are those of the ch
 end of the run.
 """
 
+import gc
 import importlib
 import os
 import signal
+from collections.abc import Generator
 
 import pytest
 
+from support import failing
 from support.effort import WRONG, load_profile
 
 # Our programs have gRPC's own log off, which is read at its import: in this process, which runs what they run, it would
@@ -36,6 +39,34 @@ def pytest_configure() -> None:
     """
     if WRONG:
         raise pytest.UsageError(WRONG)
+
+
+def pytest_collection_finish() -> None:
+    """Have the collector of garbage leave alone what stays for the whole run, and look seldom for the rest.
+
+    Ten thousand tests and all modules would be looked through again and again, and Hypothesis counts each time.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(20_000, 10, 10)
+
+
+def pytest_runtest_setup() -> None:
+    """Forget what was made for the test before."""
+    failing.forget()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Write down and tell the random models of a test that failed."""
+    report = yield
+    if call.when == "call" and report.failed:
+        told = failing.written(item.name, item.config.rootpath / "out" / "failing")
+        if told:
+            report.sections.append(("random models of this test", told))
+    return report
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

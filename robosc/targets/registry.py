@@ -156,6 +156,9 @@ def require_target(name: str) -> None:
     Raises:
         UnknownTargetError: There is none; the message says what there is.
     """
+    # What other packages offer is looked up only if it is asked for: that reads the lists of all that is installed.
+    if name in _BUILT_IN or name in _registered:
+        return
     names = [info.name for info in available_targets()]
     if name in names:
         return

@@ -70,14 +70,6 @@ def test_a_recorded_run_in_python(robot: str) -> None:
     compare(python_target(supervisor), scenario, observe(supervisor, scenario))
 
 
-@needs_gcc
-@pytest.mark.parametrize("robot", ROBOTS)
-def test_a_recorded_run_in_c(robot: str, tmp_path: Path) -> None:
-    supervisor = robot_supervisor(robot)
-    scenario = read_recorded(robot)
-    compare(c99_target(supervisor, tmp_path), scenario, observe(supervisor, scenario))
-
-
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_an_example_in_python(robot: str) -> None:
     supervisor = robot_supervisor(robot)
@@ -89,17 +81,11 @@ def test_an_example_in_python(robot: str) -> None:
 @settings(max_examples=examples(60))
 @given(st.integers(0, 2**32 - 1))
 def test_random_robots_in_python(seed: int) -> None:
-    supervisor = _some_supervisor(seed)
-    scenario = random_scenario(supervisor, seed, 60)
-    compare(python_target(supervisor), scenario, observe(supervisor, scenario))
-
-
-@settings(max_examples=examples(60))
-@given(st.integers(0, 2**32 - 1))
-def test_without_a_log_whole_messages_are_taken_with_the_same_effect(seed: int) -> None:
+    """With a log, and without one: whole messages are taken then, with the same effect."""
     supervisor = _some_supervisor(seed)
     scenario = random_scenario(supervisor, seed, 60)
     expected = observe(supervisor, scenario)
+    compare(python_target(supervisor), scenario, expected)
     compare(reference(supervisor, has_log=False), scenario, expected)
     compare(python_target(supervisor, has_log=False), scenario, expected)
 
@@ -114,9 +100,10 @@ def test_a_recorded_run_without_a_log(robot: str) -> None:
 @needs_gcc
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_an_example_in_c(robot: str, tmp_path: Path) -> None:
+    """The recorded run and a random one, of one program."""
     supervisor = robot_supervisor(robot)
-    scenario = random_scenario(supervisor, 7, 400)
-    compare(c99_target(supervisor, tmp_path), scenario, observe(supervisor, scenario))
+    for scenario in (read_recorded(robot), random_scenario(supervisor, 7, 400)):
+        compare(c99_target(supervisor, tmp_path), scenario, observe(supervisor, scenario))
 
 
 @needs_gcc

@@ -44,5 +44,7 @@ def test_c_does_what_the_model_says(seed: int, tmp_path: Path) -> None:
     canary = tmp_path / "canary"
     supervisor = hostile(seed, canary, is_on_ros=False)
     scenario = random_scenario(supervisor, seed, 150)
-    compare(C99Target(supervisor, tmp_path / "c"), scenario, observe(supervisor, scenario))
+    # Some with sanitizers, which take the compiler three times as long.
+    options = () if seed % 4 == 0 else ("-O0",)
+    compare(C99Target(supervisor, tmp_path / "c", *options), scenario, observe(supervisor, scenario))
     assert not canary.exists()

@@ -42,18 +42,30 @@ _MASK = 2**64 - 1
 
 
 def compiled(supervisor: Supervisor, folder: Path, *options: str) -> Path:
-    """The test program of a supervisor."""
+    """The test program of a supervisor; the one that is there, if the same was compiled into the folder before."""
+    return built(supervisor, test_program(supervisor), folder, *options)
+
+
+def built(supervisor: Supervisor, program: str, folder: Path, *options: str) -> Path:
+    """A program around generated C.
+
+    Args:
+        supervisor: What is generated.
+        program: The text of the file with `main`.
+        folder: Where to compile.
+        options: For the compiler.
+    """
+    unit = [*WARNINGS, "-ffp-contract=off", *options, "-c", f"{make_layout(supervisor).prefix}.c", "-o", "unit.o"]
+    whole = ["-std=c99", *options, "test.c", "unit.o", "-lm", "-o", "test"]
+    texts = {**generate(supervisor, "c99"), "test.c": program, "options.txt": " ".join(options)}
+    if (folder / "test").exists() and all((folder / path).read_text("utf-8") == text for path, text in texts.items()):
+        return folder / "test"
     folder.mkdir(parents=True, exist_ok=True)
-    for path, text in generate(supervisor, "c99").items():
+    for path, text in texts.items():
         (folder / path).write_text(text, encoding="utf-8")
-    layout = make_layout(supervisor)
-    (folder / "test.c").write_text(test_program(supervisor), encoding="utf-8")
-    command = [GCC or "gcc", *WARNINGS, "-ffp-contract=off", *options, "-c", f"{layout.prefix}.c", "-o", "unit.o"]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr[:4000]
-    command = [GCC or "gcc", "-std=c99", *options, "test.c", "unit.o", "-lm", "-o", "test"]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr[:4000]
+    for command in (unit, whole):
+        done = subprocess.run([GCC or "gcc", *command], cwd=folder, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr[:4000]
     return folder / "test"
 
 

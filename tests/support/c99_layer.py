@@ -1,7 +1,6 @@
 """Compares a generated C layer with the reference layer: the same commands to both, all that happens line by line."""
 
 import math
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from random import Random
@@ -14,10 +13,9 @@ from robosc.execution.settings import Settings
 from robosc.expressions import DoubleType, Type
 from robosc.model.structure import CommunicationKind
 from robosc.supervisor.structure import Supervisor
-from robosc.targets import generate
 from robosc.targets.c99.layer import request_parameters
-from robosc.targets.c99.layout import Layout, event_data, make_layout
-from support.c99 import GCC, WARNINGS, Reference, _hex, data_words, microseconds, replay
+from robosc.targets.c99.layout import Layout, event_data
+from support.c99 import Reference, _hex, built, data_words, microseconds, replay
 from support.c99_layer_main import CALLBACKS, TOKENS, layer_program
 from support.c99_main import batch_types, events_back
 
@@ -35,18 +33,8 @@ _ENDS = ("succeeded", "aborted", "cancelled")
 
 
 def compiled_layer(supervisor: Supervisor, folder: Path, *options: str) -> Path:
-    """The test program of a layer."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for path, text in generate(supervisor, "c99").items():
-        (folder / path).write_text(text, encoding="utf-8")
-    prefix = make_layout(supervisor).prefix
-    (folder / "test.c").write_text(layer_program(supervisor), encoding="utf-8")
-    unit = [GCC or "gcc", *WARNINGS, "-ffp-contract=off", *options, "-c", f"{prefix}.c", "-o", "unit.o"]
-    program = [GCC or "gcc", "-std=c99", *options, "test.c", "unit.o", "-lm", "-o", "test"]
-    for command in (unit, program):
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr[:4000]
-    return folder / "test"
+    """The test program of a layer; the one that is there, if the same was compiled into the folder before."""
+    return built(supervisor, layer_program(supervisor), folder, *options)
 
 
 def layer_settings_words(layout: Layout, settings: Settings) -> list[object]:

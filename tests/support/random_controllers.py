@@ -48,6 +48,7 @@ from robosc.model.structure import (
 from robosc.supervisor.structure import Supervisor
 from robosc.synthesis import SynthesisStatus, synthesize
 from support.execution import supervisor_of
+from support.failing import made, model_files
 
 NONE, BOOLEAN, SAMPLE = NoneType(), BooleanType(), ObjectType("Sample")
 
@@ -101,6 +102,7 @@ def random_controller(
         enums: The rules of its two enums.
     """
     model = msgspec.structs.replace(_model(Random(seed), is_plain), enums=enums)
+    made("random_controller", seed, lambda: model_files(model))
     result = synthesize(to_automata(model, Deployment.CONTROLLER))
     if result.status is SynthesisStatus.EMPTY:
         return None
@@ -109,7 +111,9 @@ def random_controller(
 
 def random_robot(seed: int) -> Supervisor:
     """A supervisor that adds nothing to a random robot: it may be blocking, but has no range to leave."""
-    return supervisor_of(_model(Random(seed), is_plain=False))
+    model = _model(Random(seed), is_plain=False)
+    made("random_robot", seed, lambda: model_files(model))
+    return supervisor_of(model)
 
 
 def _model(dice: Random, is_plain: bool) -> Model:

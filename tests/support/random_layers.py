@@ -8,6 +8,7 @@ from robosc.expressions import Binary, Constant, Expression, Received
 from robosc.model.structure import Communication, CommunicationKind, Deployment
 from robosc.supervisor.structure import Supervisor
 from support.execution import supervisor_of
+from support.failing import made, model_files
 from support.random_controllers import SAMPLE, random_robot
 
 _INCOMING = CommunicationKind.INCOMING_MESSAGE
@@ -32,7 +33,9 @@ def random_layer(dice: Random) -> Supervisor:
         msgspec.structs.replace(item, when=None) if is_open and item.name == last.get(item.identifier) else item
         for item in found
     )
-    return supervisor_of(msgspec.structs.replace(model, communications=communications), Deployment.LAYER)
+    layer = msgspec.structs.replace(model, communications=communications)
+    made("random_layer", None, lambda: model_files(layer))
+    return supervisor_of(layer, Deployment.LAYER)
 
 
 def _condition(dice: Random) -> Expression:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from robosc.language.tokens import Kind, tokenize
 from robosc.source import Bundle, SourceFile
+from support.failing import bundle_files, made
 
 _STATES = ("idle", "busy", "^state", "always", "depth", "then_")
 _VARIABLES = ("level", "^value", "never", "count", "max", "flag")
@@ -30,7 +31,9 @@ def random_bundle(seed: int, *, part_b: bool = True) -> Bundle:
     library = author.library() if dice.random() < 0.5 else None
     main = author.robot(library is not None)
     files = [] if library is None else [SourceFile("parts.rscd", relaid(library, dice))]
-    return Bundle(SourceFile("robot.rscd", relaid(main, dice)), tuple(files))
+    bundle = Bundle(SourceFile("robot.rscd", relaid(main, dice)), tuple(files))
+    made("random_bundle", seed, lambda: bundle_files(bundle))
+    return bundle
 
 
 def relaid(text: str, dice: Random) -> str:

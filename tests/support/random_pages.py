@@ -48,6 +48,7 @@ from robosc.model.structure import (
     Update,
     Variable,
 )
+from support.failing import made, model_files
 
 NAMES = (
     "end", "state", "note", "End", "END", "END_", "_end", "__init__", "_", "direction", "class", "classDef", "any",
@@ -66,7 +67,13 @@ TWIST = ObjectType("Library.Twist")
 
 def models() -> st.SearchStrategy[Model]:
     """Models with hostile names and texts."""
-    return st.integers(0, 2**32 - 1).map(lambda seed: _Builder(Random(seed)).model())
+    return st.integers(0, 2**32 - 1).map(_of_seed)
+
+
+def _of_seed(seed: int) -> Model:
+    model = _Builder(Random(seed)).model()
+    made("random_page", seed, lambda: model_files(model))
+    return model
 
 
 class _Builder:

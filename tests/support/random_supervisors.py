@@ -66,6 +66,7 @@ from robosc.model.structure import (
     Variable,
 )
 from robosc.supervisor.structure import AddedCondition, Certificate, DecisionDiagram, DecisionNode, Supervisor
+from support.failing import made, model_files
 
 CERTIFICATE = Certificate(
     engine_version="0.0.0",
@@ -398,6 +399,7 @@ def random_supervisor(seed: int) -> Supervisor:
         provides=_provides(dice, requested, world),
         invariants=(),
     )
+    made("random_supervisor", seed, lambda: model_files(model))
     deployment = dice.choice(list(Deployment))
     return Supervisor(model, deployment, _added(dice, to_automata(model, deployment)), CERTIFICATE)
 

@@ -1,11 +1,8 @@
 """What tests of the generated ROS packages of supervision layers share."""
 
 import ast
-import subprocess
-import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -13,6 +10,7 @@ from robosc.model.structure import Deployment
 from robosc.supervisor.structure import Supervisor
 from robosc.targets import generate, write_files
 from support.models import model_of
+from support.own_tests import own_tests
 from support.random_supervisors import CERTIFICATE
 
 HOSTILE_LAYER = r"""
@@ -39,12 +37,6 @@ robot None {
 def layer_of(text: str) -> Supervisor:
     """A layer to which synthesis adds nothing."""
     return Supervisor(model_of(text), Deployment.LAYER, (), CERTIFICATE)
-
-
-def own_tests(folder: Path) -> Any:
-    """What becomes of a generated package's own tests."""
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test"]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
 
 
 def hostile_package(target: str, folder: Path) -> None:

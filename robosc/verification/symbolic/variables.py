@@ -18,6 +18,12 @@ from robosc.verification.symbolic.work import Work
 _FRAMES_PER_LEVEL = 6
 """Python frames that the plain engine has open for each variable."""
 
+_CACHE_SLOTS = 2**14
+_MEMORY_ESTIMATE_BYTES = 2**24
+_LOOSE_SLOTS = 6_710_886
+"""What CUDD begins with: as it chooses by itself, to set it up takes longer than to verify a dozen states. Its tables
+grow as fast as by its own choice, and as large."""
+
 
 @dataclass(frozen=True, slots=True)
 class Digits:
@@ -59,7 +65,8 @@ def make_manager(engine: str) -> Any:
     """
     if engine != "autoref":
         try:
-            manager = load_dd("cudd").BDD()
+            manager = load_dd("cudd").BDD(initial_cache_size=_CACHE_SLOTS, memory_estimate=_MEMORY_ESTIMATE_BYTES)
+            manager.configure(loose_up_to=_LOOSE_SLOTS)
         except ImportError:
             manager = load_dd("autoref").BDD()
     else:

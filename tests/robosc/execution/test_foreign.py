@@ -95,9 +95,12 @@ def test_what_has_no_numbers_is_finite() -> None:
     assert is_finite(array.array("B", bytes(MAXIMUM_PARTS * 2)))
 
 
-def test_what_cannot_be_looked_through_is_not_finite() -> None:
+def test_what_cannot_be_looked_through_is_not_finite(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not is_finite(Trap())
     assert not is_finite([Trap()])
+    monkeypatch.setattr("robosc.execution.foreign.MAXIMUM_PARTS", 1000)
+    assert is_finite([0.5] * 999)
+    assert not is_finite([0.5] * 1000)
     assert not is_finite(Bottomless())
 
 

@@ -13,9 +13,8 @@ from robosc.explanation.problems import BoundedWatch, Problems
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
 from robosc.synthesis.watch import Watch
-from robosc.verification import synthesize_explicit
 from support.effort import seeds
-from support.random_systems import random_system
+from support.random_systems import explicit_supervisor, random_system
 
 EXAMPLES = 40
 STATES = 6
@@ -32,7 +31,7 @@ class Twin:
 
     def __init__(self, seed: int) -> None:
         self.system = random_system(seed)
-        supervisor = synthesize_explicit(self.system, limit=50_000)
+        supervisor = explicit_supervisor(self.system)
         assert supervisor is not None
         self.supervisor = supervisor
         self.semantics = Semantics(self.system)

@@ -32,7 +32,7 @@ from support.mutants import (
     with_added,
 )
 from support.random_models import random_bundle
-from support.random_systems import disables_something, systems
+from support.random_systems import disables_something, explicit_supervisor, systems
 
 LIMITS = Limits.of(40_000)
 SYMBOLIC = Limits(0, 0, 10**7)
@@ -113,7 +113,7 @@ def test_the_examples_pass(name: str, deployment: Deployment) -> None:
 def _right_or_caught(bundle: Bundle, supervisor: Supervisor, most: int, seed: int) -> tuple[int, int]:
     """Check mutants of what is added against the slow judge; returns how many are right and how many are not."""
     system = to_automata(supervisor.model, supervisor.deployment)
-    right = synthesize_explicit(system, limit=20_000)
+    right = explicit_supervisor(system)
     assert right is not None
     counts = [0, 0]
     mutants = list(added_mutants(supervisor.added, system, Random(seed)))
@@ -162,7 +162,7 @@ def test_mutants_of_random_models_are_judged_rightly(seed: int) -> None:
 
 
 def _judged_rightly(system: System, seed: int, most: int) -> None:
-    result, right = synthesize(system), synthesize_explicit(system, limit=20_000)
+    result, right = synthesize(system), explicit_supervisor(system)
     assert right is not None
     assume(result.status is SynthesisStatus.SUPERVISOR and disables_something(system, right))
     mutants = list(added_mutants(result.added, system, Random(seed)))

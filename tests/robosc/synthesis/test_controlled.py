@@ -28,9 +28,9 @@ from robosc.synthesis import (
     Together,
     synthesize,
 )
-from robosc.verification import ExplicitSupervisor, synthesize_explicit
+from robosc.verification import ExplicitSupervisor
 from support.effort import seeds
-from support.random_systems import random_system
+from support.random_systems import explicit_supervisor, random_system
 from support.systems import automaton, edge, operation, read
 from support.systems import system as system_of
 
@@ -53,7 +53,7 @@ def engine(request: pytest.FixtureRequest) -> str:
 
 @lru_cache(maxsize=100)
 def explicit(system: System) -> ExplicitSupervisor:
-    supervisor = synthesize_explicit(system, limit=LIMIT)
+    supervisor = explicit_supervisor(system)
     assert supervisor is not None
     return supervisor
 

@@ -23,10 +23,9 @@ from robosc.supervisor.words import Formulas, in_words
 from robosc.synthesis import SynthesisStatus, simplify, synthesize
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.nodes import restrict
-from robosc.verification import synthesize_explicit
 from support.effort import examples
 from support.families import FAMILIES
-from support.random_systems import random_system
+from support.random_systems import explicit_supervisor, random_system
 from support.systems import automaton, edge, operation, read, system
 
 MOST_STATES = 2_000
@@ -41,7 +40,7 @@ def plain(system: System, formula: Expression, state: tuple[Any, ...]) -> Any:
 
 def check_conditions(system: System, added: tuple[AddedCondition, ...]) -> None:
     """Conditions are right wherever it matters, and their formulas are the conditions everywhere."""
-    explicit = synthesize_explicit(system, limit=50_000)
+    explicit = explicit_supervisor(system)
     assert explicit is not None
     semantics = Semantics(system)
     predicates = state_predicates(system, added)

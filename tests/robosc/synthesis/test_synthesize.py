@@ -15,11 +15,11 @@ from robosc.expressions.tree import Binary, Constant, VariableRead
 from robosc.model.structure import Deployment
 from robosc.supervisor.conditions import state_predicate, state_predicates
 from robosc.synthesis import Progress, SynthesisResult, SynthesisStatus, UnknownEngineError, synthesize
-from robosc.verification import Outcome, synthesize_explicit, verify
+from robosc.verification import Outcome, verify
 from robosc.verification.symbolic import verify_symbolically
 from support.effort import seeds
 from support.models import EXAMPLE_NAMES, example_model
-from support.random_systems import kind, random_system, wide_system
+from support.random_systems import explicit_supervisor, kind, random_system, wide_system
 
 ENGINES = ("cudd", "autoref")
 PARTS = 4
@@ -35,7 +35,7 @@ def _needs_cudd() -> None:
 
 def agree(system: System, engines: tuple[str, ...] = ENGINES) -> str:
     """Compare engines with the explicit twin in every reachable state; returns the system's kind."""
-    explicit = synthesize_explicit(system, limit=LIMIT)
+    explicit = explicit_supervisor(system)
     assert explicit is not None
     results = [synthesize(system, engine=engine) for engine in engines]
     first = results[0]

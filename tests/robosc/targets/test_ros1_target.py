@@ -18,6 +18,7 @@ from robosc.targets import GeneratedFiles, GenerateOptions, generate, write_file
 from robosc.targets.ros.runtime.parameters import USE_SIM_TIME, declarations, validate
 from support.generated import example_supervisor
 from support.models import model_of
+from support.own_tests import PYTEST, own_tests
 from support.random_supervisors import CERTIFICATE
 
 yaml = pytest.importorskip("yaml", reason="PyYAML is not installed")
@@ -116,14 +117,19 @@ def test_the_readme_names_every_topic_server_and_parameter(files: GeneratedFiles
 
 
 @pytest.mark.parametrize("name", [FOLLOWER, MAZE, NAVIGATION])
-@pytest.mark.parametrize("command", [["-m", "pytest", "-q", "-p", "no:cacheprovider", "test"], ["test/run_tests.py"]])
-def test_the_packages_own_tests_pass_without_ros_and_can_fail(name: str, command: list[str], tmp_path: Path) -> None:
+@pytest.mark.parametrize("command", [PYTEST, ("test/run_tests.py",)])
+def test_the_packages_own_tests_pass_without_ros(name: str, command: tuple[str, ...], tmp_path: Path) -> None:
     write_files(generate(example_supervisor(name), "ros1"), tmp_path)
-    run = [sys.executable, *command]
-    assert subprocess.run(run, cwd=tmp_path, capture_output=True, check=False).returncode == 0
+    result = own_tests(tmp_path, command)
+    assert result.returncode == 0, result.stdout
+
+
+@pytest.mark.parametrize("command", [PYTEST, ("test/run_tests.py",)])
+def test_the_packages_own_tests_can_fail(command: tuple[str, ...], tmp_path: Path) -> None:
+    write_files(generate(example_supervisor(FOLLOWER), "ros1"), tmp_path)
     test = tmp_path / "test/test_supervisor.py"
     test.write_text(test.read_text() + "\n\ndef test_that_fails():\n    assert False\n")
-    assert subprocess.run(run, cwd=tmp_path, capture_output=True, check=False).returncode == 1
+    assert own_tests(tmp_path, command).returncode == 1
 
 
 def test_a_package_may_be_called_as_one_likes() -> None:
@@ -195,6 +201,5 @@ def test_hostile_texts_get_nowhere(tmp_path: Path) -> None:
     for path in ("package.xml", "launch/controller.launch"):
         ElementTree.fromstring(files[path])
     yaml.safe_load(files["config/parameters.yaml"])
-    run = [sys.executable, "test/run_tests.py"]
-    result = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, check=False)
+    result = own_tests(tmp_path, ("test/run_tests.py",))
     assert result.returncode == 0, result.stdout + result.stderr

@@ -22,6 +22,7 @@ from robosc.targets.ros2.runtime.lifecycle import AUTOSTART
 from support.generated import example_supervisor, imported
 from support.launch_stub import launch_actions
 from support.models import model_of
+from support.own_tests import own_tests
 from support.random_supervisors import CERTIFICATE
 
 yaml = pytest.importorskip("yaml", reason="PyYAML, a part of ROS 2, is not installed")
@@ -184,8 +185,7 @@ def test_services_and_actions_stand_in_the_package() -> None:
 @pytest.mark.parametrize("name", [FOLLOWER, MAZE, NAVIGATION])
 def test_the_packages_own_tests_pass_without_ros(name: str, tmp_path: Path) -> None:
     write_files(generate(example_supervisor(name), "ros2"), tmp_path)
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test"]
-    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    result = own_tests(tmp_path)
     assert result.returncode == 0, result.stdout
     assert "3 passed" in result.stdout
 
@@ -196,9 +196,7 @@ def test_the_packages_own_tests_can_fail(tmp_path: Path) -> None:
     text = supervisor.read_text()
     begin = text.index("def allow_move_request")
     supervisor.write_text(text[:begin] + text[begin:].replace("== 'safe'", "== 'unsafe'", 1))
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test"]
-    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert result.returncode == 1
+    assert own_tests(tmp_path).returncode == 1
 
 
 @pytest.mark.parametrize(

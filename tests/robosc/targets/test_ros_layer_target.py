@@ -20,7 +20,8 @@ from robosc.targets.ros.runtime.supervised import callers_name, robots_name
 from robosc.targets.ros2.runtime.lifecycle import AUTOSTART
 from support import porter, porter_ros1
 from support.generated import example_supervisor
-from support.ros_layers import layer_of, own_tests
+from support.own_tests import own_tests
+from support.ros_layers import layer_of
 
 yaml = pytest.importorskip("yaml", reason="PyYAML, a part of ROS 2, is not installed")
 

@@ -13,10 +13,10 @@ from robosc.automata.controlled import Added
 from robosc.errors import SynthesisCancelled
 from robosc.expressions import IntegerType, StateTest
 from robosc.model.structure import Deployment
-from robosc.verification import ExplicitSupervisor, Failure, Outcome, Verification, synthesize_explicit, verify
+from robosc.verification import ExplicitSupervisor, Failure, Outcome, Verification, verify
 from support.effort import examples
 from support.models import EXAMPLE_NAMES, example_model
-from support.random_systems import disables_something, systems
+from support.random_systems import disables_something, explicit_supervisor, systems
 from support.systems import automaton, edge, operation, read, system
 
 PASSED, FAILED, NOT_CHECKED = Outcome.PASSED, Outcome.FAILED, Outcome.NOT_CHECKED
@@ -175,7 +175,7 @@ def _added(made: System, supervisor: ExplicitSupervisor) -> dict[str, Callable[[
 @settings(max_examples=examples(80))
 @given(systems())
 def test_what_is_synthesized_passes(drawn: System) -> None:
-    supervisor = synthesize_explicit(drawn, limit=20_000)
+    supervisor = explicit_supervisor(drawn)
     assert supervisor is not None
     found = verify(drawn, _added(drawn, supervisor))
     if supervisor.is_empty:
@@ -199,7 +199,7 @@ def _mutant(
 @settings(max_examples=examples(80))
 @given(systems(), st.data())
 def test_every_mutant_is_caught_with_a_trace_that_replays(drawn: System, data: st.DataObject) -> None:
-    supervisor = synthesize_explicit(drawn, limit=20_000)
+    supervisor = explicit_supervisor(drawn)
     assume(supervisor is not None and not supervisor.is_empty and disables_something(drawn, supervisor))
     assert supervisor is not None
     semantics = Semantics(drawn)
@@ -226,7 +226,7 @@ def test_every_mutant_is_caught_with_a_trace_that_replays(drawn: System, data: s
 @pytest.mark.parametrize("deployment", list(Deployment))
 def test_the_examples_have_supervisors_that_pass(name: str, deployment: Deployment) -> None:
     drawn = to_automata(example_model(name), deployment)
-    supervisor = synthesize_explicit(drawn, limit=20_000)
+    supervisor = explicit_supervisor(drawn)
     assert supervisor is not None
     assert not supervisor.is_empty
     found = verify(drawn, _added(drawn, supervisor))

@@ -34,7 +34,7 @@ class C99Target:
 
     Args:
         supervisor: What is generated.
-        folder: Where to compile.
+        folder: Where to compile, unless the same was compiled there before.
         options: For the compiler.
     """
 

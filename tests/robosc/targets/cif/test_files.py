@@ -222,7 +222,7 @@ def test_a_requirement_without_a_value_never_holds() -> None:
     assert "requirement message_turn.c_trigger needs component_C.v_n = 0;" in text
 
 
-@pytest.mark.parametrize("size", [3, 10_000])
+@pytest.mark.parametrize("size", [3, 3000])
 def test_long_chains(size: int) -> None:
     """As deep as they are long, leaning left: written flat, without deep recursion."""
     supervisor = unsupervised(SMALL)

@@ -1,0 +1,23 @@
+"""Runs the tests that generated packages bring with them, as somebody would who has nothing but pytest."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+PYTEST = ("-m", "pytest", "-q", "-p", "no:cacheprovider", "test")
+"""What a package's page tells to run its tests with."""
+
+
+def own_tests(folder: Path, command: tuple[str, ...] = PYTEST) -> "subprocess.CompletedProcess[str]":
+    """What becomes of a generated package's own tests.
+
+    Args:
+        folder: The package.
+        command: Arguments of Python.
+    """
+    # They need none of our plug-ins, whose import takes longer than the tests.
+    variables = os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    return subprocess.run(
+        [sys.executable, *command], cwd=folder, env=variables, capture_output=True, text=True, check=False
+    )

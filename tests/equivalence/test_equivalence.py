@@ -23,7 +23,7 @@ from support.equivalence.recorded import FOLDER, read_recorded, recorded_text
 from support.equivalence.scenario import Action, Scenario
 from support.equivalence.targets import compare
 from support.equivalence.worlds import WORLDS, live, robot_supervisor
-from support.generated import loaded_file
+from support.generated import load_module, loaded_file
 from support.models import model_of
 from support.random_controllers import random_controller, random_robot
 from support.random_supervisors import CERTIFICATE, random_supervisor
@@ -94,7 +94,7 @@ def test_random_robots_in_python(seed: int) -> None:
     supervisor = _some_supervisor(seed)
     scenario = random_scenario(supervisor, seed, 60)
     expected = observe(supervisor, scenario)
-    module = python_module(supervisor)
+    module = load_module(supervisor)
     compare(generated_python(supervisor, module), scenario, expected)
     compare(generated_python(supervisor, module, has_log=False), scenario, expected)
     compare(reference(supervisor, has_log=False), scenario, expected)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 from random import Random
+from types import ModuleType
 
 import msgspec
 import pytest
@@ -22,7 +23,7 @@ from support.equivalence.recorded import FOLDER, read_recorded, recorded_text
 from support.equivalence.scenario import Action, Scenario
 from support.equivalence.targets import compare
 from support.equivalence.worlds import WORLDS, live, robot_supervisor
-from support.generated import loaded_file
+from support.generated import load_module, loaded_file
 from support.models import model_of
 from support.random_controllers import random_controller, random_robot
 from support.random_supervisors import CERTIFICATE, random_supervisor
@@ -31,8 +32,12 @@ ROBOTS = sorted(WORLDS)
 needs_gcc = pytest.mark.skipif(GCC is None, reason="gcc is not installed")
 
 
-def python_target(supervisor: Supervisor, *, has_log: bool = True) -> PythonTarget:
-    return generated_python(supervisor, loaded_file(generate(supervisor, "python")), has_log=has_log)
+def python_module(supervisor: Supervisor) -> ModuleType:
+    return loaded_file(generate(supervisor, "python"))
+
+
+def python_target(supervisor: Supervisor) -> PythonTarget:
+    return generated_python(supervisor, python_module(supervisor))
 
 
 def _some_supervisor(seed: int) -> Supervisor:
@@ -65,17 +70,21 @@ def test_the_recorded_runs_show_every_request() -> None:
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_a_recorded_run_in_python(robot: str) -> None:
+    """With a log and without."""
     supervisor = robot_supervisor(robot)
     scenario = read_recorded(robot)
-    compare(python_target(supervisor), scenario, observe(supervisor, scenario))
+    expected, module = observe(supervisor, scenario), python_module(supervisor)
+    compare(generated_python(supervisor, module), scenario, expected)
+    compare(generated_python(supervisor, module, has_log=False), scenario, expected)
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_an_example_in_python(robot: str) -> None:
     supervisor = robot_supervisor(robot)
+    module = python_module(supervisor)
     for seed in range(4):
         scenario = random_scenario(supervisor, seed, 150)
-        compare(python_target(supervisor), scenario, observe(supervisor, scenario))
+        compare(generated_python(supervisor, module), scenario, observe(supervisor, scenario))
 
 
 @settings(max_examples=examples(60))
@@ -85,16 +94,10 @@ def test_random_robots_in_python(seed: int) -> None:
     supervisor = _some_supervisor(seed)
     scenario = random_scenario(supervisor, seed, 60)
     expected = observe(supervisor, scenario)
-    compare(python_target(supervisor), scenario, expected)
+    module = load_module(supervisor)
+    compare(generated_python(supervisor, module), scenario, expected)
+    compare(generated_python(supervisor, module, has_log=False), scenario, expected)
     compare(reference(supervisor, has_log=False), scenario, expected)
-    compare(python_target(supervisor, has_log=False), scenario, expected)
-
-
-@pytest.mark.parametrize("robot", ROBOTS)
-def test_a_recorded_run_without_a_log(robot: str) -> None:
-    supervisor = robot_supervisor(robot)
-    scenario = read_recorded(robot)
-    compare(python_target(supervisor, has_log=False), scenario, observe(supervisor, scenario))
 
 
 @needs_gcc

@@ -19,7 +19,7 @@ from support.equivalence.c99_target import C99Layer
 from support.equivalence.python_targets import PythonTarget, generated_python, observe
 from support.equivalence.random_scenarios import random_scenario
 from support.equivalence.targets import compare
-from support.generated import example_supervisor, loaded_file
+from support.generated import example_supervisor, load_module, loaded_file
 from support.random_layers import random_layer
 from support.random_supervisors import random_supervisor
 
@@ -54,7 +54,7 @@ def test_an_example_in_python(robot: str) -> None:
 def test_random_robots_in_python(seed: int) -> None:
     supervisor = some_layer(seed)
     scenario = random_scenario(supervisor, seed, 60)
-    compare(python_target(supervisor), scenario, observe(supervisor, scenario))
+    compare(generated_python(supervisor, load_module(supervisor)), scenario, observe(supervisor, scenario))
 
 
 @needs_gcc

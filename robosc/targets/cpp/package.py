@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from importlib import resources
 
 import jinja2
@@ -235,6 +236,7 @@ def declaration(parameter: Parameter) -> str:
     return f"{{{string_literal(parameter.name)}, {value}, {string_literal(parameter.description)}}},"
 
 
+@cache
 def _environment(module: str) -> jinja2.Environment:
     environment = jinja2.Environment(
         loader=jinja2.ChoiceLoader([jinja2.PackageLoader(module), jinja2.PackageLoader("robosc.targets.cpp")]),

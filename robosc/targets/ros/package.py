@@ -4,6 +4,7 @@ import json
 import pprint
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
 from importlib import resources
 
 import jinja2
@@ -151,6 +152,7 @@ def python_files(supervisor: Supervisor, package: str, modules: Mapping[str, str
     return files
 
 
+@cache
 def environment(target: str) -> jinja2.Environment:
     """Templates of a target's package, and those that all packages share."""
     found = jinja2.Environment(

@@ -17,7 +17,7 @@ from robosc.automata import System, to_automata
 from robosc.expressions import Expression, StateTest, Value, VariableRead, leaves
 from robosc.expressions.evaluate import evaluate as evaluate_expression
 from robosc.model import check
-from robosc.supervisor import Supervisor, make_supervisor
+from robosc.supervisor import Supervisor, make_supervisor, summary
 from robosc.supervisor.diagram import Domains, Subject, diagram_domains, evaluate
 from robosc.supervisor.structure import DecisionDiagram
 from robosc.supervisor.summary import added_lines, added_texts, summary_json
@@ -35,6 +35,12 @@ def made(path: Path) -> tuple[Supervisor, System]:
     supervisor = make_supervisor(bundle_of(path.read_text(encoding="utf-8")), engine="autoref").supervisor
     assert supervisor is not None
     return supervisor, to_automata(supervisor.model, supervisor.deployment)
+
+
+@pytest.fixture(autouse=True)
+def _searched_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is told in several ways is looked for once."""
+    monkeypatch.setattr(summary, "_added", cache(summary._added))
 
 
 def words(supervisor: Supervisor, system: System) -> str:

@@ -8,6 +8,11 @@ from typing import Self
 import serial
 from dynamixel_sdk import PortHandler
 
+from robosc_bridge.simulated import SimulatedLine
+
+PATIENCE_S = 60.0
+"""Time after which something that comes at once is taken for lost: it ends a test that fails."""
+
 
 class Host:
     """An open port.
@@ -18,7 +23,7 @@ class Host:
     """
 
     def __init__(self, path: str, baud: int = 1_000_000) -> None:
-        self.port = serial.Serial(path, baud, timeout=5.0)
+        self.port = serial.Serial(path, baud, timeout=PATIENCE_S)
 
     def send(self, hexes: str | bytes) -> None:
         self.port.write(bytes.fromhex(hexes) if isinstance(hexes, str) else hexes)
@@ -43,7 +48,7 @@ class Host:
     def hears_nothing(self, seconds: float = 0.05) -> bool:
         self.port.timeout = seconds
         data = self.port.read(1)
-        self.port.timeout = 5.0
+        self.port.timeout = PATIENCE_S
         return not data
 
     def close(self) -> None:
@@ -58,21 +63,53 @@ class Host:
         self.close()
 
 
-def set_speed(port: PortHandler, baud: int) -> None:
-    """Open the SDK's port anew at a speed."""
-    assert port.setBaudRate(baud)
-    # As it comes it spins while it waits, and a simulator in the same process starves.
-    port.ser.timeout = 0.005
+class SdkPort(PortHandler):  # type: ignore[misc]
+    """A port of dynamixel-sdk, open, that gives up when nothing can come any more and not when time is over.
+
+    The SDK waits some 34 ms for an answer, which a busy computer does not always keep.
+
+    Args:
+        line: At the other end.
+    """
+
+    def __init__(self, line: SimulatedLine) -> None:
+        super().__init__(line.path)
+        self._line = line
+        self._written = line.received
+        self._read = line.sent
+        self.set_speed(self.baudrate)
+
+    def set_speed(self, baud: int) -> None:
+        """Open it anew at a speed."""
+        self._settle()
+        self._read = self._line.sent
+        assert self.setBaudRate(baud)
+        # As it comes it spins while it waits, and a simulator in the same process starves.
+        self.ser.timeout = 0.005
+
+    def writePort(self, packet: bytes | list[int]) -> int:
+        written: int = super().writePort(packet)
+        self._written += written
+        return written
+
+    def readPort(self, length: int) -> bytes:
+        data: bytes = super().readPort(length)
+        self._read += len(data)
+        return data
+
+    def clearPort(self) -> None:
+        self.readPort(self.ser.in_waiting)
+
+    def isPacketTimeout(self) -> bool:
+        is_over = self._line.has_answered(self._written) and self._read == self._line.sent
+        assert is_over or self.getTimeSinceStart() < 1000 * PATIENCE_S, "the line hangs"
+        return is_over
+
+    def _settle(self) -> None:
+        wait_until(lambda: self._line.has_answered(self._written))
 
 
-def sdk_port(path: str, baud: int = 1_000_000) -> PortHandler:
-    """A port of dynamixel-sdk, open."""
-    port = PortHandler(path)
-    set_speed(port, baud)
-    return port
-
-
-def wait_until(is_so: Callable[[], bool], limit_s: float = 5.0) -> None:
+def wait_until(is_so: Callable[[], bool], limit_s: float = PATIENCE_S) -> None:
     """Wait for a condition, with a limit."""
     end_s = time.monotonic() + limit_s
     while not is_so():

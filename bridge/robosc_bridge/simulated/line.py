@@ -145,6 +145,11 @@ class SimulatedLine:
         """Whether the port is there."""
         return self._end.is_connected
 
+    def has_answered(self, received: int) -> bool:
+        """Return whether it has heard so many bytes of the host, and has nothing on the wire for it."""
+        with self._time.lock:
+            return self.received >= received and not self._wire
+
     def disconnect(self) -> None:
         """Pull the plug: the port is gone, and whoever has it open sees a hang-up."""
         with self._time.lock:

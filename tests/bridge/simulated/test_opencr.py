@@ -10,7 +10,7 @@ from dynamixel_sdk import PacketHandler
 
 from robosc.execution.clock import ManualClock
 from robosc_bridge.simulated import Noise, OpenCr, Scene, SimulatedTurtleBot3, Walls
-from support.wire import sdk_port
+from support.wire import SdkPort
 
 OPEN_SPACE = Walls(())
 
@@ -22,7 +22,7 @@ class Station:
         assert robot.opencr is not None
         self.robot = robot
         self.opencr: OpenCr = robot.opencr
-        self.port = sdk_port(robot.base_path)
+        self.port = SdkPort(robot.base_line)
         self.handler = PacketHandler(2.0)
         self.beats = 0
 

@@ -9,7 +9,7 @@ from dynamixel_sdk import GroupBulkRead, GroupBulkWrite, GroupSyncRead, GroupSyn
 
 from robosc.execution.clock import ManualClock
 from robosc_bridge.simulated import HardwareError, Servo, SimulatedTurtleBot3, Walls
-from support.wire import sdk_port, set_speed
+from support.wire import SdkPort
 
 OPEN_SPACE = Walls(())
 RAM_GOAL, TORQUE, WATCHDOG, HARDWARE_ERROR = 104, 64, 98, 70
@@ -21,7 +21,7 @@ class Station:
 
     def __init__(self, robot: SimulatedTurtleBot3) -> None:
         self.robot = robot
-        self.port = sdk_port(robot.base_path)
+        self.port = SdkPort(robot.base_line)
         self.handler = PacketHandler(2.0)
 
     def write(self, address: int, size: int, value: int, device_id: int = 1) -> tuple[int, int]:
@@ -330,7 +330,7 @@ def test_every_error_alerts_and_the_chosen_ones_shut_off(station: Station, error
 def test_the_bus_takes_its_time(station: Station) -> None:
     station.write(9, 1, 0)
     station.write(8, 1, 1)
-    set_speed(station.port, 57_600)
+    station.port.set_speed(57_600)
     # 10 bytes there and 14 back.
     for _ in range(5):
         began_s = time.monotonic()
@@ -384,7 +384,7 @@ def test_a_factory_reset_keeps_what_it_is_told_to(station: Station) -> None:
     assert station.handler.factoryReset(station.port, 1, 0xFF) == (0, 0)
     station.robot.advance(0.5)
     assert station.ping()[1] == SILENT
-    set_speed(station.port, 57_600)
+    station.port.set_speed(57_600)
     assert station.ping() == (1060, 0, 0)
 
 
@@ -394,7 +394,7 @@ def test_another_id_and_another_speed_act_at_once(station: Station) -> None:
     assert station.ping(42) == (1060, 0, 0)
     assert station.write(8, 1, 1, 42) == (0, 0)
     assert station.ping(42)[1] == SILENT
-    set_speed(station.port, 57_600)
+    station.port.set_speed(57_600)
     assert station.ping(42) == (1060, 0, 0)
     assert station.ping(2)[1] == SILENT
 

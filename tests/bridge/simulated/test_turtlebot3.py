@@ -9,7 +9,7 @@ from dynamixel_sdk import GroupSyncWrite, PacketHandler
 
 from robosc.execution.clock import ManualClock
 from robosc_bridge.simulated import BASES, BODIES, LIDARS, SimulatedTurtleBot3, Walls
-from support.wire import Host, sdk_port, wait_until
+from support.wire import Host, SdkPort, wait_until
 
 
 @pytest.mark.parametrize("robot", BODIES)
@@ -50,7 +50,7 @@ def here(robot: SimulatedTurtleBot3, later_s: float = 0.0) -> Look:
 
 def drive_off(robot: SimulatedTurtleBot3) -> float:
     """Let both servos turn forward; how fast that is, in m/s of the world."""
-    port, handler = sdk_port(robot.base_path), PacketHandler(2.0)
+    port, handler = SdkPort(robot.base_line), PacketHandler(2.0)
     for device_id in (1, 2):
         assert handler.write1ByteTxRx(port, device_id, 64, 1) == (0, 0)
     goals = GroupSyncWrite(port, handler, 104, 4)

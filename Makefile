@@ -16,7 +16,7 @@ WHEELS := out/wheels
 # Without bytecode on disk, every program that the tests start would compile all that it imports.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test acceptance smoke soak mutants fuzz lint format bindings lock benchmark environment colcon checkers images extension vscode clean help
+.PHONY: demo test acceptance smoke soak mutants faults fuzz lint format bindings lock benchmark environment colcon checkers images extension vscode clean help
 
 help:
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -83,7 +83,7 @@ soak: $(READY) ## random tests with EFFORT times the examples, drawn from SEED
 	ROBOSC_EFFORT=$(EFFORT) ROBOSC_SEED=$(SEED) $(PYTEST) -n $(WORKERS) --dist worksteal --timeout 7200 -r fE \
 	  --hypothesis-seed=$(SEED) -m "hypothesis or random" $(TESTS)
 
-# Tools of `mutants` and `fuzz`: some exist for some systems only, so that they are no part of the environment.
+# Tools of `mutants`, `faults` and `fuzz`: some exist for some systems only, so that they are no part of the environment.
 TOOLS := out/tools
 
 $(TOOLS)/.ready: deploy/requirements-soak.txt | $(READY)
@@ -101,6 +101,11 @@ mutants: $(TOOLS)/.ready ## mutation tests of the bridge's safety layer
 	cp -r tests/support out/mutation/tests
 	cp -r tests/bridge/safety out/mutation/tests/bridge
 	cd out/mutation && $(MUTMUT) run && $(MUTMUT) results
+
+FAULTS := --number 50 --seed 1
+
+faults: $(TOOLS)/.ready ## put small faults into functions drawn by chance, one at a time, and tell which the tests find
+	PYTHONPATH=$(CURDIR)/$(TOOLS) $(BIN)/python soak/faults.py $(FAULTS)
 
 DECODERS := lds01 lds02 lds03 mavlink dynamixel registers
 SECONDS := 60

@@ -12,7 +12,8 @@ from robosc.model.structure import Deployment
 from robosc.targets import generate, write_files
 from support.generated import example_supervisor
 from support.process import Process
-from support.ros1 import PYTHON, Master, Peer, clean_environment, missing, until, wait_until
+from support.ros1 import PYTHON, Master, Peer, clean_environment, missing, until
+from support.waiting import wait_until
 
 pytestmark = [
     pytest.mark.ros1,

@@ -22,8 +22,8 @@ from support.ros1_cpp import (
     node_command,
     plain_environment,
     supervisor_of,
-    until,
 )
+from support.waiting import wait_until
 
 pytestmark = [
     pytest.mark.skipif(missing() is not None, reason=str(missing())),
@@ -100,20 +100,22 @@ class Robot:
             self.line()
             self.scan(2.0)
 
-        until(lambda: self.speed == 0.15, "the robot to move", see)
+        wait_until(lambda: self.speed == 0.15, "the robot to move", repeat=see)
 
 
 @pytest.mark.smoke
 def test_it_moves_only_while_everything_allows_it(start: Start, peer: Peer) -> None:
     start("period:=0.02")
     robot = Robot(peer)
-    until(lambda: robot.speed is not None, "the first command")
-    until(lambda: len(robot.commands) > 10, "a line without a scan to change nothing", robot.line)
+    wait_until(lambda: robot.speed is not None, "the first command")
+    wait_until(lambda: len(robot.commands) > 10, "a line without a scan to change nothing", repeat=robot.line)
     assert {command["linear"]["x"] for command in robot.commands} == {0.0}
 
     robot.drive()
     assert robot.commands[-1]["angular"]["z"] == 0.25
-    until(lambda: robot.commands[-1]["angular"]["z"] == -0.5, "the new correction", lambda: robot.line(-0.5))
+    wait_until(
+        lambda: robot.commands[-1]["angular"]["z"] == -0.5, "the new correction", repeat=lambda: robot.line(-0.5)
+    )
 
     stops: list[tuple[str, Callable[[], object], Callable[[], object]]] = [
         ("an obstacle", lambda: robot.scan(0.2), lambda: robot.scan(2.0)),
@@ -121,11 +123,11 @@ def test_it_moves_only_while_everything_allows_it(start: Start, peer: Peer) -> N
         ("a lost line", lambda: robot.empty("/line/lost"), robot.line),
     ]
     for what, stop, resume in stops:
-        until(lambda: robot.speed == 0.0, f"the robot to stop at {what}", stop)
+        wait_until(lambda: robot.speed == 0.0, f"the robot to stop at {what}", repeat=stop)
         before = len(robot.commands)
-        until(lambda before=before: len(robot.commands) > before + 5, "more commands")  # type: ignore[misc]
+        wait_until(lambda before=before: len(robot.commands) > before + 5, "more commands")  # type: ignore[misc]
         assert {command["linear"]["x"] for command in robot.commands[before:]} == {0.0}, what
-        until(lambda: robot.speed == 0.15, f"the robot to move again after {what}", resume)
+        wait_until(lambda: robot.speed == 0.15, f"the robot to move again after {what}", repeat=resume)
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
@@ -136,7 +138,7 @@ def test_a_signal_stops_the_robot_first(start: Start, peer: Peer, number: signal
     robot.drive()
     node.signal(number)
     assert node.wait() == 0
-    until(lambda: robot.speed == 0.0, "a zero")
+    wait_until(lambda: robot.speed == 0.0, "a zero")
     assert robot.commands[-1] == {"linear": STOPPED, "angular": STOPPED}
     assert node.stderr == ""
     (log,) = (tmp_path / "new" / "events").iterdir()
@@ -163,7 +165,7 @@ def test_rosnode_kill_stops_the_robot_first(start: Start, peer: Peer, master: Ma
     )
     assert done.returncode == 0, done.stderr
     assert node.wait() == 0
-    until(lambda: robot.speed == 0.0, "a zero")
+    wait_until(lambda: robot.speed == 0.0, "a zero")
 
 
 def test_without_its_master_the_robot_is_stopped(workspace: Path, tmp_path: Path) -> None:
@@ -184,7 +186,7 @@ def test_without_its_master_the_robot_is_stopped(workspace: Path, tmp_path: Path
             lost.append((node, robot))
         for node, robot in lost:
             assert node.wait() == 1
-            until(lambda robot=robot: robot.speed == 0.0, "a zero")  # type: ignore[misc]
+            wait_until(lambda robot=robot: robot.speed == 0.0, "a zero")  # type: ignore[misc]
             assert node.stderr == f"{PACKAGE}: the ROS master is lost\n"
 
 
@@ -192,9 +194,9 @@ def test_a_fault_stops_the_robot_and_is_told_at_the_end(start: Start, peer: Peer
     node = start("period:=0.5", "on_unknown:=fault")
     robot = Robot(peer)
     robot.drive()
-    until(lambda: not node.is_running, "the end", lambda: robot.scan(float("nan")))
+    wait_until(lambda: not node.is_running, "the end", repeat=lambda: robot.scan(float("nan")))
     assert node.wait() == 1
-    until(lambda: robot.speed == 0.0, "a zero")
+    wait_until(lambda: robot.speed == 0.0, "a zero")
     assert node.stderr.splitlines()[-1] == f"{PACKAGE}: something was unknown"
 
 
@@ -235,9 +237,9 @@ def test_state_prefix_stale_sensors_and_other_scans(start: Start, peer: Peer) ->
         # Of 720 beams the model's 360 are made.
         robot.scan(2.0, count=720)
 
-    until(lambda: robot.speed == 0.15, "the robot to move", see)
+    wait_until(lambda: robot.speed == 0.15, "the robot to move", repeat=see)
     assert "there is no parameter 'perod'" in node.stdout + node.stderr
-    until(lambda: bool(peer.messages("/robot1/state")), "a state")
+    wait_until(lambda: bool(peer.messages("/robot1/state")), "a state")
     state = json.loads(peer.messages("/robot1/state")[-1]["data"])
     assert state["communications"] == {}
     assert state["definition"]["name"] == "LineFollower"
@@ -250,7 +252,7 @@ def test_state_prefix_stale_sensors_and_other_scans(start: Start, peer: Peer) ->
     taken = [number for item in peer.messages("/robot1/state") for number in json.loads(item["data"])["transitions"]]
     assert taken
     assert set(taken) <= numbers
-    until(lambda: bool(peer.messages("/diagnostics")), "diagnostics")
+    wait_until(lambda: bool(peer.messages("/diagnostics")), "diagnostics")
     (status,) = peer.messages("/diagnostics")[-1]["status"]
     assert status["name"] == f"/{PACKAGE}: controller"
     assert status["hardware_id"] == "LineFollower"
@@ -278,18 +280,18 @@ def test_a_stale_sensor_stops_the_robot_until_it_is_back(
             robot.line()
             robot.scan(2.0)
 
-        until(lambda: robot.speed == 0.15, "the robot to move", see)
-        until(lambda: robot.speed == 0.0, "the robot to stop without scans", robot.line)
-        until(lambda: robot.speed == 0.15, "the robot to move again", see)
+        wait_until(lambda: robot.speed == 0.15, "the robot to move", repeat=see)
+        wait_until(lambda: robot.speed == 0.0, "the robot to stop without scans", repeat=robot.line)
+        wait_until(lambda: robot.speed == 0.15, "the robot to move again", repeat=see)
         launch.signal(signal.SIGINT)
         assert launch.wait() == 0
-    until(lambda: robot.speed == 0.0, "a zero at the end")
+    wait_until(lambda: robot.speed == 0.0, "a zero at the end")
 
 
 def test_it_ends_on_a_signal_while_there_is_no_master(workspace: Path, tmp_path: Path) -> None:
     variables = plain_environment(ROS_MASTER_URI="http://127.0.0.1:9", ROS_IP="127.0.0.1", ROS_HOME=str(tmp_path))
     with Process(node_command(workspace), variables, tmp_path / "node") as node:
-        until(lambda: "waiting for the master" in node.stdout + node.stderr, "the warning")
+        wait_until(lambda: "waiting for the master" in node.stdout + node.stderr, "the warning")
         node.signal(signal.SIGTERM)
         assert node.wait() == 0
 

@@ -9,7 +9,8 @@ import pytest
 from robosc.supervisor.structure import Supervisor
 from support.node_logs import Entry, entries_of
 from support.process import Process
-from support.ros1_cpp import Master, Peer, built_once, missing, node_command, supervisor_of, until
+from support.ros1_cpp import Master, Peer, built_once, missing, node_command, supervisor_of
+from support.waiting import wait_until
 
 pytestmark = [
     pytest.mark.skipif(missing() is not None, reason=str(missing())),
@@ -57,7 +58,7 @@ class Carrier:
             assert self.node.is_running, self.node.stderr
             return len(self.events(event)) >= count
 
-        until(is_there, f"{event}, {count} times", repeat)
+        wait_until(is_there, f"{event}, {count} times", repeat=repeat)
 
     def say(self, word: str) -> None:
         self.peer.publish("/word", "std_msgs/String", data=word)
@@ -67,7 +68,7 @@ class Carrier:
 
     def calibrate(self) -> None:
         """Answer the calibration as it should be."""
-        until(lambda: bool(self.peer.of("called", "/calibrate")), "a call")
+        wait_until(lambda: bool(self.peer.of("called", "/calibrate")), "a call")
         self.peer.tell("answer", "/calibrate", data={"success": True, "message": "fine"})
         self.until("calibrate.response")
 
@@ -75,7 +76,7 @@ class Carrier:
         """Get it so far that a goal is under way."""
         before = len(self.peer.of("goal", "/move_base"))
         self.until("word.response", repeat=lambda: self.say("go"))
-        until(lambda: len(self.peer.of("goal", "/move_base")) > before, "a goal")
+        wait_until(lambda: len(self.peer.of("goal", "/move_base")) > before, "a goal")
 
 
 @pytest.fixture
@@ -105,8 +106,8 @@ def test_what_is_sent_is_as_the_model_says_and_stamped(ready: Carrier, superviso
     ):
         peer.tell("subscribe", topic, type_)
     ready.until("level.response", repeat=lambda: peer.publish("/level", "std_msgs/Float32", data=0.25))
-    until(lambda: any(m["twist"]["angular"]["z"] == 0.25 for m in peer.messages("/creep")), "the charge")
-    until(lambda: bool(peer.messages("/said") and peer.messages("/count")), "texts and numbers")
+    wait_until(lambda: any(m["twist"]["angular"]["z"] == 0.25 for m in peer.messages("/creep")), "the charge")
+    wait_until(lambda: bool(peer.messages("/said") and peer.messages("/count")), "texts and numbers")
     message = peer.messages("/creep")[-1]
     assert message["header"]["frame_id"] == "base_link"
     assert message["header"]["stamp"] > 1e9
@@ -156,7 +157,7 @@ def test_missing_servers_are_errors_and_never_block(carrier: Carrier) -> None:
     carrier.start("server_wait:=0.2")
     carrier.until("calibrate.error", 3)
     # The wheels go on turning between the failing calls.
-    until(lambda: len(carrier.peer.messages("/creep")) > 5, "commands")
+    wait_until(lambda: len(carrier.peer.messages("/creep")) > 5, "commands")
     assert "starting without a server of /calibrate, /move_base" in carrier.node.stdout + carrier.node.stderr
     carrier.peer.tell("service", "/calibrate", "std_srvs/Trigger")
     carrier.calibrate()
@@ -169,7 +170,7 @@ def test_a_service_that_does_not_answer_times_out_and_its_late_answer_changes_no
     carrier.peer.tell("action", "/move_base", "move_base_msgs/MoveBase")
     carrier.start("service_timeout:=0.3")
     carrier.until("calibrate.error", 2)
-    until(lambda: len(carrier.peer.of("called", "/calibrate")) >= 2, "another call")
+    wait_until(lambda: len(carrier.peer.of("called", "/calibrate")) >= 2, "another call")
     carrier.peer.tell("answer", "/calibrate", data="fail")
     carrier.until("calibrate.error", 3)
     # It ends at once, although calls wait for their replies.
@@ -182,20 +183,20 @@ def test_goals_end_in_every_way(ready: Carrier) -> None:
     ready.drive()
     peer.tell("reject", "/move_base")
     ready.until("carry.error", 1)
-    until(lambda: len(peer.of("goal", "/move_base")) >= 2, "another goal")
+    wait_until(lambda: len(peer.of("goal", "/move_base")) >= 2, "another goal")
     peer.tell("accept", "/move_base")
     peer.tell("abort", "/move_base")
     ready.until("carry.error", 2)
-    until(lambda: len(peer.of("goal", "/move_base")) >= 3, "another goal")
+    wait_until(lambda: len(peer.of("goal", "/move_base")) >= 3, "another goal")
     peer.tell("accept", "/move_base")
     # Something stands in the way: the goal is cancelled.
     ready.until("carry.cancel", repeat=lambda: ready.scan(0.2))
-    until(lambda: bool(peer.of("cancel", "/move_base")), "the cancel")
+    wait_until(lambda: bool(peer.of("cancel", "/move_base")), "the cancel")
     peer.tell("canceled", "/move_base")
     ready.until("scan.response", 1)
     goals = len(peer.of("goal", "/move_base"))
     ready.until("scan.response", len(ready.events("scan.response")) + 1, repeat=lambda: ready.scan(5.0))
-    until(lambda: len(peer.of("goal", "/move_base")) > goals, "a goal with a clear way")
+    wait_until(lambda: len(peer.of("goal", "/move_base")) > goals, "a goal with a clear way")
 
 
 def test_a_goal_is_cancelled_when_the_node_is_stopped(ready: Carrier) -> None:
@@ -205,7 +206,7 @@ def test_a_goal_is_cancelled_when_the_node_is_stopped(ready: Carrier) -> None:
     ready.until("carry.feedback")
     ready.peer.tell("subscribe", "/creep", "geometry_msgs/TwistStamped")
     ready.node.signal(signal.SIGINT)
-    until(lambda: bool(ready.peer.of("cancel", "/move_base")), "the cancel")
+    wait_until(lambda: bool(ready.peer.of("cancel", "/move_base")), "the cancel")
     assert ready.node.wait() == 0
     assert ready.node.stderr == ""
 
@@ -219,7 +220,7 @@ def test_a_server_that_vanishes_is_an_error(workspace: Path, tmp_path: Path) -> 
         with carrier.node:
             carrier.calibrate()
             carrier.until("word.response", repeat=lambda: carrier.say("go"))
-            until(lambda: bool(mover.of("goal", "/move_base")), "a goal")
+            wait_until(lambda: bool(mover.of("goal", "/move_base")), "a goal")
             mover.tell("accept", "/move_base")
             mover.tell("feedback", "/move_base", data={})
             carrier.until("carry.feedback")
@@ -250,7 +251,7 @@ def test_a_goal_that_nothing_is_heard_of_is_an_error(carrier: Carrier) -> None:
     carrier.start()
     carrier.calibrate()
     carrier.until("carry.request", repeat=lambda: carrier.say("go"))
-    until(lambda: bool(carrier.peer.of("goal", "/move_base")), "a goal")
+    wait_until(lambda: bool(carrier.peer.of("goal", "/move_base")), "a goal")
     carrier.until("carry.error")
 
 
@@ -259,6 +260,6 @@ def test_calls_that_never_end_do_not_keep_others_from_being_made(carrier: Carrie
     carrier.peer.tell("action", "/move_base", "move_base_msgs/MoveBase")
     carrier.start("service_timeout:=0.01")
     # More than may wait, and more than threads of one service may be.
-    until(lambda: len(carrier.peer.of("called", "/calibrate")) > 40, "another call")
+    wait_until(lambda: len(carrier.peer.of("called", "/calibrate")) > 40, "another call")
     carrier.node.signal(signal.SIGTERM)
     assert carrier.node.wait() == 0

@@ -25,7 +25,8 @@ from support.porter_ros1 import (
     porter_supervisor,
 )
 from support.process import Process
-from support.ros1 import PYTHON, missing, until, wait_until
+from support.ros1 import PYTHON, missing, until
+from support.waiting import wait_until
 
 pytestmark = [
     pytest.mark.ros1,

@@ -13,7 +13,8 @@ from robosc.language import load_bundle
 from robosc.supervisor import make_supervisor
 from robosc.targets import generate, write_files
 from support.process import Process
-from support.ros1 import Master, Peer, missing, start_node, until, wait_until
+from support.ros1 import Master, Peer, missing, start_node, until
+from support.waiting import wait_until
 
 pytestmark = [
     pytest.mark.ros1,

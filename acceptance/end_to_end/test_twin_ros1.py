@@ -16,7 +16,8 @@ import pytest
 from robosc_bridge.experiments.ros1 import run_line, run_maze
 from robosc_bridge.experiments.scenario import Outcome
 from support.process import Process
-from support.ros1 import Master, Peer, clean_environment, missing, until, wait_until
+from support.ros1 import Master, Peer, clean_environment, missing, until
+from support.waiting import wait_until
 
 pytestmark = [pytest.mark.ros1, pytest.mark.skipif(missing() is not None, reason=str(missing())), pytest.mark.real_time]
 

@@ -13,7 +13,8 @@ from robosc.supervisor.structure import Supervisor
 from support import porter
 from support.models import bundle_of
 from support.process import Process
-from support.ros1 import PYTHON, Master, Peer, start_node, until, wait_until
+from support.ros1 import PYTHON, Master, Peer, start_node, until
+from support.waiting import wait_until
 
 PACKAGE = "porter_layer"
 CARELESS = Path(__file__).with_name("ros1_careless.py")

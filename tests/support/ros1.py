@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from support.process import EXIT_LIMIT_S, Process
+from support.waiting import wait_until
 
 PYTHON = "/usr/bin/python3"
 LIMIT_S = 20.0
@@ -48,18 +49,6 @@ def free_port() -> int:
     with socket.socket() as found:
         found.bind(("127.0.0.1", 0))
         return int(found.getsockname()[1])
-
-
-def wait_until(condition: Callable[[], bool], what: str, limit_s: float = LIMIT_S) -> None:
-    """Poll until a condition is true.
-
-    Raises:
-        AssertionError: It was not within the limit; says what was waited for.
-    """
-    deadline = time.monotonic() + limit_s
-    while not condition():
-        assert time.monotonic() < deadline, f"waited {limit_s} s in vain for {what}"
-        time.sleep(0.01)
 
 
 class Master:
@@ -301,12 +290,11 @@ def until(
     Raises:
         AssertionError: It did not become true in time, or the process ended.
     """
-    deadline = time.monotonic() + limit_s
-    next_s = time.monotonic()
-    while not condition():
-        assert time.monotonic() < deadline, f"waited {limit_s} s in vain for {what}\n{process.stderr}"
-        assert process.is_running, f"the node ended, waiting for {what}\n{process.stderr}"
-        if time.monotonic() >= next_s:
-            repeat()
-            next_s = time.monotonic() + REPEAT_S
-        time.sleep(0.005)
+    wait_until(
+        condition,
+        what,
+        limit_s,
+        repeat=repeat,
+        fault=lambda: "" if process.is_running else "the node ended",
+        told=lambda: process.stderr,
+    )

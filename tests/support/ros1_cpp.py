@@ -7,8 +7,6 @@ import shutil
 import socket
 import subprocess
 import threading
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Self
 
@@ -20,6 +18,7 @@ from robosc.supervisor.structure import Supervisor
 from robosc.targets import generate, write_files
 from support.process import Process
 from support.shared import shared
+from support.waiting import wait_until
 
 LIMIT_S = 20.0
 PYTHON = "/usr/bin/python3"
@@ -79,22 +78,6 @@ def built_once(supervisor: Supervisor, factory: pytest.TempPathFactory) -> Path:
     return shared(factory, f"ros1_cpp_{supervisor.model.name}", lambda folder: built(supervisor, folder))
 
 
-def until(condition: Callable[[], bool], what: str, repeat: Callable[[], object] = lambda: None) -> None:
-    """Poll until a condition is true, doing something again and again: first messages may be lost.
-
-    Raises:
-        AssertionError: It was not within the limit; says what was waited for.
-    """
-    deadline = time.monotonic() + LIMIT_S
-    next_repeat = 0.0
-    while not condition():
-        assert time.monotonic() < deadline, f"waited {LIMIT_S} s in vain for {what}"
-        if time.monotonic() >= next_repeat:
-            repeat()
-            next_repeat = time.monotonic() + 0.1
-        time.sleep(0.005)
-
-
 class Master(Process):
     """A rosmaster of its own.
 
@@ -114,7 +97,7 @@ class Master(Process):
         )
         self._command = ["/usr/bin/rosmaster", "--core", "-p", str(self.port)]
         super().__init__(self._command, self.variables, folder / "master")
-        until(self._is_up, "the master")
+        wait_until(self._is_up, "the master")
 
     def another(self, folder: Path) -> Process:
         """One in its place that knows nobody; it has ended."""
@@ -150,7 +133,7 @@ class Peer:
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
         try:
-            until(lambda: bool(self.of("ready")), "the peer")
+            wait_until(lambda: bool(self.of("ready")), "the peer")
         except BaseException:
             self.kill()
             raise

@@ -14,7 +14,7 @@ from typing import Any, Self
 from robosc_bridge.experiments.domains import own_domain
 from support.process import Process
 
-__all__ = ["Peer", "RosProcess", "environment", "own_domain", "wait_until"]
+__all__ = ["Peer", "RosProcess", "environment", "own_domain"]
 
 PEER_NODE, SERVERS_NODE = "test_peer", "test_servers"
 OWN_NODES = frozenset({PEER_NODE, SERVERS_NODE})
@@ -46,18 +46,6 @@ def environment(domain: int, folder: Path) -> dict[str, str]:
         "ROS_PYTHON_CHECK_FIELDS": "1",
         "FASTRTPS_DEFAULT_PROFILES_FILE": str(profile),
     }
-
-
-def wait_until(condition: Callable[[], bool], limit_s: float, what: str, step_s: float = 0.01) -> None:
-    """Poll until a condition is true.
-
-    Raises:
-        AssertionError: It was not within the limit; says what was waited for.
-    """
-    deadline = time.monotonic() + limit_s
-    while not condition():
-        assert time.monotonic() < deadline, f"waited {limit_s} s in vain for {what}"
-        time.sleep(step_s)
 
 
 class RosProcess(Process):

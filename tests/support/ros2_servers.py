@@ -5,7 +5,8 @@ from collections.abc import Callable
 from enum import Enum
 from typing import Any, Self
 
-from support.ros2 import SERVERS_NODE, Peer, wait_until
+from support.ros2 import SERVERS_NODE, Peer
+from support.waiting import wait_until
 
 LIMIT_S = 60.0
 
@@ -52,7 +53,7 @@ class ServerHost:
         for gate in self.gates:
             gate.open(None)
         # A server that is still at work would live on, and answer the next test.
-        wait_until(lambda: all(gate.is_over for gate in self.gates), LIMIT_S, "the servers' callbacks to end")
+        wait_until(lambda: all(gate.is_over for gate in self.gates), "the servers' callbacks to end", LIMIT_S)
         self._is_spinning = False
         self._thread.join(LIMIT_S)
         self._executor.shutdown()

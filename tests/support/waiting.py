@@ -15,6 +15,9 @@ PATIENCE_S = 60.0
 _PAUSE_S = 0.005
 
 
+_REPEAT_S = 0.1
+
+
 def eventually(condition: Callable[[], bool]) -> bool:
     """Whether a condition becomes true."""
     end_s = time.monotonic() + PATIENCE_S
@@ -23,6 +26,40 @@ def eventually(condition: Callable[[], bool]) -> bool:
             return False
         time.sleep(_PAUSE_S)
     return True
+
+
+def wait_until[Found](
+    look: Callable[[], Found | None],
+    what: str = "what is looked for",
+    limit_s: float = PATIENCE_S,
+    *,
+    repeat: Callable[[], object] = lambda: None,
+    fault: Callable[[], str] = lambda: "",
+    told: Callable[[], str] = lambda: "",
+) -> Found:
+    """Return what a look finds, as soon as it is true.
+
+    Args:
+        look: What is asked for.
+        what: It is, in words.
+        limit_s: After which it is taken for lost.
+        repeat: Done now and again meanwhile: the first messages of a new connection may be lost.
+        fault: Says why it cannot come any more; an empty text while it can.
+        told: What others said, for the failure.
+
+    Raises:
+        AssertionError: It was not found.
+    """
+    end_s = time.monotonic() + limit_s
+    next_s = time.monotonic()
+    while not (found := look()):
+        assert time.monotonic() < end_s, f"waited {limit_s:g} s in vain for {what}\n{told()}"
+        assert not fault(), f"{fault()}, waiting for {what}\n{told()}"
+        if time.monotonic() >= next_s:
+            repeat()
+            next_s = time.monotonic() + _REPEAT_S
+        time.sleep(_PAUSE_S)
+    return found
 
 
 async def until(condition: Callable[[], bool | Awaitable[bool]]) -> None:

@@ -1,7 +1,5 @@
 """The host's end of a simulated serial line, with pyserial and nothing of the drivers."""
 
-import time
-from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
@@ -9,9 +7,7 @@ import serial
 from dynamixel_sdk import PortHandler
 
 from robosc_bridge.simulated import SimulatedLine
-
-PATIENCE_S = 60.0
-"""Time after which something that comes at once is taken for lost: it ends a test that fails."""
+from support.waiting import PATIENCE_S, wait_until
 
 
 class Host:
@@ -107,11 +103,3 @@ class SdkPort(PortHandler):  # type: ignore[misc]
 
     def _settle(self) -> None:
         wait_until(lambda: self._line.has_answered(self._written))
-
-
-def wait_until(is_so: Callable[[], bool], limit_s: float = PATIENCE_S) -> None:
-    """Wait for a condition, with a limit."""
-    end_s = time.monotonic() + limit_s
-    while not is_so():
-        assert time.monotonic() < end_s, "it has not come to it in time"
-        time.sleep(0.002)

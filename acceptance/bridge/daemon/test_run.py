@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from robosc.cli.main import main as robosc
 from robosc_bridge.simulated import SimulatedTurtleBot3
 from support.models import EXAMPLES
 from support.service import served
+from support.waiting import wait_until
 
 pytestmark = pytest.mark.real_time
 
@@ -22,12 +23,8 @@ MODEL = EXAMPLES / "maze_solver" / "maze_solver.rscd"
 START_LIMIT_S, LIMIT_S = 90.0, 30.0
 
 
-def wait_until(condition: Callable[[], bool], what: str, process: subprocess.Popen[str], limit_s: float) -> None:
-    end_s = time.monotonic() + limit_s
-    while not condition():
-        assert process.poll() is None, process.communicate()[1]
-        assert time.monotonic() < end_s, f"waited {limit_s} s in vain for {what}"
-        time.sleep(0.01)
+def _ended(process: subprocess.Popen[str]) -> str:
+    return "" if process.poll() is None else process.communicate()[1] or "it ended"
 
 
 def bridge(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -57,7 +54,7 @@ def running(folder: Path, robot: SimulatedTurtleBot3, base: str) -> Iterator[sub
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         start = robot.world.pose
-        wait_until(lambda: robot.world.pose != start, "the robot to move", process, START_LIMIT_S)
+        wait_until(lambda: robot.world.pose != start, "the robot to move", START_LIMIT_S, fault=lambda: _ended(process))
         yield process
     finally:
         process.kill()
@@ -160,7 +157,9 @@ def test_a_signed_supervisor_is_run_without_its_model(tmp_path: Path) -> None:
         )
         try:
             start = robot.world.pose
-            wait_until(lambda: robot.world.pose != start, "the robot to move", process, START_LIMIT_S)
+            wait_until(
+                lambda: robot.world.pose != start, "the robot to move", START_LIMIT_S, fault=lambda: _ended(process)
+            )
             process.send_signal(signal.SIGTERM)
             _, errors = process.communicate(timeout=LIMIT_S)
         finally:

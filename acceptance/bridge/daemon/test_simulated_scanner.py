@@ -15,7 +15,7 @@ from robosc_bridge.safety import Caution, Reason, SafetyLayer
 from robosc_bridge.simulated import SimulatedTurtleBot3, Walls, room
 from support.pty_end import SkippingClock
 from support.safety import LIMITS, reading
-from support.wire import wait_until
+from support.waiting import wait_until
 
 pytestmark = pytest.mark.real_time
 

@@ -21,6 +21,7 @@ from pymavlink import mavutil
 from robosc_bridge.simulated import SimulatedTurtleBot3
 from support.ground import joined_texts
 from support.models import EXAMPLES
+from support.waiting import wait_until
 
 pytestmark = pytest.mark.real_time
 
@@ -151,13 +152,6 @@ def _speeds(robot: SimulatedTurtleBot3) -> tuple[float, float]:
     return robot.world.left.speed_rad_s, robot.world.right.speed_rad_s
 
 
-def _wait(condition: Callable[[], bool], what: str, limit_s: float = LIMIT_S) -> None:
-    end_s = time.monotonic() + limit_s
-    while not condition():
-        assert time.monotonic() < end_s, f"waited {limit_s} s in vain for {what}"
-        time.sleep(0.005)
-
-
 @pytest.fixture
 def station() -> Iterator[tuple[Station, str]]:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
@@ -179,23 +173,23 @@ def test_a_ground_station_starts_holds_and_stops_the_robot(tmp_path: Path, stati
         # Arming is answered once it runs.
         assert there.command(400, 1.0) == 0
         there.beat("arming", _armed)
-        _wait(lambda: _speeds(robot) != (0.0, 0.0), "motion")
+        wait_until(lambda: _speeds(robot) != (0.0, 0.0), "motion")
         there.until(lambda item: item.get_type() == "ODOMETRY" and (item.x, item.y) != (0.0, 0.0), "odometry")
         # HOLD stops the wheels before it is answered, but for what the motors need.
         assert there.command(176, 1.0, 4.0) == 0
-        _wait(lambda: _speeds(robot) == (0.0, 0.0), "standstill", 1.0)
+        wait_until(lambda: _speeds(robot) == (0.0, 0.0), "standstill", 1.0)
         beat = there.beat("HOLD", lambda beat: beat.custom_mode == 4)
         assert _armed(beat)
         assert there.command(400, 1.0) == 1
         assert "Not armed: An operator has stopped the robot. Resume or reset it first." in joined_texts(there.heard)
         assert there.command(176, 1.0, 10.0) == 0
         there.beat("AUTO", lambda beat: beat.custom_mode == 10)
-        _wait(lambda: _speeds(robot) != (0.0, 0.0), "motion")
+        wait_until(lambda: _speeds(robot) != (0.0, 0.0), "motion")
         # Disarming leaves torque off.
         assert there.command(400, 0.0) == 0
-        _wait(lambda: _speeds(robot) == (0.0, 0.0), "standstill", 1.0)
+        wait_until(lambda: _speeds(robot) == (0.0, 0.0), "standstill", 1.0)
         there.beat("disarming", lambda beat: not _armed(beat))
-        _wait(lambda: robot.left.table["torque enable"] == 0, "torque off")
+        wait_until(lambda: robot.left.table["torque enable"] == 0, "torque off")
         assert there.command(400, 1.0) == 0
         there.beat("arming", _armed)
         # A fault of a device is told, and after a reset and its return it goes on.
@@ -239,7 +233,7 @@ def test_set_points_move_the_wheels_as_far_as_the_layer_lets_them(tmp_path: Path
         robot.world.place(0.0, 0.0, 0.0)
         there.asking_for(0.1, lambda: min(_speeds(robot)) > 0.0, "motion")
         # A station that falls silent leaves a robot that stands.
-        _wait(lambda: _speeds(robot) == (0.0, 0.0), "standstill", 5.0)
+        wait_until(lambda: _speeds(robot) == (0.0, 0.0), "standstill", 5.0)
         process.send_signal(signal.SIGTERM)
         _, errors = process.communicate(timeout=LIMIT_S)
         assert process.returncode == 0, errors

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from robosc_bridge.simulated import read_motion
-from support.wire import Host, wait_until
+from support.waiting import wait_until
+from support.wire import Host
 
 
 class Program:

@@ -5,7 +5,8 @@ import time
 import pytest
 
 from robosc_bridge.simulated import SimulatedTurtleBot3, Walls
-from support.wire import Host, wait_until
+from support.waiting import wait_until
+from support.wire import Host
 
 
 @pytest.mark.real_time

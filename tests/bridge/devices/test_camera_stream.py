@@ -15,7 +15,7 @@ import pytest
 from robosc_bridge.devices.camera import SIMULATED, Camera, GreyRows, ProcessCamera, make_camera
 from robosc_bridge.errors import BridgeError, LineDeniedError, LineError, LineLostError, LineMissingError
 from robosc_bridge.protocol.netpbm import GreyPicture, encoded
-from support.wire import wait_until
+from support.waiting import wait_until
 
 LIMIT_S = 20.0
 
@@ -207,5 +207,5 @@ def test_a_camera_process_whose_host_hears_no_more_ends(tmp_path: Path) -> None:
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stdout is not None and process.stderr is not None
         process.stdout.close()
-        wait_until(lambda: process.poll() is not None, LIMIT_S)
+        wait_until(lambda: process.poll() is not None)
         assert process.stderr.read() == b""

@@ -12,7 +12,7 @@ from robosc_bridge.devices.dynamixel_bus import DynamixelBus, RefusedError
 from robosc_bridge.errors import DeviceSilentError, LineLostError
 from robosc_bridge.transport.serial_line import SerialLine
 from support.peer import Answers, Peer, asked, packet, status
-from support.wire import wait_until
+from support.waiting import wait_until
 
 LIMIT_S = 0.1
 

@@ -27,7 +27,7 @@ from robosc_bridge.errors import LineError, LineLostError, LineMissingError
 from robosc_bridge.transport.serial_line import SerialLine
 from support.lidar_frames import lds01_frame, lds02_frame, lds03_frame
 from support.pty_end import LIMIT_S, PtyEnd, SkippingClock
-from support.wire import wait_until
+from support.waiting import wait_until
 
 START_LDS03 = bytes.fromhex("aa 55 f0 0f")
 STOP_LDS03 = bytes.fromhex("aa 55 f5 0a")

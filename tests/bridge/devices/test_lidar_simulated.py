@@ -14,7 +14,7 @@ from robosc_bridge.devices.lidar import BAUD_TRIAL_S, Lidar, make_lds01, make_ld
 from robosc_bridge.errors import LineLostError
 from robosc_bridge.simulated import SimulatedTurtleBot3, Walls, room
 from support.pty_end import SkippingClock
-from support.wire import wait_until
+from support.waiting import wait_until
 
 MAKERS: dict[str, Callable[..., Lidar[Any]]] = {"lds01": make_lds01, "lds02": make_lds02, "lds03": make_lds03}
 # Of an LDS-02, the correction moves neighbouring points apart where a wall comes nearer: a bin may lie between.

@@ -6,7 +6,6 @@ import subprocess
 import sys
 import textwrap
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ import pytest
 from robosc_bridge.experiments import processes
 from robosc_bridge.experiments.processes import Program, finish, interruptible
 from robosc_bridge.experiments.scenario import ScenarioError
+from support.waiting import wait_until
 
 LIMIT_S = 30.0
 
@@ -24,13 +24,6 @@ def script(folder: Path, text: str, name: str = "program.py") -> tuple[str, ...]
     file = folder / name
     file.write_text(textwrap.dedent(text), encoding="utf-8")
     return (str(file),)
-
-
-def wait_until(condition: Callable[[], bool]) -> None:
-    end_s = time.monotonic() + LIMIT_S
-    while not condition():
-        assert time.monotonic() < end_s, "waited in vain"
-        time.sleep(0.01)
 
 
 def is_alive(number: int) -> bool:

@@ -24,7 +24,7 @@ from robosc_bridge.ground.settings import GroundSettings
 from robosc_bridge.protocol.mavlink_signing import Signing
 from robosc_bridge.transport.lines import Line, open_line
 from support.ground import KEY, PlayedDaemon, Station, of_type
-from support.wire import wait_until
+from support.waiting import wait_until
 
 FASTEST = Velocity(0.2, 2.0)
 
@@ -96,7 +96,7 @@ def peer(*arguments: Any, **values: Any) -> Iterator[Peer]:
 
 
 def _port(link: GroundLink) -> int:
-    wait_until(lambda: link.port is not None, 5.0)
+    wait_until(lambda: link.port is not None)
     assert link.port is not None
     return link.port
 
@@ -110,7 +110,7 @@ def test_a_station_that_is_called_sees_the_robot_and_arms_it() -> None:
         station.send(station.station.command(400, 1.0))
         assert station.until("COMMAND_ACK").result == 0
         assert daemon.commands == [Command.START]
-        wait_until(lambda: daemon.seen == 1, 2.0)
+        wait_until(lambda: daemon.seen == 1)
         daemon.show(state=State.RUNNING)
         assert station.until("HEARTBEAT", is_so=lambda beat: bool(beat.base_mode & 128)).custom_mode == 10
 
@@ -167,7 +167,7 @@ while True:
         station.until("HEARTBEAT")
         process = subprocess.Popen([sys.executable, "-c", flood])
         try:
-            wait_until(lambda: link._session._decoder.counts.frames > 1000, 10.0)
+            wait_until(lambda: link._session._decoder.counts.frames > 1000)
             rest, rested_s = link._over.wait, []
 
             def note(limit_s: float) -> bool:
@@ -254,7 +254,7 @@ def test_nobody_there_is_told_once(caplog: pytest.LogCaptureFixture, monkeypatch
         port = server.getsockname()[1]
     with linked(f"tcp:127.0.0.1:{port}"):
         # With the third begun, two have failed.
-        wait_until(lambda: len(tries) > 2, 20.0)
+        wait_until(lambda: len(tries) > 2)
     assert caplog.text.count("nobody serves there") == 1
 
 
@@ -286,8 +286,8 @@ def test_a_lost_line_ends_driving_at_once() -> None:
         with connection:
             stick = station.codec.manual_control_encode(1, 500, 0, 0, 0, 0)
             connection.sendall(station.pack(stick))
-            wait_until(lambda: len(daemon.told) == 2, 0.4)
-        wait_until(lambda: isinstance(daemon.told[-1], Detached), 0.4)
+            wait_until(lambda: len(daemon.told) == 2)
+        wait_until(lambda: isinstance(daemon.told[-1], Detached))
 
 
 def test_the_last_heartbeat_says_that_it_ends() -> None:
@@ -305,7 +305,7 @@ def test_an_error_inside_ends_nothing(caplog: pytest.LogCaptureFixture, monkeypa
         station.until("HEARTBEAT")
         with monkeypatch.context() as patch:
             patch.setattr(link._session, "step", lambda *_, **__: 1 / 0)
-            wait_until(lambda: "ZeroDivisionError" in caplog.text, 5.0)
+            wait_until(lambda: "ZeroDivisionError" in caplog.text)
         station.until("HEARTBEAT")
 
 
@@ -321,6 +321,6 @@ def test_a_thread_that_ends_unexpectedly_is_seen(monkeypatch: pytest.MonkeyPatch
     link = GroundLink(PlayedDaemon().operations, GroundSettings("udpin:127.0.0.1:0", FASTEST))
     monkeypatch.setattr(link._session, "step", end)
     link.start()
-    wait_until(lambda: not link.is_alive, 5.0)
+    wait_until(lambda: not link.is_alive)
     assert ended[0].exc_type is Over
     link.stop()

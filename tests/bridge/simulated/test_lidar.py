@@ -8,7 +8,8 @@ import pytest
 from robosc.execution.clock import ManualClock
 from robosc_bridge.simulated import SimulatedTurtleBot3, room
 from robosc_bridge.simulated.lidar_frames import crc8, lds01_frame, lds02_frame, lds03_frame, lds03_identity
-from support.wire import Host, wait_until
+from support.waiting import wait_until
+from support.wire import Host
 
 BAUDS = {"lds01": 230_400, "lds02": 115_200, "lds03": 230_400}
 START_03 = "aa 55 f0 0f"

@@ -11,7 +11,8 @@ import serial
 from robosc.execution.clock import ManualClock
 from robosc_bridge.simulated import SimulatedTurtleBot3
 from support.descriptors import open_descriptors
-from support.wire import Host, wait_until
+from support.waiting import wait_until
+from support.wire import Host
 
 PING = "ff ff fd 00 01 03 00 01 19 4e"
 

@@ -9,7 +9,8 @@ from dynamixel_sdk import GroupSyncWrite, PacketHandler
 
 from robosc.execution.clock import ManualClock
 from robosc_bridge.simulated import BASES, BODIES, LIDARS, SimulatedTurtleBot3, Walls
-from support.wire import Host, SdkPort, wait_until
+from support.waiting import wait_until
+from support.wire import Host, SdkPort
 
 
 @pytest.mark.parametrize("robot", BODIES)

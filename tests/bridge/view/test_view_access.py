@@ -22,7 +22,7 @@ from robosc_bridge.view.server import BURST, MAXIMUM_VIEWERS, answer_headers
 from support.certificates import Authority
 from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed
 from support.pages_open import LIMIT_S, opened, token_of
-from support.wire import wait_until
+from support.waiting import wait_until
 
 
 @pytest.fixture

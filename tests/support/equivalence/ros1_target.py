@@ -22,8 +22,9 @@ from support.equivalence.observation import Issued, Sight
 from support.equivalence.ros1_caller import Ros1Caller
 from support.equivalence.scenario import Action, Scenario
 from support.process import Process
-from support.ros1 import PYTHON, Master, Peer, until, wait_until
+from support.ros1 import PYTHON, Master, Peer, until
 from support.ros1_cpp import node_command
+from support.waiting import wait_until
 
 _RUNNING = ("running", "waiting for the first message")
 _SPIN_S = 0.002

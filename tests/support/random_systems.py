@@ -76,7 +76,12 @@ def systems() -> st.SearchStrategy[System]:
     Tests draw from the same few hundred, which are made once: they differ by what they look at. `make soak` draws from
     all.
     """
-    return st.integers(0, 2**32 - 1 if EFFORT else 299).map(random_system)
+    return system_seeds().map(random_system)
+
+
+def system_seeds() -> st.SearchStrategy[int]:
+    """Seeds of `random_system` and `wide_system`: see `systems`."""
+    return st.integers(0, 2**32 - 1 if EFFORT else 299)
 
 
 def any_systems() -> st.SearchStrategy[System]:

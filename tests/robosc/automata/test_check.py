@@ -5,7 +5,6 @@ from typing import Any
 
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from robosc.automata import (
     Assignment,
@@ -35,7 +34,7 @@ from robosc.expressions import (
 from robosc.model.structure import Deployment
 from support.effort import examples
 from support.models import EXAMPLE_NAMES, example_model
-from support.random_systems import wide_system
+from support.random_systems import system_seeds, wide_system
 from support.systems import automaton, edge, system
 
 COLOUR = EnumType("Colour", ("red", "green"))
@@ -141,7 +140,7 @@ def test_lowered_models_fit(name: str, deployment: Deployment) -> None:
     check_system(to_automata(example_model(name), deployment))
 
 
-@given(st.integers(0, 2**32 - 1))
+@given(system_seeds())
 @settings(max_examples=examples(30))
 def test_random_systems_fit(seed: int) -> None:
     check_system(wide_system(seed))

@@ -4,7 +4,6 @@ from random import Random
 
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from robosc.automata import System
 from robosc.errors import SynthesisCancelled
@@ -31,7 +30,7 @@ from support.effort import examples
 from support.explicit_ctl import ExplicitChecker
 from support.families import dining_philosophers
 from support.random_formulas import random_formula
-from support.random_systems import random_system
+from support.random_systems import random_system, system_seeds
 from support.systems import automaton, system
 
 FORMULAS = 6
@@ -53,7 +52,7 @@ def verdict(given_system: System, formula: Formula, engine: str = "auto") -> Ver
 
 
 @settings(max_examples=examples(60))
-@given(st.integers(0, 2**32 - 1))
+@given(system_seeds())
 def test_it_agrees_with_the_explicit_checker(seed: int) -> None:
     drawn = random_system(seed)
     added = supervised(drawn)
@@ -71,7 +70,7 @@ def test_it_agrees_with_the_explicit_checker(seed: int) -> None:
 
 
 @settings(max_examples=examples(10))
-@given(st.integers(0, 2**32 - 1))
+@given(system_seeds())
 def test_both_engines_give_the_same(seed: int) -> None:
     drawn = random_system(seed)
     random = Random(seed)
@@ -82,7 +81,7 @@ def test_both_engines_give_the_same(seed: int) -> None:
 
 
 @settings(max_examples=examples(30))
-@given(st.integers(0, 2**32 - 1))
+@given(system_seeds())
 def test_runs_to_a_state_are_shortest(seed: int) -> None:
     drawn = random_system(seed)
     explicit = ExplicitChecker(drawn, {})

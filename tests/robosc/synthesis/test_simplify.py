@@ -25,7 +25,7 @@ from robosc.synthesis.diagrams import extract
 from robosc.synthesis.nodes import restrict
 from support.effort import examples
 from support.families import FAMILIES
-from support.random_systems import explicit_supervisor, random_system
+from support.random_systems import explicit_supervisor, random_system, system_seeds
 from support.systems import automaton, edge, operation, read, system
 
 MOST_STATES = 2_000
@@ -61,7 +61,7 @@ def check_conditions(system: System, added: tuple[AddedCondition, ...]) -> None:
 
 
 @settings(max_examples=examples(15))
-@given(st.integers(0, 2**32 - 1))
+@given(system_seeds())
 def test_random_systems(seed: int) -> None:
     system = random_system(seed)
     found = synthesize(system, engine="autoref")

@@ -222,7 +222,7 @@ def test_linear_forms_agree_with_the_explicit_search(made: System, seed: int) ->
         _agrees(made, _conditions(made, seed))
 
 
-@pytest.mark.parametrize("high", [20, 100])
+@pytest.mark.parametrize("high", [20, 40])
 def test_relations_of_wider_integers_agree_with_the_explicit_search(high: int) -> None:
     a, b = read("A.n"), read("B.n")
     relations = [

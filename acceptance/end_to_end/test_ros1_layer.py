@@ -34,8 +34,9 @@ pytestmark = [
     # One layer serves many tests.
 ]
 
-# Nothing is taken back because the existing controller is silent, and nothing is waited for.
-PATIENT = ("_server_wait:=0.0", "_command_timeout:=0.0")
+# It begins when the robot's servers are connected, for a goal before that is lost, and nothing is taken back because the
+# existing controller is silent.
+PATIENT = ("_server_wait:=60.0", "_command_timeout:=0.0")
 
 
 @pytest.fixture(scope="module")

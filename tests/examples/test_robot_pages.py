@@ -56,7 +56,7 @@ def identifiers(robot: str) -> set[str]:
 def test_every_robot_has_a_page_a_launch_file_and_a_place_in_the_list() -> None:
     folders = {path.parent.name for path in EXAMPLES.glob("*/*.rscd")}
     assert set(ROBOTS) == folders
-    assert {path.name.partition(".")[0] for path in (HELPERS / "launch").iterdir()} == folders
+    assert {path.name.partition(".")[0] for path in (HELPERS / "launch").glob("*.*")} == folders
     text = (EXAMPLES / "README.md").read_text(encoding="utf-8")
     assert all(f"({robot}/README.md)" in text for robot in ROBOTS)
 

@@ -34,8 +34,8 @@ pytestmark = [
     # One layer serves many tests.
 ]
 
-# It begins when the robot's servers are connected, for a goal before that is lost, and nothing is taken back because the
-# existing controller is silent.
+# It begins when the robot's servers are connected, for a goal before that is lost, and nothing is taken back because
+# the existing controller is silent.
 PATIENT = ("_server_wait:=60.0", "_command_timeout:=0.0")
 
 

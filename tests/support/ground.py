@@ -1,6 +1,7 @@
 """A daemon that a test plays for its remote faces, and a ground station of pymavlink's own making."""
 
 import math
+import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -119,6 +120,7 @@ class PlayedDaemon:
             supervisor, ties, self.feed, self._post, self._operator_seen, is_layer=self.is_layer
         )
         self.snapshot = STANDBY
+        self._showing = threading.Lock()
         self.show()
 
     def _post(self, item: Order | FromProgram) -> None:
@@ -139,8 +141,9 @@ class PlayedDaemon:
 
     def show(self, **values: Any) -> None:
         """Show another snapshot."""
-        self.snapshot = replace(self.snapshot, number=self.snapshot.number + 1, **values)
-        self.feed.show(self.snapshot)
+        with self._showing:
+            self.snapshot = replace(self.snapshot, number=self.snapshot.number + 1, **values)
+            self.feed.show(self.snapshot)
 
     def write(self, **entry: Any) -> None:
         """Write an entry into the event log."""

@@ -23,8 +23,12 @@ _END_S = 10.0
 """A thread that does not end within so long by the computer's clock waits for something that is not of this host."""
 
 
+_VAIN_S = 3600.0
+"""Whoever waits without a limit while others go on for so long waits in vain."""
+
+
 class VirtualTimeError(Exception):
-    """Nobody's wait will ever end."""
+    """A wait will never end."""
 
 
 class _Ended(BaseException):
@@ -52,7 +56,9 @@ class VirtualHost:
     def __init__(self, now_s: float = 1000.0, epoch_s: float = 1_000_000.0) -> None:
         self._now_s = now_s
         self._epoch_s = epoch_s
-        self._running = _Turn()
+        self._maker = self._running = _Turn()
+        self._until_s = math.inf
+        self._is_stuck = False
         self._waiting: deque[_Turn] = deque()
         self._threads: list[threading.Thread] = []
         self._is_closed = False
@@ -74,12 +80,15 @@ class VirtualHost:
         """Let others run until something holds, or for a time; whether it holds.
 
         Raises:
-            VirtualTimeError: Nothing will ever happen any more.
+            VirtualTimeError: Nothing will ever happen any more, or the time of the thread that has made the host is
+                long over. It is told to that one: nobody looks at what ends another thread.
         """
         if self._is_closed:
             raise _Ended
         turn = self._running
         turn.is_ready, turn.end_s = is_ready, self._now_s + max(limit_s, 0.0)
+        if turn is self._maker:
+            self._until_s = self._now_s + _VAIN_S if math.isinf(turn.end_s) else turn.end_s
         self._waiting.append(turn)
         self._pass_on(turn)
         return is_ready()
@@ -146,6 +155,9 @@ class VirtualHost:
             turn.given.acquire()
         if self._is_closed:
             raise _Ended
+        if self._is_stuck:
+            self._is_stuck = False
+            raise VirtualTimeError(f"everybody waits for ever, or this thread in vain; it is {self._now_s:g} s")
 
     def _next(self) -> _Turn:
         for turn in self._waiting:
@@ -153,9 +165,11 @@ class VirtualHost:
                 break
         else:
             turn = min(self._waiting, key=lambda turn: turn.end_s)
-            if math.isinf(turn.end_s):
-                raise VirtualTimeError("everybody waits for ever")
-            self._now_s = max(self._now_s, turn.end_s)
+            if not math.isinf(turn.end_s):
+                self._now_s = max(self._now_s, turn.end_s)
+            if math.isinf(turn.end_s) or self._now_s > self._until_s:
+                self._is_stuck = True
+                turn = self._maker
         self._waiting.remove(turn)
         return turn
 

@@ -55,6 +55,18 @@ def test_a_grave_fault_stops_the_wheels_in_time_and_ends_the_run(base: str, faul
         bridge.stays(WHILE_S)
 
 
+# The trials of three exchanges, and those of letting the motors go.
+@pytest.mark.parametrize(("base", "trials"), [("opencr", 3 + 3), ("dynamixel", 3 + 6)])
+def test_a_base_that_is_silent_counts_as_lost_after_three_answers_that_do_not_come(base: str, trials: int) -> None:
+    with driven(base, options="{answer_limit_s: 0.3}") as bridge:
+        bridge.steady()
+        begin_s = bridge.host.monotonic()
+        wires(bridge, is_deaf=True)
+        bridge.until(lambda: "lost.response" in bridge.log.events(), "the loss")
+        # Beside the rest of a cycle.
+        assert bridge.host.monotonic() - begin_s == pytest.approx(trials * 0.3, abs=0.05)
+
+
 def test_which_fault_a_motor_tells_is_told() -> None:
     with driven("dynamixel") as bridge:
         bridge.steady()

@@ -8,7 +8,7 @@ import pytest
 
 from robosc_bridge.daemon.backoff import Backoff
 from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice
-from robosc_bridge.daemon.workers import RESTART_LIMIT, SILENT_LIMIT, VALID_LIMIT, DriveWorker, ScannerWorker
+from robosc_bridge.daemon.workers import RESTART_LIMIT, VALID_LIMIT, DriveWorker, ScannerWorker
 from robosc_bridge.devices.interface import (
     BINS,
     STANDSTILL,
@@ -258,15 +258,15 @@ def test_a_missing_answer_is_noise_and_three_in_a_row_are_a_loss(scene: Scene) -
     scene.up()
     for _ in range(2):
         scene.base.failing["exchange"] = DeviceSilentError("no answer")
-        for _ in range(SILENT_LIMIT - 1):
+        for _ in range(2):
             # At once again.
             assert scene.step() == 0.0
         del scene.base.failing["exchange"]
         scene.step()
     assert "close" not in scene.taken()
-    assert scene.gate.failures == 2 * (SILENT_LIMIT - 1)
+    assert scene.gate.failures == 2 * 2
     scene.base.failing["exchange"] = DeviceSilentError("no answer")
-    for _ in range(SILENT_LIMIT):
+    for _ in range(3):
         scene.step()
     assert scene.taken()[-1] == "close"
 

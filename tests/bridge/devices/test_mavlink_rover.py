@@ -10,6 +10,7 @@ from robosc_bridge.devices.interface import (
 from robosc_bridge.devices.registry import make_drive_base
 from robosc_bridge.errors import (
     DeviceError,
+    DeviceSilentError,
     LineMissingError,
 )
 from support.rovers import BODY, FORWARD, POSE, Bench
@@ -52,6 +53,30 @@ def test_targets_are_repeated_and_new_ones_go_at_once(bench: Bench) -> None:
         bench.host.sleep(0.001)
     # A slow radio is not filled.
     assert len(bench.rover.targets) - before < 15
+
+
+def test_our_heartbeat_goes_on_while_it_is_driven_and_never_without(bench: Bench) -> None:
+    bench.base.open()
+    before = len(bench.rover.heartbeats)
+    bench.drive(FORWARD, 10.5)
+    assert len(bench.rover.heartbeats) - before == 10
+    assert set(bench.rover.heartbeats) == {(255, 190)}
+    # The reader of the line lives on, and yet keeps nothing alive.
+    bench.host.sleep(10.0)
+    assert len(bench.rover.heartbeats) - before == 10
+
+
+def test_a_vehicle_that_does_not_tell_its_motion_is_stopped_and_told_after_1_s(bench: Bench) -> None:
+    bench.start()
+    last_s = bench.drive(FORWARD, 0.2).time_s
+    bench.rover.is_silent = True
+    with pytest.raises(DeviceSilentError, match="has not told its motion for 1 s"):
+        bench.drive(FORWARD, 30.0)
+    # It is looked at every 10 ms.
+    assert 1.0 < bench.host.monotonic() - last_s < 1.015
+    bench.host.sleep(0.001)
+    assert bench.rover.targets[-1]["vx"] == 0.0
+    assert bench.speed_m_s == 0.0
 
 
 def test_a_driver_that_dies_stops_the_vehicle(bench: Bench) -> None:

@@ -3,8 +3,6 @@
 import contextlib
 import os
 import socket
-import subprocess
-import sys
 import threading
 import time
 import tty
@@ -15,18 +13,50 @@ from typing import Any
 
 import pytest
 
+from robosc_bridge.daemon.backoff import Backoff
 from robosc_bridge.daemon.programs import Detached
 from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.devices.interface import Velocity
 from robosc_bridge.ground import link as link_module
 from robosc_bridge.ground.link import GroundLink
+from robosc_bridge.ground.session import STATION_LIMIT_S
 from robosc_bridge.ground.settings import GroundSettings
 from robosc_bridge.protocol.mavlink_signing import Signing
 from robosc_bridge.transport.lines import Line, open_line
 from support.ground import KEY, PlayedDaemon, Station, of_type
-from support.waiting import wait_until
+from support.waiting import PATIENCE_S, wait_until
 
 FASTEST = Velocity(0.2, 2.0)
+STEP_S = 0.01
+
+
+class Turns:
+    """A clock that goes on by a step whenever the link looks at it, and a daemon that turns as often.
+
+    So its time passes with the link's own turns, however slow the machine is.
+
+    Args:
+        daemon: That turns.
+
+    Attributes:
+        step_s: The step; 0: time stands still.
+        now_s: What it shows.
+    """
+
+    def __init__(self, daemon: PlayedDaemon) -> None:
+        self.step_s = STEP_S
+        self._daemon = daemon
+        self.now_s = 1000.0
+
+    def __call__(self) -> float:
+        self._daemon.show()
+        self.now_s += self.step_s
+        return self.now_s
+
+    def pass_by(self, seconds: float) -> None:
+        """Wait until so much of it is over."""
+        end_s = self.now_s + seconds
+        wait_until(lambda: self.now_s > end_s)
 
 
 class Peer:
@@ -36,7 +66,7 @@ class Peer:
         self.station = Station(key, system)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(("127.0.0.1", 0))
-        self.socket.settimeout(0.2)
+        self.socket.settimeout(0.02)
         self.to = None if port is None else ("127.0.0.1", port)
 
     @property
@@ -53,7 +83,7 @@ class Peer:
             return self.station.hear(data)
         return []
 
-    def until(self, name: str, limit_s: float = 5.0, is_so: Callable[[Any], bool] = lambda _: True) -> Any:
+    def until(self, name: str, limit_s: float = PATIENCE_S, is_so: Callable[[Any], bool] = lambda _: True) -> Any:
         """The next message of a kind."""
         end_s = time.monotonic() + limit_s
         while time.monotonic() < end_s:
@@ -65,27 +95,32 @@ class Peer:
 
 @contextmanager
 def linked(
-    address: str, daemon: PlayedDaemon | None = None, **values: Any
+    address: str,
+    daemon: PlayedDaemon | None = None,
+    clock: Callable[[], float] | None = None,
+    **values: Any,
 ) -> Iterator[tuple[PlayedDaemon, GroundLink]]:
+    """A link whose turns are short, and which tries anew at once.
+
+    Args:
+        address: Of its line.
+        daemon: That it shows; None: one of its own.
+        clock: What it goes by; None: its own turns.
+        **values: Of its settings.
+    """
     daemon = daemon or PlayedDaemon()
-    link = GroundLink(daemon.operations, GroundSettings(address, FASTEST, **{"obeys_unsigned": True, **values}))
-    over = threading.Event()
-
-    def turn() -> None:
-        while not over.wait(0.02):
-            daemon.show()
-
-    loop = threading.Thread(target=turn)
-    link.start()
-    loop.start()
-    try:
-        yield daemon, link
-    finally:
-        over.set()
-        loop.join()
-        link.stop()
-        assert not link._thread.is_alive()
-        assert not daemon.feed.is_watched
+    settings = GroundSettings(address, FASTEST, **{"obeys_unsigned": True, **values})
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(link_module, "TURN_S", 0.001)
+        link = GroundLink(daemon.operations, settings, clock or Turns(daemon))
+        patch.setattr(link, "_backoff", Backoff(0.01))
+        link.start()
+        try:
+            yield daemon, link
+        finally:
+            link.stop()
+            assert not link._thread.is_alive()
+            assert not daemon.feed.is_watched
 
 
 @contextmanager
@@ -103,7 +138,7 @@ def _port(link: GroundLink) -> int:
 
 def test_a_station_that_is_called_sees_the_robot_and_arms_it() -> None:
     with peer() as station, linked(f"udpout:127.0.0.1:{station.port}") as (daemon, _):
-        beat = station.until("HEARTBEAT", 2.0)
+        beat = station.until("HEARTBEAT")
         assert (beat.type, beat.get_srcSystem(), beat.get_srcComponent()) == (10, 1, 1)
         daemon.answers[Command.START] = ""
         station.send(station.station.heartbeat())
@@ -116,27 +151,31 @@ def test_a_station_that_is_called_sees_the_robot_and_arms_it() -> None:
 
 
 def test_one_station_is_answered_and_another_may_stop() -> None:
+    played = PlayedDaemon()
+    turns = Turns(played)
     with (
-        linked("udpin:127.0.0.1:0") as (daemon, link),
+        linked("udpin:127.0.0.1:0", played, turns) as (daemon, link),
         peer(_port(link)) as first,
         peer(_port(link), system=254) as second,
     ):
         first.send(first.station.heartbeat())
         first.until("HEARTBEAT")
+        # The first one keeps its place meanwhile.
+        turns.step_s = 0.0
         second.send(second.station.command(400, 1.0))
         second.send(second.station.command(400, 0.0))
         assert second.until("COMMAND_ACK").result == 0
         assert daemon.commands == [Command.STANDBY]
         assert {item.get_type() for item in second.station.heard} == {"COMMAND_ACK"}
+        turns.step_s = STEP_S
         first.until("HEARTBEAT")
 
 
-def test_when_a_station_is_gone_another_takes_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(link_module, "STATION_LIMIT_S", 0.3)
+def test_when_a_station_is_gone_another_takes_its_place() -> None:
     with linked("udpin:127.0.0.1:0") as (_, link), peer(_port(link)) as first, peer(_port(link)) as second:
         first.send(first.station.heartbeat())
         first.until("HEARTBEAT")
-        end_s = time.monotonic() + 5.0
+        end_s = time.monotonic() + PATIENCE_S
         while not second.station.heard and time.monotonic() < end_s:
             second.send(second.station.heartbeat())
             second.receive()
@@ -154,33 +193,33 @@ def test_garbage_takes_nobodys_place() -> None:
 
 
 def test_a_flood_of_datagrams_leaves_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    with linked("udpin:127.0.0.1:0") as (daemon, link), peer(_port(link)) as station:
-        evil = b"".join(station.station.command(410) for _ in range(100))
-        # From another process, with a processor of its own.
-        flood = f"""
-import socket
-source = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-while True:
-    source.sendto(bytes.fromhex("{evil.hex()}"), ("127.0.0.1", {_port(link)}))
-"""
+    """After bytes that waited already, a rest of twice the work on those before, and none that is long."""
+    played = PlayedDaemon()
+    turns = Turns(played)
+    with linked("udpin:127.0.0.1:0", played, turns) as (daemon, link), peer(_port(link)) as station:
         station.send(station.station.heartbeat())
         station.until("HEARTBEAT")
-        process = subprocess.Popen([sys.executable, "-c", flood])
-        try:
-            wait_until(lambda: link._session._decoder.counts.frames > 1000)
-            rest, rested_s = link._over.wait, []
+        # From now on work alone takes time.
+        turns.step_s = 0.0
+        step, work_s, rested_s = link._session.step, 0.02, []
 
-            def note(limit_s: float) -> bool:
-                rested_s.append(limit_s)
-                return rest(limit_s)
+        def works(now_s: float, data: bytes = b"", **how: Any) -> bytes:
+            turns.now_s += work_s if data else 0.0
+            return step(now_s, data, **how)
 
-            monkeypatch.setattr(link._over, "wait", note)
-            station.until("HEARTBEAT")
-            station.until("HEARTBEAT")
-        finally:
-            process.kill()
-            process.wait()
-        assert len(rested_s) >= 3
+        def rests(limit_s: float) -> bool:
+            rested_s.append(round(limit_s, 6))
+            return False
+
+        monkeypatch.setattr(link._session, "step", works)
+        monkeypatch.setattr(link._over, "wait", rests)
+        evil = b"".join(station.station.command(410) for _ in range(100))
+        for work_s in (0.02, 0.2):
+            rested_s.clear()
+            for _ in range(10):
+                station.send(evil)
+            wait_until(lambda: len(rested_s) == 10)
+            assert set(rested_s) == {min(2 * work_s, 0.1)}
         assert daemon.orders == []
 
 
@@ -203,22 +242,23 @@ def test_signed(tmp_path: Path) -> None:
         assert stranger.station.heard == []
 
 
-def test_who_sends_our_own_packets_back_takes_nobodys_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(link_module, "STATION_LIMIT_S", 0.1)
+def test_who_sends_our_own_packets_back_takes_nobodys_place(tmp_path: Path) -> None:
+    played = PlayedDaemon()
+    turns = Turns(played)
     (tmp_path / "key").write_bytes(KEY)
     signing = Signing(tmp_path / "key")
     with (
-        linked("udpin:127.0.0.1:0", signing=signing, obeys_unsigned=False) as (daemon, link),
+        linked("udpin:127.0.0.1:0", played, turns, signing=signing, obeys_unsigned=False) as (daemon, link),
         peer(_port(link)) as thief,
         peer(_port(link), key=KEY) as station,
     ):
         station.station.codec.signing.timestamp = signing.begin().timestamp()
         station.send(station.station.heartbeat())
-        station.socket.settimeout(3.0)
+        station.socket.settimeout(PATIENCE_S)
         for _ in range(3):
             # Overheard, while the station is silent for longer than its place is kept.
             packets = station.socket.recv(65535)
-            time.sleep(0.15)
+            turns.pass_by(STATION_LIMIT_S + 0.1)
             thief.send(packets)
         assert thief.receive() == []
         daemon.answers[Command.START] = ""
@@ -232,10 +272,10 @@ def test_a_server_that_goes_and_comes_again_is_found() -> None:
         port = server.getsockname()[1]
         with linked(f"tcp:127.0.0.1:{port}"):
             for _ in range(2):
-                server.settimeout(10.0)
+                server.settimeout(PATIENCE_S)
                 connection, _ = server.accept()
                 with connection:
-                    connection.settimeout(5.0)
+                    connection.settimeout(PATIENCE_S)
                     station = Station()
                     connection.sendall(station.command(410))
                     while not of_type("COMMAND_ACK", station.heard):
@@ -267,7 +307,7 @@ def test_a_serial_line() -> None:
             # What comes before the line is open is dropped: it is with the first heartbeat.
             station.hear(os.read(ours, 4096))
             os.write(ours, b"noise\xfd" + station.command(410) + station.command(400, 0.0))
-            end_s = time.monotonic() + 5.0
+            end_s = time.monotonic() + PATIENCE_S
             while len(of_type("COMMAND_ACK", station.heard)) < 2:
                 assert time.monotonic() < end_s
                 station.hear(os.read(ours, 4096))
@@ -280,7 +320,11 @@ def test_a_serial_line() -> None:
 def test_a_lost_line_ends_driving_at_once() -> None:
     daemon = PlayedDaemon(is_layer=True)
     daemon.show(state=State.RUNNING)
-    with socket.create_server(("127.0.0.1", 0)) as server, linked(f"tcp:127.0.0.1:{server.getsockname()[1]}", daemon):
+    with (
+        socket.create_server(("127.0.0.1", 0)) as server,
+        # Time stands still: it is not silence that ends it.
+        linked(f"tcp:127.0.0.1:{server.getsockname()[1]}", daemon, lambda: 1000.0),
+    ):
         connection, _ = server.accept()
         station = Station()
         with connection:

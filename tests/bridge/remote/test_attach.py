@@ -1,12 +1,12 @@
 """Programs of the model and operators of a layer, over real sockets."""
 
 import asyncio
+import itertools
 import math
 import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -213,28 +213,23 @@ class TestOperator:
         assert eventually(lambda: daemon.of(programs.Requested))
         program.end()
 
-    def test_one_that_sends_as_fast_as_it_can_is_ended(self, daemon: FakeDaemon, stub: Any) -> None:
+    def test_one_that_sends_as_fast_as_it_can_is_ended(
+        self, daemon: FakeDaemon, stub: Any, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        looks = itertools.count()
+        # By its clock, which is looked at for each message, more come than may.
+        monkeypatch.setattr(session, "OperatorPace", lambda _: OperatorPace(lambda: next(looks) / (1.2 * MESSAGES_A_S)))
         program = attached(stub, is_operator=True)
-        end = threading.Event()
-
-        def flood() -> None:
-            while not end.is_set():
-                program.send(keep_alive=pb.KeepAlive())
-                end.wait(0.001)
+        for _ in range(2 * FLOOD_S * MESSAGES_A_S):
+            program.send(keep_alive=pb.KeepAlive())
 
         def turn() -> Any:
             daemon.show()
             return daemon.of(programs.Detached)
 
-        sender = threading.Thread(target=flood)
-        sender.start()
-        try:
-            eventually(turn)
-            code, details = program.failure()
-        finally:
-            end.set()
-            sender.join()
-            program.end()
+        eventually(turn)
+        code, details = program.failure()
+        program.end()
         assert code is grpc.StatusCode.RESOURCE_EXHAUSTED
         assert details == "an operator sends at most 200 messages a second, and these are more"
         assert daemon.seen <= 2 + MESSAGES_A_S
@@ -348,8 +343,10 @@ class TestHostilePrograms:
     def test_a_program_that_hangs_with_its_whole_machine_is_taken_for_gone(
         self, daemon: FakeDaemon, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(face_module, "PING_S", 1.0)
-        monkeypatch.setattr(face_module, "PING_LIMIT_S", 1.0)
+        assert face_module.PING_S + face_module.PING_LIMIT_S <= 8.0
+        monkeypatch.setattr(face_module, "PING_S", 0.05)
+        # One that is slow is taken for gone as well as one that hangs.
+        monkeypatch.setattr(face_module, "PING_LIMIT_S", 0.5)
         text = (
             "import sys; from support.remote import *\n"
             "with connected(sys.argv[1]) as stub:\n"

@@ -16,6 +16,7 @@ from robosc_api.v1 import bridge_pb2 as pb
 from robosc_bridge.configuration import parse
 from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.remote import RemoteError, RemoteFace, RemoteSettings, serve, service, settings_of
+from robosc_bridge.remote import face as face_module
 from robosc_bridge.remote.face import MAXIMUM_CONNECTIONS, MAXIMUM_REQUEST_BYTES
 from robosc_bridge.remote.watchers import MAXIMUM_EVENTS
 from support.remote import PATIENCE_S, READING, FakeDaemon, connected, eventually, model, scan, served
@@ -249,7 +250,16 @@ class TestStop:
             for channel in channels:
                 channel.__exit__(None, None, None)
 
-    def test_callers_that_say_nothing_do_not_keep_it_out_for_long(self, daemon: FakeDaemon, face: RemoteFace) -> None:
+    def test_callers_that_say_nothing_do_not_keep_it_out_for_long(
+        self, daemon: FakeDaemon, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        assert face_module._HANDSHAKE_LIMIT_S <= 3.0
+        monkeypatch.setattr(face_module, "_HANDSHAKE_LIMIT_S", 0.2)
+        with served(daemon) as face:
+            self._crowd(face)
+        assert daemon.commands()[-1] is Command.STOP
+
+    def _crowd(self, face: RemoteFace) -> None:
         host, _, port = face.address.rpartition(":")
         silent = [socket.create_connection((host, int(port))) for _ in range(MAXIMUM_CONNECTIONS + 20)]
 
@@ -262,11 +272,10 @@ class TestStop:
             return True
 
         try:
-            eventually(stopped, limit_s=15.0)
+            eventually(stopped)
         finally:
             for line in silent:
                 line.close()
-        assert daemon.commands()[-1] is Command.STOP
 
 
 def _hello_and_wait(forever: threading.Event) -> Any:
@@ -350,7 +359,10 @@ class TestWatch:
         assert time.monotonic() - begin_s > 0.15
         call.cancel()
 
-    def test_a_sign_of_life_comes_of_a_loop_that_hangs(self, daemon: FakeDaemon, stub: Any) -> None:
+    def test_a_sign_of_life_comes_of_a_loop_that_hangs(
+        self, daemon: FakeDaemon, stub: Any, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(service, "SIGN_OF_LIFE_S", 0.02)
         call = stub.Watch(pb.WatchRequest(maximum_rate_hz=100), timeout=PATIENCE_S)
         before = next(call)
         after = next(call)

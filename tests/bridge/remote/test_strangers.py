@@ -16,7 +16,7 @@ from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.remote import RemoteFace
 from robosc_bridge.remote import face as face_module
 from robosc_bridge.remote.connections import Places
-from robosc_bridge.remote.face import IDLE_S, MAXIMUM_CALLS, MAXIMUM_CONNECTIONS
+from robosc_bridge.remote.face import MAXIMUM_CALLS, MAXIMUM_CONNECTIONS
 from support.remote import PATIENCE_S, FakeDaemon, connected, eventually, served
 from support.strangers import SETTINGS, strangers
 
@@ -33,14 +33,23 @@ def face(daemon: FakeDaemon) -> Any:
         yield made
 
 
-def test_idle_connections_are_ended_so_that_a_stop_comes_through(
-    daemon: FakeDaemon, face: RemoteFace, caplog: pytest.LogCaptureFixture
+def test_connections_that_take_all_places_are_told_of(
+    daemon: FakeDaemon, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with strangers(face.address, MAXIMUM_CONNECTIONS) as held:
-        begin_s = time.monotonic()
-        eventually(lambda: "connections of the remote face are taken" in caplog.text)
+    monkeypatch.setattr(face_module, "IDLE_S", 3600.0)
+    monkeypatch.setattr(face_module, "_LOOK_S", 0.01)
+    monkeypatch.setattr(face_module, "MAXIMUM_CONNECTIONS", 3)
+    with served(daemon) as face, strangers(face.address, 3):
+        eventually(lambda: "all 3 connections of the remote face are taken" in caplog.text)
+
+
+def test_idle_connections_are_ended_so_that_a_stop_comes_through(
+    daemon: FakeDaemon, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert face_module.IDLE_S <= 3.0
+    monkeypatch.setattr(face_module, "IDLE_S", 0.2)
+    with served(daemon) as face, strangers(face.address, MAXIMUM_CONNECTIONS) as held:
         eventually(lambda: not any(each.is_open for each in held))
-        assert time.monotonic() - begin_s < IDLE_S + PATIENCE_S / 2
         with connected(face.address) as stub:
             stub.Stop(pb.StopRequest(), timeout=PATIENCE_S)
     assert daemon.commands() == [Command.STOP]

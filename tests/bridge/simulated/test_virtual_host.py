@@ -90,6 +90,32 @@ def test_what_will_never_happen_is_told() -> None:
         host.wait(lambda: False, math.inf)
 
 
+@pytest.mark.parametrize("rest_s", [math.inf, 1.0], ids=["waits", "ends"])
+def test_it_is_told_to_whoever_made_the_host_though_another_thread_comes_to_it(rest_s: float) -> None:
+    with VirtualHost() as host:
+        host.thread(partial(host.sleep, rest_s), "other").start()
+        with pytest.raises(VirtualTimeError, match="everybody waits for ever"):
+            host.wait(lambda: False, math.inf)
+        # And again, if it goes on to wait.
+        with pytest.raises(VirtualTimeError):
+            host.condition().wait()
+        host.sleep(1.0)
+
+
+def test_whoever_waits_in_vain_while_others_live_on_is_told() -> None:
+    with VirtualHost(0.0) as host:
+
+        def live() -> None:
+            while True:
+                host.sleep(60.0)
+
+        host.thread(live, "lives").start()
+        host.sleep(86_400.0)
+        with pytest.raises(VirtualTimeError, match="in vain"):
+            host.wait(lambda: False, math.inf)
+        assert host.monotonic() == pytest.approx(86_400.0 + 3600.0, abs=60.0)
+
+
 def test_threads_that_still_wait_end_with_the_host() -> None:
     ended: list[str] = []
     with VirtualHost() as host:

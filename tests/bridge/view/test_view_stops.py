@@ -9,6 +9,7 @@ import pytest
 
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.remote import RemoteSettings, serve
+from robosc_bridge.terminal import client
 from robosc_bridge.view import remote_bridge
 from support.live import LiveRobot, large_model, supervisor_without_synthesis
 from support.pages_open import LIMIT_S, OpenPage, opened
@@ -35,6 +36,7 @@ class Gate:
         self.connections = 0
         self.is_open = asyncio.Event()
         self._passing: set[asyncio.Task[None]] = set()
+        self._server: asyncio.Server | None = None
 
     @contextlib.asynccontextmanager
     async def standing(self) -> AsyncIterator["Gate"]:
@@ -42,13 +44,19 @@ class Gate:
         server = await asyncio.start_server(self._pass, "127.0.0.1", 0)
         host, port = server.sockets[0].getsockname()
         self.address = f"{host}:{port}"
+        self._server = server
         try:
             yield self
         finally:
-            server.close()
-            for task in self._passing:
-                task.cancel()
+            self.fall()
             await asyncio.gather(*self._passing, return_exceptions=True)
+
+    def fall(self) -> None:
+        """End every connection, and let no other one come."""
+        if self._server is not None:
+            self._server.close()
+        for task in self._passing:
+            task.cancel()
 
     def _pass(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self.connections += 1
@@ -149,7 +157,14 @@ def test_a_stop_that_is_wanted_while_one_is_under_way_follows_it(
     asyncio.run(look())
 
 
-def test_a_stop_that_hangs_holds_up_the_next_one_only_shortly(robot: LiveRobot, address: str) -> None:
+def test_a_stop_that_hangs_holds_up_the_next_one_only_shortly(
+    robot: LiveRobot, address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert remote_bridge.FOLLOW_S <= 0.5
+    monkeypatch.setattr(remote_bridge, "FOLLOW_S", 0.01)
+    # Whatever ends one, it is not its time.
+    monkeypatch.setattr(client, "STOP_LIMIT_S", 10 * LIMIT_S)
+
     async def look() -> None:
         async with (
             Gate(address).standing() as gate,
@@ -166,6 +181,7 @@ def test_a_stop_that_hangs_holds_up_the_next_one_only_shortly(robot: LiveRobot, 
             assert not any(message.get("what") == "stop" for message in page.messages)
             assert robot.orders == []
             # In the end who wanted it is told that nobody has heard it.
+            gate.fall()
             assert (await page.told("refused"))["what"] == "stop"
 
     asyncio.run(look())

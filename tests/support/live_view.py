@@ -3,7 +3,6 @@
 import asyncio
 import json
 import threading
-import time
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 from aiohttp import WSMsgType, web
 
 import robosc_bridge
+from support.waiting import wait_until
 
 PAGE = Path(robosc_bridge.__file__).parent / "view" / "page"
 TOKEN = "a-token-of-this-start"
@@ -100,10 +100,7 @@ class StandIn:
         self._wait(lambda: len(self._sockets) == count)
 
     def _wait(self, is_so: Callable[[], bool]) -> None:
-        end_s = time.monotonic() + LIMIT_S
-        while not is_so():
-            assert time.monotonic() < end_s, f"in vain; received: {self.received}"
-            time.sleep(0.01)
+        wait_until(is_so, told=lambda: f"received: {self.received}")
 
     def _do(self, work: Any) -> Any:
         return asyncio.run_coroutine_threadsafe(work, self._loop).result(LIMIT_S)

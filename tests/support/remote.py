@@ -27,8 +27,7 @@ from robosc_bridge.remote import RemoteFace, RemoteSettings, serve
 from robosc_bridge.safety import Caution, Reason
 from support.models import bundle_of
 from support.random_supervisors import CERTIFICATE
-
-PATIENCE_S = 30.0
+from support.waiting import PATIENCE_S, wait_until
 
 MODEL = """
 robot Porter {
@@ -166,7 +165,7 @@ class FakeDaemon:
 
     def program(self) -> Program:
         """The first that was attached."""
-        return eventually(lambda: self.told[0].program if self.told else None)
+        return wait_until(lambda: self.told[0].program if self.told else None)
 
     def of(self, kind: type[Any]) -> list[Any]:
         """What was told of a kind."""
@@ -194,15 +193,6 @@ class FakeDaemon:
                 self.told.append(item)
                 self.handle(item)
             self.show()
-
-
-def eventually[Found](look: Callable[[], Found | None], limit_s: float = PATIENCE_S) -> Found:
-    """What a look finds, as soon as it is true."""
-    end_s = time.monotonic() + limit_s
-    while not (found := look()):
-        assert time.monotonic() < end_s, "waited in vain"
-        time.sleep(0.002)
-    return found
 
 
 @contextmanager

@@ -7,7 +7,7 @@ import sys
 import termios
 import threading
 
-from support.remote import PATIENCE_S
+from support.waiting import PATIENCE_S
 
 
 class Terminal:

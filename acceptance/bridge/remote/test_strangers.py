@@ -11,7 +11,8 @@ import pytest
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 
 from robosc_bridge.remote import RemoteFace
-from support.remote import PATIENCE_S, FakeDaemon, served
+from support.remote import FakeDaemon, served
+from support.waiting import PATIENCE_S
 
 
 @pytest.fixture

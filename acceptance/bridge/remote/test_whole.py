@@ -16,8 +16,9 @@ import pytest
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_bridge.simulated import SimulatedTurtleBot3
 from support.real_time import preferred
-from support.remote import Attachment, connected, eventually
+from support.remote import Attachment, connected
 from support.terminals import Terminal
+from support.waiting import wait_until
 
 pytestmark = pytest.mark.real_time
 
@@ -97,7 +98,7 @@ class Running:
             assert self.process.poll() is None, self.written
             return re.search(r"the remote face listens on (\S+)\n", self.written)
 
-        return eventually(look, START_LIMIT_S)[1]
+        return wait_until(look, limit_s=START_LIMIT_S)[1]
 
     def end(self) -> None:
         self.process.kill()
@@ -122,7 +123,7 @@ def speeds(robot: SimulatedTurtleBot3) -> tuple[float, float]:
 
 
 def becomes(look: Callable[[], bool]) -> None:
-    eventually(look, LIMIT_S)
+    wait_until(look, limit_s=LIMIT_S)
 
 
 def moves(robot: SimulatedTurtleBot3) -> bool:
@@ -146,7 +147,7 @@ def test_a_robot_is_started_watched_stopped_and_let_go_on_from_elsewhere(
 ) -> None:
     with running(tmp_path, robot) as bridge:
         address = bridge.address()
-        eventually(lambda: state(address) == "BRIDGE_STATE_STANDBY", START_LIMIT_S)
+        wait_until(lambda: state(address) == "BRIDGE_STATE_STANDBY", limit_s=START_LIMIT_S)
         assert speeds(robot) == (0.0, 0.0)
         line = [sys.executable, "-m", "robosc_bridge.command", "watch", "--address", address]
         with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as watcher:
@@ -186,7 +187,7 @@ def test_a_stop_reaches_the_motors_at_once(
 
     with running(tmp_path, robot) as bridge:
         address = bridge.address()
-        eventually(lambda: state(address) == "BRIDGE_STATE_STANDBY", START_LIMIT_S)
+        wait_until(lambda: state(address) == "BRIDGE_STATE_STANDBY", limit_s=START_LIMIT_S)
         with BridgeClient(address, Credentials()) as client:
             client.want(Wish.START)
             becomes(lambda: moves(robot))
@@ -222,7 +223,7 @@ def test_an_address_that_cannot_be_used_is_one_line(robot: SimulatedTurtleBot3, 
     bridge = Running(file)
     try:
         assert bridge.process.wait(START_LIMIT_S) == 2
-        eventually(lambda: "can be reached from other machines" in bridge.written)
+        wait_until(lambda: "can be reached from other machines" in bridge.written)
         assert "Traceback" not in bridge.written
     finally:
         bridge.end()
@@ -240,16 +241,16 @@ def test_a_robot_is_driven_by_keys_as_far_as_the_layer_lets_it(tmp_path: Path) -
         bridge = Running(configuration, "--deployment", "layer")
         try:
             address = bridge.address()
-            eventually(lambda: state(address) == "BRIDGE_STATE_STANDBY", START_LIMIT_S)
+            wait_until(lambda: state(address) == "BRIDGE_STATE_STANDBY", limit_s=START_LIMIT_S)
             with connected(address) as stub:
                 gate = Attachment(stub, name="gate")
                 gate.receive()
                 assert command("start", "--address", address).returncode == 0
                 terminal = Terminal(address)
                 try:
-                    eventually(lambda: "w/s or up/down" in terminal.seen)
+                    wait_until(lambda: "w/s or up/down" in terminal.seen)
                     terminal.type("wwwww")
-                    eventually(lambda: "BLOCKED /cmd_vel" in terminal.seen)
+                    wait_until(lambda: "BLOCKED /cmd_vel" in terminal.seen)
                     assert speeds(robot) == (0.0, 0.0)
                     gate.send(give=pb.Message(identifier="/gate/open"))
                     becomes(lambda: held(terminal) and moves(robot) and min(speeds(robot)) > 1.0)

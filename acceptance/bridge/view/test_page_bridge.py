@@ -17,8 +17,8 @@ from robosc_bridge.simulated import SimulatedTurtleBot3
 from support.browser import Visit, visit
 from support.models import EXAMPLES
 from support.real_time import preferred
-from support.remote import eventually
 from support.view_shown import EQUALS, entries_shown, wanted
+from support.waiting import wait_until
 
 pytestmark = pytest.mark.real_time
 
@@ -68,7 +68,7 @@ class Bridge:
             assert self.process.poll() is None, self._errors.read_text()
             return re.search(pattern, self._errors.read_text())
 
-        return eventually(look, START_LIMIT_S)[1]
+        return wait_until(look, limit_s=START_LIMIT_S)[1]
 
     def status(self) -> Any:
         """As a terminal is told."""
@@ -173,19 +173,19 @@ def test_a_whole_bridge_is_shown_stopped_started_and_missed(
         assert not moves(robot)
         seen.page.get_by_role("button", name="Start", exact=True).click()
         seen.wait(STATE_IS, "running")
-        eventually(lambda: moves(robot), LIMIT_S)
+        wait_until(lambda: moves(robot), limit_s=LIMIT_S)
         seen.wait("() => document.querySelector('#map-told').textContent.includes('Motors hold.')")
 
         seen.page.get_by_role("button", name="STOP").click()
-        eventually(lambda: not moves(robot), LIMIT_S)
+        wait_until(lambda: not moves(robot), limit_s=LIMIT_S)
         seen.wait(ANSWER_BEGINS, "STOP was heard")
         seen.wait("() => document.querySelector('#causes').textContent.includes('An operator has stopped the robot.')")
-        eventually(lambda: equals_status(seen, bridge), LIMIT_S)
+        wait_until(lambda: equals_status(seen, bridge), limit_s=LIMIT_S)
         count = len(logged(tmp_path / "log"))
         seen.picture(f"whole-{freshness}")
 
         seen.page.get_by_role("button", name="Resume", exact=True).click()
-        eventually(lambda: moves(robot), LIMIT_S)
+        wait_until(lambda: moves(robot), limit_s=LIMIT_S)
         seen.wait(ANSWER_BEGINS, "resume: done.")
 
         bridge.process.send_signal(signal.SIGTERM)

@@ -20,7 +20,8 @@ from robosc_bridge.remote import RemoteFace, RemoteSettings, service, session
 from robosc_bridge.remote import face as face_module
 from robosc_bridge.remote.data import MAXIMUM_DEPTH, value_of
 from robosc_bridge.remote.pace import FLOOD_S, MESSAGES_A_S, FloodError, OperatorPace
-from support.remote import PATIENCE_S, Attachment, FakeDaemon, connected, eventually, served
+from support.remote import Attachment, FakeDaemon, connected, served
+from support.waiting import PATIENCE_S, wait_until
 
 
 @pytest.fixture
@@ -58,7 +59,7 @@ class TestHello:
         assert not known.may_request
         program.end()
         assert list(program.call) == []
-        assert eventually(lambda: daemon.of(programs.Detached))[0].program is known
+        assert wait_until(lambda: daemon.of(programs.Detached))[0].program is known
 
     @pytest.mark.parametrize(("is_layer", "is_operator"), [(True, True), (True, False), (False, True)])
     def test_only_an_operator_before_a_layer_may_request(self, is_layer: bool, is_operator: bool) -> None:
@@ -162,7 +163,7 @@ class TestTalk:
     def test_what_a_program_says(self, message: Any, kind: Any, parts: Any, daemon: FakeDaemon, stub: Any) -> None:
         program = attached(stub)
         program.send(**message)
-        assert eventually(lambda: daemon.of(kind)) == [kind(daemon.program(), *parts)]
+        assert wait_until(lambda: daemon.of(kind)) == [kind(daemon.program(), *parts)]
         program.end()
 
     @pytest.mark.parametrize(("item", "kind", "fields", "data"), HEARD)
@@ -182,7 +183,7 @@ class TestTalk:
     def test_not_a_number_goes_through_both_ways(self, daemon: FakeDaemon, stub: Any) -> None:
         program = attached(stub, is_operator=True)
         program.send(request=pb.Message(identifier="/cmd_vel", data=value_of([math.nan, math.inf])))
-        data = eventually(lambda: daemon.of(programs.Requested))[0].data
+        data = wait_until(lambda: daemon.of(programs.Requested))[0].data
         assert math.isnan(data[0])
         assert data[1] == math.inf
         daemon.program().tell(programs.PassedOn("/scan", [math.nan]))
@@ -193,7 +194,7 @@ class TestTalk:
         program = attached(stub)
         for number in range(500):
             program.send(give=pb.Message(identifier="/order", data=value_of(number)))
-        eventually(lambda: len(daemon.of(programs.Told)) == 500)
+        wait_until(lambda: len(daemon.of(programs.Told)) == 500)
         assert [item.data for item in daemon.of(programs.Told)] == list(range(500))
         for number in range(500):
             daemon.program().tell(programs.MessageSent("show", "/show", number))
@@ -205,12 +206,12 @@ class TestTalk:
 class TestOperator:
     def test_each_message_is_a_sign_of_life(self, daemon: FakeDaemon, stub: Any) -> None:
         program = attached(stub, is_operator=True)
-        eventually(lambda: daemon.seen == 1)
+        wait_until(lambda: daemon.seen == 1)
         program.send(keep_alive=pb.KeepAlive())
-        eventually(lambda: daemon.seen == 2)
+        wait_until(lambda: daemon.seen == 2)
         program.send(request=pb.Message(identifier="/cmd_vel"))
-        eventually(lambda: daemon.seen == 3)
-        assert eventually(lambda: daemon.of(programs.Requested))
+        wait_until(lambda: daemon.seen == 3)
+        assert wait_until(lambda: daemon.of(programs.Requested))
         program.end()
 
     def test_one_that_sends_as_fast_as_it_can_is_ended(
@@ -227,7 +228,7 @@ class TestOperator:
             daemon.show()
             return daemon.of(programs.Detached)
 
-        eventually(turn)
+        wait_until(turn)
         code, details = program.failure()
         program.end()
         assert code is grpc.StatusCode.RESOURCE_EXHAUSTED
@@ -238,7 +239,7 @@ class TestOperator:
         program = attached(stub)
         program.send(keep_alive=pb.KeepAlive())
         program.send(give=pb.Message(identifier="/order"))
-        eventually(lambda: daemon.of(programs.Told))
+        wait_until(lambda: daemon.of(programs.Told))
         assert daemon.seen == 0
         program.end()
 
@@ -312,7 +313,7 @@ class TestHostilePrograms:
         program.send(**message)
         assert why in program.receive().refused.why
         program.send(give=pb.Message(identifier="/order"))
-        assert len(eventually(lambda: daemon.of(programs.Told))) == 1
+        assert len(wait_until(lambda: daemon.of(programs.Told))) == 1
         program.end()
 
     def test_nesting_beyond_what_protobuf_reads_ends_the_stream(self, daemon: FakeDaemon, face: RemoteFace) -> None:
@@ -328,7 +329,7 @@ class TestHostilePrograms:
             with pytest.raises(grpc.RpcError) as caught:
                 list(call)
         assert caught.value.code() is grpc.StatusCode.INVALID_ARGUMENT
-        assert eventually(lambda: daemon.of(programs.Detached))
+        assert wait_until(lambda: daemon.of(programs.Detached))
         assert not daemon.of(programs.Told)
 
     def test_a_program_that_vanishes_is_gone_for_the_loop(self, daemon: FakeDaemon, face: RemoteFace) -> None:
@@ -336,7 +337,7 @@ class TestHostilePrograms:
             attached(stub, serves=["open"])
             daemon.program()
         # Its connection is closed, without a word.
-        assert eventually(lambda: daemon.of(programs.Detached))[0].program is daemon.program()
+        assert wait_until(lambda: daemon.of(programs.Detached))[0].program is daemon.program()
         # What the loop still tells it goes nowhere.
         daemon.program().tell(programs.CallMade("open", 1, None))
 
@@ -359,7 +360,7 @@ class TestHostilePrograms:
             try:
                 daemon.program()
                 process.send_signal(signal.SIGSTOP)
-                assert eventually(lambda: daemon.of(programs.Detached))
+                assert wait_until(lambda: daemon.of(programs.Detached))
             finally:
                 process.kill()
                 process.wait()
@@ -370,14 +371,14 @@ class TestHostilePrograms:
         daemon.turns = False
         for number in range(5000):
             program.send(give=pb.Message(identifier="/order", data=value_of(number)))
-        eventually(lambda: daemon.waiting >= session.MESSAGES_A_TURN - 1)
+        wait_until(lambda: daemon.waiting >= session.MESSAGES_A_TURN - 1)
         time.sleep(0.2)
         # The loop's thread has taken one more, and shown nothing since.
         assert daemon.waiting <= session.MESSAGES_A_TURN + 1
         stub.Stop(pb.StopRequest(), timeout=PATIENCE_S)
         assert daemon.orders
         daemon.turns = True
-        eventually(lambda: len(daemon.of(programs.Told)) == 5000)
+        wait_until(lambda: len(daemon.of(programs.Told)) == 5000)
         program.end()
 
     @pytest.mark.parametrize("size", [200, 20_000])
@@ -430,11 +431,11 @@ class TestHostilePrograms:
         for _ in range(12):
             program.send(give=pb.Message(identifier="/order", data=data))
         # The third goes beyond the limit; the loop's thread may have taken one.
-        eventually(lambda: daemon.waiting >= 2)
+        wait_until(lambda: daemon.waiting >= 2)
         time.sleep(0.2)
         assert daemon.waiting <= 3
         daemon.turns = True
-        eventually(lambda: len(daemon.of(programs.Told)) == 12)
+        wait_until(lambda: len(daemon.of(programs.Told)) == 12)
         program.end()
 
     def test_the_end_of_the_bridge_is_told(self, daemon: FakeDaemon) -> None:
@@ -442,5 +443,5 @@ class TestHostilePrograms:
             program = attached(stub)
             face.stop()
             assert program.failure() == (grpc.StatusCode.UNAVAILABLE, "the bridge ends")
-            assert eventually(lambda: daemon.of(programs.Detached))
+            assert wait_until(lambda: daemon.of(programs.Detached))
             program.end()

@@ -14,7 +14,8 @@ from robosc_bridge.daemon.states import Command
 from robosc_bridge.remote import RemoteSettings
 from robosc_bridge.remote.service import RULES
 from support.certificates import Authority
-from support.remote import PATIENCE_S, Attachment, FakeDaemon, connected, eventually, served
+from support.remote import Attachment, FakeDaemon, connected, served
+from support.waiting import PATIENCE_S, wait_until
 
 ADMITTED = "admitted"
 CALLS = ("GetStatus", "GetDefinition", "Watch", "Stop", "Command", "Attach")
@@ -133,4 +134,4 @@ def test_without_tokens_other_machines_may_watch_and_stop(monkeypatch: pytest.Mo
     with bridge(ServerSecurity()) as (daemon, address):
         denied = "PERMISSION_DENIED"
         assert outcomes(address) == {**ALL, "Command": denied, "Attach": denied}
-        assert eventually(lambda: daemon.commands()) == [Command.STOP]
+        assert wait_until(lambda: daemon.commands()) == [Command.STOP]

@@ -19,7 +19,8 @@ from robosc_bridge.remote import RemoteError, RemoteFace, RemoteSettings, serve,
 from robosc_bridge.remote import face as face_module
 from robosc_bridge.remote.face import MAXIMUM_CONNECTIONS, MAXIMUM_REQUEST_BYTES
 from robosc_bridge.remote.watchers import MAXIMUM_EVENTS
-from support.remote import PATIENCE_S, READING, FakeDaemon, connected, eventually, model, scan, served
+from support.remote import READING, FakeDaemon, connected, model, scan, served
+from support.waiting import PATIENCE_S, wait_until
 
 
 @pytest.fixture
@@ -158,11 +159,11 @@ class TestCommands:
     def test_a_caller_that_goes_away_leaves_an_order_that_may_be_answered(self, daemon: FakeDaemon, stub: Any) -> None:
         daemon.refusal = None
         call = stub.Command.future(pb.CommandRequest(command=pb.COMMAND_KIND_START))
-        eventually(lambda: daemon.orders)
+        wait_until(lambda: daemon.orders)
         call.cancel()
         daemon.refusal = ""
         # Whatever was cancelled, the loop's thread may answer.
-        eventually(lambda: command(stub, pb.COMMAND_KIND_RESET) == "")
+        wait_until(lambda: command(stub, pb.COMMAND_KIND_RESET) == "")
         daemon.orders[0].answer("")
 
     @pytest.mark.parametrize(
@@ -175,9 +176,9 @@ class TestCommands:
         daemon.refusal = None
         kind: Any = pb.CommandKind.Value(f"COMMAND_KIND_{name}")
         call = stub.Command.future(pb.CommandRequest(command=kind))
-        eventually(lambda: daemon.orders)
+        wait_until(lambda: daemon.orders)
         call.cancel()
-        eventually(lambda: daemon.commands() == [Command[name], *undone_by])
+        wait_until(lambda: daemon.commands() == [Command[name], *undone_by])
         daemon.refusal = ""
         assert command(stub, pb.COMMAND_KIND_RESET) == ""
         assert daemon.commands() == [Command[name], *undone_by, Command.RESET]
@@ -185,7 +186,7 @@ class TestCommands:
     def test_a_callers_own_deadline_takes_it_back_too(self, daemon: FakeDaemon, stub: Any) -> None:
         daemon.refusal = None
         assert failure(lambda: command(stub, pb.COMMAND_KIND_START, 0.5))[0] is grpc.StatusCode.DEADLINE_EXCEEDED
-        eventually(lambda: daemon.commands() == [Command.START, Command.STANDBY])
+        wait_until(lambda: daemon.commands() == [Command.START, Command.STANDBY])
 
     def test_a_loop_that_does_not_answer_is_told(
         self, daemon: FakeDaemon, stub: Any, monkeypatch: pytest.MonkeyPatch
@@ -195,13 +196,13 @@ class TestCommands:
         code, details = failure(lambda: command(stub, pb.COMMAND_KIND_START))
         assert code is grpc.StatusCode.DEADLINE_EXCEEDED
         assert "has not answered" in details
-        eventually(lambda: daemon.commands() == [Command.START, Command.STANDBY])
+        wait_until(lambda: daemon.commands() == [Command.START, Command.STANDBY])
 
     def test_commands_that_wait_are_bounded_and_a_stop_is_not(self, daemon: FakeDaemon, stub: Any) -> None:
         daemon.refusal = None
         request = pb.CommandRequest(command=pb.COMMAND_KIND_START)
         calls = [stub.Command.future(request) for _ in range(service.MAXIMUM_COMMANDS)]
-        eventually(lambda: len(daemon.orders) == service.MAXIMUM_COMMANDS)
+        wait_until(lambda: len(daemon.orders) == service.MAXIMUM_COMMANDS)
         code, details = failure(lambda: command(stub, pb.COMMAND_KIND_START))
         assert code is grpc.StatusCode.RESOURCE_EXHAUSTED
         assert details == "there are 32 commands already"
@@ -272,7 +273,7 @@ class TestStop:
             return True
 
         try:
-            eventually(stopped)
+            wait_until(stopped)
         finally:
             for line in silent:
                 line.close()
@@ -311,7 +312,7 @@ class TestWatch:
         assert len(daemon.feed._subscriptions) == 1
         for call in calls:
             call.cancel()
-        eventually(lambda: not daemon.feed.is_watched)
+        wait_until(lambda: not daemon.feed.is_watched)
 
     def test_scans_come_once_each_and_only_if_wanted(self, daemon: FakeDaemon, stub: Any) -> None:
         turn = scan(1.25)
@@ -479,7 +480,7 @@ class TestFace:
             assert face.is_alive
             assert face._loop is not None
             face._loop.call_soon_threadsafe(face._loop.stop)
-            eventually(lambda: not face.is_alive)
+            wait_until(lambda: not face.is_alive)
         finally:
             face.stop()
 

@@ -17,8 +17,9 @@ from robosc_bridge.remote import RemoteFace
 from robosc_bridge.remote import face as face_module
 from robosc_bridge.remote.connections import Places
 from robosc_bridge.remote.face import MAXIMUM_CALLS, MAXIMUM_CONNECTIONS
-from support.remote import PATIENCE_S, FakeDaemon, connected, eventually, served
+from support.remote import FakeDaemon, connected, served
 from support.strangers import SETTINGS, strangers
+from support.waiting import PATIENCE_S, wait_until
 
 
 @pytest.fixture
@@ -40,7 +41,7 @@ def test_connections_that_take_all_places_are_told_of(
     monkeypatch.setattr(face_module, "_LOOK_S", 0.01)
     monkeypatch.setattr(face_module, "MAXIMUM_CONNECTIONS", 3)
     with served(daemon) as face, strangers(face.address, 3):
-        eventually(lambda: "all 3 connections of the remote face are taken" in caplog.text)
+        wait_until(lambda: "all 3 connections of the remote face are taken" in caplog.text)
 
 
 def test_idle_connections_are_ended_so_that_a_stop_comes_through(
@@ -49,7 +50,7 @@ def test_idle_connections_are_ended_so_that_a_stop_comes_through(
     assert face_module.IDLE_S <= 3.0
     monkeypatch.setattr(face_module, "IDLE_S", 0.2)
     with served(daemon) as face, strangers(face.address, MAXIMUM_CONNECTIONS) as held:
-        eventually(lambda: not any(each.is_open for each in held))
+        wait_until(lambda: not any(each.is_open for each in held))
         with connected(face.address) as stub:
             stub.Stop(pb.StopRequest(), timeout=PATIENCE_S)
     assert daemon.commands() == [Command.STOP]
@@ -79,7 +80,7 @@ def test_a_call_without_its_request_is_ended(path: str, daemon: FakeDaemon, monk
     monkeypatch.setattr(face_module, "REQUEST_LIMIT_S", 0.1)
     with served(daemon) as face, strangers(face.address, 1) as (stranger,):
         stranger.call(1, path)
-        eventually(lambda: stranger.was_told(b"within 0.1 seconds"))
+        wait_until(lambda: stranger.was_told(b"within 0.1 seconds"))
 
 
 def test_a_stream_about_what_is_served_is_ended_when_it_says_nothing_more(
@@ -89,7 +90,7 @@ def test_a_stream_about_what_is_served_is_ended_when_it_says_nothing_more(
     with served(daemon) as face, strangers(face.address, 1) as (stranger,):
         stranger.call(1, REFLECTION_METHODS[-1])
         stranger.message(1, reflection_pb2.ServerReflectionRequest(list_services="").SerializeToString())
-        eventually(lambda: stranger.was_told(b"each further one within 0.1"))
+        wait_until(lambda: stranger.was_told(b"each further one within 0.1"))
 
 
 def test_health_is_not_watched(face: RemoteFace) -> None:
@@ -120,7 +121,7 @@ def test_health_follows_the_loop(daemon: FakeDaemon, face: RemoteFace) -> None:
 
 def test_calls_of_a_connection_are_bounded(face: RemoteFace) -> None:
     with strangers(face.address, 1) as (stranger,):
-        eventually(lambda: any(kind == SETTINGS and not flags for kind, flags, _ in stranger.frames))
+        wait_until(lambda: any(kind == SETTINGS and not flags for kind, flags, _ in stranger.frames))
         told = next(content for kind, flags, content in stranger.frames if kind == SETTINGS and not flags)
         settings = {struct.unpack_from(">HI", told, at) for at in range(0, len(told), 6)}
         assert (3, MAXIMUM_CALLS) in settings

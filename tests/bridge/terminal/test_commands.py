@@ -24,7 +24,8 @@ from robosc_bridge.safety import Reason
 from robosc_bridge.terminal.commands import NAMES, main
 from robosc_bridge.terminal.shown import Lines, event_line, status_lines
 from support.certificates import Authority
-from support.remote import PATIENCE_S, READING, FakeDaemon, connected, eventually, served
+from support.remote import READING, FakeDaemon, connected, served
+from support.waiting import PATIENCE_S, wait_until
 
 NOWHERE = "127.0.0.1:1"
 
@@ -285,6 +286,6 @@ def test_a_watcher_that_is_killed_leaves_nothing_behind(daemon: FakeDaemon, addr
         assert process.stdout is not None
         process.stdout.readline()
         assert daemon.feed.is_watched
-    eventually(lambda: not daemon.feed.is_watched)
+    wait_until(lambda: not daemon.feed.is_watched)
     with connected(address) as stub:
         assert stub.GetStatus(pb.GetStatusRequest(), timeout=PATIENCE_S).HasField("snapshot")

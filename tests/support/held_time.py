@@ -44,6 +44,10 @@ class HeldLoop(asyncio.SelectorEventLoop):
 
     def _pass(self, until_s: float, done: Callable[[], None]) -> None:
         ours: Any = self
+        for handle in ours._ready:
+            if isinstance(handle, asyncio.TimerHandle):
+                # It is called a rounding error too early, and might put itself off for ever.
+                self._now_s = max(self._now_s, handle.when())
         if not ours._ready:  # Else others have their turn first.
             timers = [timer.when() for timer in ours._scheduled if not timer.cancelled()]
             next_s = min(timers, default=until_s)

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from robosc.cli.arguments import Parser
 from robosc.supervisor import Supervisor, encode
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.view import command, model_alone
@@ -232,7 +233,7 @@ def test_the_command_follows_its_file(tmp_path: Path, suffix: str, monkeypatch: 
         part.replace(file)
 
     write(FIRST, 2)
-    parser = argparse.ArgumentParser(prog="robosc")
+    parser: argparse.ArgumentParser = Parser(prog="robosc")
     command.add_parser(parser.add_subparsers())
     make, is_shared, robot = command._source(parser.parse_args(["view", "--model", str(file)]))
 

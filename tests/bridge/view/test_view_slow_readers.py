@@ -1,4 +1,7 @@
-"""Who reads slowly, or not at all, holds no connection for long: real sockets that take as little as they like."""
+"""Who reads slowly, or not at all, holds no connection for long: real sockets that take as little as they like.
+
+The server's time stands still until a test has it pass.
+"""
 
 import asyncio
 import base64
@@ -8,19 +11,25 @@ import os
 import socket
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Coroutine, Iterator
+from types import SimpleNamespace
+from typing import Any
 
 import aiohttp
 import pytest
 
+from robosc_bridge.daemon import served_face
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.view import ViewFace
 from robosc_bridge.view import server as server_module
 from robosc_bridge.view.server import BURST
+from support.held_time import HeldLoop
 from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed
 from support.pages_open import LIMIT_S, opened
+from support.waiting import eventually
 
 PLACES = 3
+BEGIN_S = 1000.0
 
 
 @pytest.fixture
@@ -29,9 +38,17 @@ def robot() -> LiveRobot:
 
 
 @pytest.fixture
-def face(robot: LiveRobot, monkeypatch: pytest.MonkeyPatch) -> Iterator[ViewFace]:
-    monkeypatch.setattr(server_module, "PING_S", 1.0)
-    monkeypatch.setattr(server_module, "_CLOSE_LIMIT_S", 0.3)
+def loop() -> HeldLoop:
+    return HeldLoop(BEGIN_S)
+
+
+@pytest.fixture
+def face(robot: LiveRobot, loop: HeldLoop, monkeypatch: pytest.MonkeyPatch) -> Iterator[ViewFace]:
+    def run(work: Coroutine[Any, Any, None]) -> None:
+        with asyncio.Runner(loop_factory=lambda: loop) as runner:
+            runner.run(work)
+
+    monkeypatch.setattr(served_face, "asyncio", SimpleNamespace(**{**vars(asyncio), "run": run}))
     monkeypatch.setattr(server_module, "MAXIMUM_CONNECTIONS", PLACES)
     with viewed(robot) as found:
         yield found
@@ -76,49 +93,28 @@ def frame(**request: str) -> bytes:
     return bytes([0x81, 0x80 | len(data)]) + mask + bytes(byte ^ mask[i % 4] for i, byte in enumerate(data))
 
 
-@contextlib.contextmanager
-def telling(robot: LiveRobot) -> Iterator[None]:
-    """More than the buffers on the way hold."""
-    end = threading.Event()
+def fill(face: ViewFace, robot: LiveRobot, pages: int, pass_by: Callable[[float], None]) -> None:
+    """Tell more than the buffers on the way hold: until the server has something for each that nobody takes."""
     note = {"time": time.time(), "kind": "device", "what": "x" * 280}
-
-    def tell() -> None:
-        while not end.wait(0.005):
-            for _ in range(50):
-                robot.feed.tell(note)
-
-    thread = threading.Thread(target=tell)
-    thread.start()
-    try:
-        yield
-    finally:
-        end.set()
-        thread.join()
+    end_s = time.monotonic() + LIMIT_S
+    while sum(item.get_write_buffer_size() > 0 for item in tuple(face._server._sockets.values())) < pages:
+        assert time.monotonic() < end_s
+        for _ in range(50):
+            robot.feed.tell(note)
+        pass_by(server_module.BATCH_S)
 
 
-def wait_for_a_place(face: ViewFace) -> None:
-    """Until a page can be opened again."""
+def see_a_place(face: ViewFace, loop: HeldLoop) -> None:
+    """A page can be opened again."""
 
     async def look() -> None:
-        async with asyncio.timeout(LIMIT_S):
-            while True:
-                with contextlib.suppress(aiohttp.ClientError):
-                    async with opened(face.url) as page:
-                        await page.told("update")
-                        return
-                await asyncio.sleep(0.02)
+        async with opened(face.url) as page:
+            told = asyncio.create_task(page.told("update"))
+            while not told.done():
+                await asyncio.to_thread(loop.advance, server_module.BATCH_S)
+            await told
 
     asyncio.run(look())
-
-
-def wait_for_unsent(face: ViewFace) -> None:
-    """Until the server has something that nobody takes; on a slow machine it may have cut them off before that."""
-    end_s = time.monotonic() + LIMIT_S
-    while (transports := list(face._server._sockets.values())) and not any(
-        item.get_write_buffer_size() for item in transports
-    ):
-        assert time.monotonic() < end_s
-        time.sleep(0.01)
 
 
 def check_full(face: ViewFace) -> None:
@@ -151,43 +147,61 @@ def trickling(reader: socket.socket) -> Iterator[None]:
         thread.join()
 
 
-def test_those_who_take_nothing_give_their_places_back(face: ViewFace, robot: LiveRobot) -> None:
-    with contextlib.ExitStack() as stack:
-        stack.enter_context(telling(robot))
-        readers = [stack.enter_context(slow(face)) for _ in range(PLACES)]
-        check_full(face)
-        readers[0].sendall(frame(type="stop"))
-        wait_for_a_place(face)
-        assert [order.command for order in robot.orders] == [Command.STOP]
+def check_cut_off(face: ViewFace, loop: HeldLoop) -> None:
+    """A page that does not answer keeps its place for one and a half of the time after which it is asked."""
+    # It is counted in whole seconds.
+    loop.advance(BEGIN_S + 1.5 * server_module.PING_S - 2.0 - loop.time())
+    assert len(face._server._sockets) == PLACES
+    check_full(face)
+    loop.advance(4.0)
+    assert not face._server._sockets
+    see_a_place(face, loop)
 
 
-def test_those_who_take_a_byte_now_and_then_do_so_too(face: ViewFace, robot: LiveRobot) -> None:
+def test_those_who_take_nothing_give_their_places_back(face: ViewFace, robot: LiveRobot, loop: HeldLoop) -> None:
     with contextlib.ExitStack() as stack:
-        stack.enter_context(telling(robot))
+        for _ in range(PLACES):
+            stack.enter_context(slow(face))
+        fill(face, robot, PLACES, loop.advance)
+        check_cut_off(face, loop)
+
+
+def test_those_who_take_a_byte_now_and_then_do_so_too(face: ViewFace, robot: LiveRobot, loop: HeldLoop) -> None:
+    with contextlib.ExitStack() as stack:
         readers = [stack.enter_context(slow(face)) for _ in range(PLACES)]
+        fill(face, robot, PLACES, loop.advance)
         for reader in readers:
             stack.enter_context(trickling(reader))
-        check_full(face)
-        wait_for_a_place(face)
+        check_cut_off(face, loop)
 
 
-def test_those_who_ask_too_much_and_take_nothing_do_so_too(face: ViewFace, robot: LiveRobot) -> None:
+def test_those_who_ask_too_much_and_take_nothing_do_so_too(face: ViewFace, robot: LiveRobot, loop: HeldLoop) -> None:
     with contextlib.ExitStack() as stack:
-        stack.enter_context(telling(robot))
         readers = [stack.enter_context(slow(face)) for _ in range(PLACES)]
+        fill(face, robot, PLACES, loop.advance)
         check_full(face)
-        wait_for_unsent(face)
+        begin_s = loop.time()
         for reader in readers:
-            with contextlib.suppress(OSError):
-                reader.sendall(frame(type="pause") * 3 * BURST)
-        wait_for_a_place(face)
+            reader.sendall(frame(type="pause") * 3 * BURST)
+        while face._server._sockets:
+            loop.advance(0.01)
+        assert loop.time() - begin_s < server_module.PING_S / 2
+        see_a_place(face, loop)
 
 
-def test_the_server_ends_soon_beside_those_who_take_nothing(robot: LiveRobot) -> None:
-    with contextlib.ExitStack() as stack:
-        stack.enter_context(telling(robot))
-        face = stack.enter_context(viewed(robot))
-        stack.enter_context(slow(face))
-        wait_for_unsent(face)
+def test_those_who_take_nothing_are_heard(face: ViewFace, robot: LiveRobot, loop: HeldLoop) -> None:
+    with slow(face) as reader:
+        fill(face, robot, 1, loop.advance)
+        reader.sendall(frame(type="stop"))
+        assert eventually(lambda: bool(robot.orders))
+        assert [order.command for order in robot.orders] == [Command.STOP]
+        loop.advance(3 * server_module.PING_S)
+
+
+def test_the_server_ends_beside_those_who_take_nothing(robot: LiveRobot, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server_module, "_CLOSE_LIMIT_S", 0.1)
+    monkeypatch.setattr(server_module, "BATCH_S", 0.001)
+    with viewed(robot) as face, slow(face):
+        fill(face, robot, 1, time.sleep)
         face.stop()
         assert not face.is_alive

@@ -413,7 +413,7 @@ def test_a_goal_that_its_server_rejects_ends_as_aborted(patient: Porter) -> None
 
 def test_a_goal_without_a_server_ends_as_aborted_and_a_call_with_the_default(package: Path, tmp_path: Path) -> None:
     with porter_robot(package, tmp_path, has_servers=False) as porter:
-        porter.start(*PATIENT)
+        porter.start("_server_wait:=0.0", "_command_timeout:=0.0")
         porter.allow(True)
         assert porter.end_of(porter.goal())[0] == ABORTED
         assert porter.reply(porter.call()) == {"success": False, "message": ""}

@@ -2,8 +2,6 @@
 
 import io
 import json
-import linecache
-import os
 import signal
 import subprocess
 import sys
@@ -630,26 +628,13 @@ class TestPrograms:
         ],
         ids=" ".join,
     )
-    def test_interrupted_client(self, tmp_path: Path, capfd: pytest.CaptureFixture[str], command: Any) -> None:
-        """In this process; `test_command` has programs that are interrupted at other moments."""
+    def test_interrupted_client(self, tmp_path: Path, command: Any) -> None:
         begun, ended = threading.Event(), threading.Event()
 
         def stuck(context: Any) -> None:
             context.add_callback(ended.set)
             begun.set()
             ended.wait(PATIENCE_S)
-
-        here = threading.get_ident()
-
-        def waits() -> bool:
-            frame = sys._current_frames()[here]
-            line = linecache.getline(frame.f_code.co_filename, frame.f_lineno)
-            return frame.f_code is threading.Condition.wait.__code__ or ".next_event()" in line
-
-        def interrupt() -> None:
-            # A call that is interrupted while it is begun leaves locks of gRPC behind, which end with a program only.
-            if begun.wait(PATIENCE_S) and eventually(waits):
-                os.kill(os.getpid(), signal.SIGINT)
 
         model = write(tmp_path, "robot R { }")
         services = (
@@ -658,13 +643,15 @@ class TestPrograms:
         )
         answers = {method.name: [[stuck]] for service in services for method in service.methods}
         with scripted(**answers) as (address, _):
-            words = [str(model) if word == "MODEL" else word for word in command]
-            interrupting = threading.Thread(target=interrupt)
-            interrupting.start()
-            status = robosc_client([*words, "--server", address])
-            interrupting.join()
-            printed = capfd.readouterr()
-            assert (status, printed.out, printed.err) == (130, "", "robosc-client: interrupted\n")
+            given = [str(model) if word == "MODEL" else word for word in command]
+            words = ["-m", "robosc_client.command", *given, "--server", address]
+            with subprocess.Popen(
+                [sys.executable, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            ) as process:
+                assert begun.wait(PATIENCE_S)
+                process.send_signal(signal.SIGINT)
+                output, error = process.communicate(timeout=PATIENCE_S)
+            assert (process.returncode, output, error) == (130, "", "robosc-client: interrupted\n")
             assert ended.wait(PATIENCE_S)
 
     @pytest.mark.parametrize("json", [[], ["--json"]])

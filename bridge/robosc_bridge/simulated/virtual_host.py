@@ -52,7 +52,8 @@ class VirtualHost:
     def __init__(self, now_s: float = 1000.0, epoch_s: float = 1_000_000.0) -> None:
         self._now_s = now_s
         self._epoch_s = epoch_s
-        self._running = _Turn()
+        self._running = self._makers = _Turn()
+        self._is_stuck = False
         self._waiting: deque[_Turn] = deque()
         self._threads: list[threading.Thread] = []
         self._is_closed = False
@@ -146,16 +147,23 @@ class VirtualHost:
             turn.given.acquire()
         if self._is_closed:
             raise _Ended
+        if self._is_stuck:
+            self._is_stuck = False
+            raise VirtualTimeError("everybody waits for ever")
 
     def _next(self) -> _Turn:
         for turn in self._waiting:
-            if turn.is_ready():
+            # Nobody is left waiting whose time is over, so that it can be stated of any run that it ends.
+            if turn.end_s <= self._now_s or turn.is_ready():
                 break
         else:
             turn = min(self._waiting, key=lambda turn: turn.end_s)
             if math.isinf(turn.end_s):
-                raise VirtualTimeError("everybody waits for ever")
-            self._now_s = max(self._now_s, turn.end_s)
+                # Told where somebody sees it: in the thread that made the host, whoever was the last to wait.
+                self._is_stuck = True
+                turn = self._makers
+            else:
+                self._now_s = turn.end_s
         self._waiting.remove(turn)
         return turn
 

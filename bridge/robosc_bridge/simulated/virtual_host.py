@@ -35,7 +35,9 @@ class _Turn:
     """A thread's place among those that take turns."""
 
     def __init__(self) -> None:
-        self.given = threading.Semaphore(0)
+        # Taken by whoever waits for its turn, released by whoever gives it: of all that waits in turn, the fastest.
+        self.given = threading.Lock()
+        self.given.acquire()
         self.end_s = math.inf
         self.is_ready: Callable[[], bool] = lambda: False
         self.is_over = False
@@ -125,8 +127,8 @@ class VirtualHost:
     def close(self) -> None:
         """End all threads that still wait."""
         self._is_closed = True
-        for turn in tuple(self._waiting):
-            turn.given.release()
+        while self._waiting:
+            self._waiting.popleft().given.release()
         for thread in self._threads:
             thread.join(_END_S)
 

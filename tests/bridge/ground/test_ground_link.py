@@ -1,13 +1,8 @@
-"""The link over real UDP, TCP and a pseudo-terminal, with pymavlink's own ground station at the other end."""
+"""The link on a virtual host, over datagrams, connections and a serial line, with a station of pymavlink's codec."""
 
-import contextlib
+import itertools
 import os
-import socket
-import subprocess
-import sys
 import threading
-import time
-import tty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,46 +13,53 @@ import pytest
 from robosc_bridge.daemon.programs import Detached
 from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.devices.interface import Velocity
-from robosc_bridge.ground import link as link_module
-from robosc_bridge.ground.link import GroundLink
+from robosc_bridge.ground.link import LASTING_S, REST, TURN_S, GroundLink
+from robosc_bridge.ground.session import STATION_LIMIT_S
 from robosc_bridge.ground.settings import GroundSettings
+from robosc_bridge.host import NetworkPort
 from robosc_bridge.protocol.mavlink_signing import Signing
-from robosc_bridge.transport.lines import Line, open_line
+from robosc_bridge.simulated import VirtualHost
 from support.ground import KEY, PlayedDaemon, Station, of_type
-from support.wire import wait_until
 
 FASTEST = Velocity(0.2, 2.0)
+LISTENING = "udpin:127.0.0.1:14550"
+CALLING = LISTENING.replace("udpin", "udpout")
+
+
+@pytest.fixture
+def time() -> Iterator[VirtualHost]:
+    with VirtualHost() as found:
+        yield found
 
 
 class Peer:
-    """A station at a UDP socket."""
+    """A station at an end of a line of the virtual host.
 
-    def __init__(self, port: int | None = None, key: bytes | None = None, system: int = 255) -> None:
+    Args:
+        time: The host.
+        address: That it calls, or listens at.
+        key: Of signing.
+        system: Its own number.
+    """
+
+    def __init__(self, time: VirtualHost, address: str = CALLING, key: bytes | None = None, system: int = 255) -> None:
         self.station = Station(key, system)
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.bind(("127.0.0.1", 0))
-        self.socket.settimeout(0.2)
-        self.to = None if port is None else ("127.0.0.1", port)
-
-    @property
-    def port(self) -> int:
-        return int(self.socket.getsockname()[1])
+        self.line = time.open_network(address)
+        self._time = time
 
     def send(self, data: bytes) -> None:
-        assert self.to is not None
-        self.socket.sendto(data, self.to)
+        self.line.write(data)
 
-    def receive(self) -> list[Any]:
-        with contextlib.suppress(TimeoutError, ConnectionRefusedError):
-            data, self.to = self.socket.recvfrom(65535)
-            return self.station.hear(data)
-        return []
+    def receive(self, limit_s: float = 0.2) -> list[Any]:
+        data = self.line.read(limit_s)
+        self.line.answer_sender()
+        return self.station.hear(data)
 
-    def until(self, name: str, limit_s: float = 5.0, is_so: Callable[[Any], bool] = lambda _: True) -> Any:
+    def until(self, name: str, limit_s: float = 2.0, is_so: Callable[[Any], bool] = lambda _: True) -> Any:
         """The next message of a kind."""
-        end_s = time.monotonic() + limit_s
-        while time.monotonic() < end_s:
-            for item in of_type(name, self.receive()):
+        end_s = self._time.monotonic() + limit_s
+        while (left_s := end_s - self._time.monotonic()) > 0:
+            for item in of_type(name, self.receive(left_s)):
                 if is_so(item):
                     return item
         raise AssertionError(f"no {name} within {limit_s} s")
@@ -65,62 +67,59 @@ class Peer:
 
 @contextmanager
 def linked(
-    address: str, daemon: PlayedDaemon | None = None, **values: Any
+    time: VirtualHost, address: str = LISTENING, daemon: PlayedDaemon | None = None, **values: Any
 ) -> Iterator[tuple[PlayedDaemon, GroundLink]]:
     daemon = daemon or PlayedDaemon()
-    link = GroundLink(daemon.operations, GroundSettings(address, FASTEST, **{"obeys_unsigned": True, **values}))
-    over = threading.Event()
+    link = GroundLink(daemon.operations, GroundSettings(address, FASTEST, **{"obeys_unsigned": True, **values}), time)
+    is_over = False
 
     def turn() -> None:
-        while not over.wait(0.02):
+        while not is_over:
             daemon.show()
+            time.sleep(0.02)
 
-    loop = threading.Thread(target=turn)
     link.start()
-    loop.start()
+    time.thread(turn, "loop").start()
+    # Both have begun.
+    time.sleep(0.0)
     try:
         yield daemon, link
     finally:
-        over.set()
-        loop.join()
+        is_over = True
         link.stop()
-        assert not link._thread.is_alive()
+        assert not link.is_alive
         assert not daemon.feed.is_watched
 
 
-@contextmanager
-def peer(*arguments: Any, **values: Any) -> Iterator[Peer]:
-    found = Peer(*arguments, **values)
-    with found.socket:
-        yield found
-
-
-def _port(link: GroundLink) -> int:
-    wait_until(lambda: link.port is not None, 5.0)
-    assert link.port is not None
-    return link.port
-
-
-def test_a_station_that_is_called_sees_the_robot_and_arms_it() -> None:
-    with peer() as station, linked(f"udpout:127.0.0.1:{station.port}") as (daemon, _):
-        beat = station.until("HEARTBEAT", 2.0)
+def test_a_station_that_is_called_sees_the_robot_and_arms_it(time: VirtualHost) -> None:
+    station = Peer(time, LISTENING)
+    with linked(time, CALLING) as (daemon, _):
+        beat = station.until("HEARTBEAT", 0.1)
         assert (beat.type, beat.get_srcSystem(), beat.get_srcComponent()) == (10, 1, 1)
         daemon.answers[Command.START] = ""
         station.send(station.station.heartbeat())
         station.send(station.station.command(400, 1.0))
-        assert station.until("COMMAND_ACK").result == 0
+        assert station.until("COMMAND_ACK", 0.1).result == 0
         assert daemon.commands == [Command.START]
-        wait_until(lambda: daemon.seen == 1, 2.0)
+        assert daemon.seen == 1
         daemon.show(state=State.RUNNING)
-        assert station.until("HEARTBEAT", is_so=lambda beat: bool(beat.base_mode & 128)).custom_mode == 10
+        assert station.until("HEARTBEAT", 1.1, lambda beat: bool(beat.base_mode & 128)).custom_mode == 10
 
 
-def test_one_station_is_answered_and_another_may_stop() -> None:
-    with (
-        linked("udpin:127.0.0.1:0") as (daemon, link),
-        peer(_port(link)) as first,
-        peer(_port(link), system=254) as second,
-    ):
+def test_heartbeats_come_once_a_second(time: VirtualHost) -> None:
+    station = Peer(time, LISTENING)
+    with linked(time, CALLING):
+        for _ in range(60):
+            station.until("HEARTBEAT", 1.0 + TURN_S)
+        begin_s = time.monotonic()
+        for _ in range(60):
+            station.until("HEARTBEAT", 1.0 + TURN_S)
+        assert time.monotonic() - begin_s == pytest.approx(60.0, abs=TURN_S)
+
+
+def test_one_station_is_answered_and_another_may_stop(time: VirtualHost) -> None:
+    with linked(time) as (daemon, _):
+        first, second = Peer(time), Peer(time, system=254)
         first.send(first.station.heartbeat())
         first.until("HEARTBEAT")
         second.send(second.station.command(400, 1.0))
@@ -131,20 +130,23 @@ def test_one_station_is_answered_and_another_may_stop() -> None:
         first.until("HEARTBEAT")
 
 
-def test_when_a_station_is_gone_another_takes_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(link_module, "STATION_LIMIT_S", 0.3)
-    with linked("udpin:127.0.0.1:0") as (_, link), peer(_port(link)) as first, peer(_port(link)) as second:
+def test_when_a_station_is_gone_another_takes_its_place_after_its_time(time: VirtualHost) -> None:
+    with linked(time):
+        first, second = Peer(time), Peer(time)
         first.send(first.station.heartbeat())
         first.until("HEARTBEAT")
-        end_s = time.monotonic() + 5.0
-        while not second.station.heard and time.monotonic() < end_s:
+        first.send(first.station.heartbeat())
+        begin_s = time.monotonic()
+        while not second.station.heard:
             second.send(second.station.heartbeat())
-            second.receive()
-        second.until("HEARTBEAT")
+            second.receive(0.1)
+        # Its first heartbeat comes within a second.
+        assert STATION_LIMIT_S < time.monotonic() - begin_s < STATION_LIMIT_S + 1.0 + 0.1 + TURN_S
 
 
-def test_garbage_takes_nobodys_place() -> None:
-    with linked("udpin:127.0.0.1:0") as (_, link), peer(_port(link)) as station, peer(_port(link)) as other:
+def test_garbage_takes_nobodys_place(time: VirtualHost) -> None:
+    with linked(time):
+        station, other = Peer(time), Peer(time)
         for size in (1, 12, 300, 9000, 60_000):
             other.send(b"\xfd" * size)
             other.send(os.urandom(size))
@@ -153,72 +155,67 @@ def test_garbage_takes_nobodys_place() -> None:
         assert other.receive() == []
 
 
-def test_a_flood_of_datagrams_leaves_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    with linked("udpin:127.0.0.1:0") as (daemon, link), peer(_port(link)) as station:
-        evil = b"".join(station.station.command(410) for _ in range(100))
-        # From another process, with a processor of its own.
-        flood = f"""
-import socket
-source = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-while True:
-    source.sendto(bytes.fromhex("{evil.hex()}"), ("127.0.0.1", {_port(link)}))
-"""
+def test_a_flood_of_datagrams_leaves_two_thirds_of_the_time(time: VirtualHost, monkeypatch: pytest.MonkeyPatch) -> None:
+    work_s = 0.001
+    steps = 0
+    with linked(time) as (daemon, link):
+        station = Peer(time)
         station.send(station.station.heartbeat())
         station.until("HEARTBEAT")
-        process = subprocess.Popen([sys.executable, "-c", flood])
-        try:
-            wait_until(lambda: link._session._decoder.counts.frames > 1000, 10.0)
-            rest, rested_s = link._over.wait, []
+        evil = b"".join(station.station.command(410) for _ in range(100))
+        is_over = False
 
-            def note(limit_s: float) -> bool:
-                rested_s.append(limit_s)
-                return rest(limit_s)
+        def flood() -> None:
+            while not is_over:
+                station.send(evil)
+                time.sleep(work_s / 2)
 
-            monkeypatch.setattr(link._over, "wait", note)
-            station.until("HEARTBEAT")
-            station.until("HEARTBEAT")
-        finally:
-            process.kill()
-            process.wait()
-        assert len(rested_s) >= 3
+        real = link._session.step
+
+        def slow(*arguments: Any, **values: Any) -> bytes:
+            nonlocal steps
+            steps += 1
+            time.sleep(work_s)
+            return real(*arguments, **values)
+
+        monkeypatch.setattr(link._session, "step", slow)
+        time.thread(flood, "flood").start()
+        begin_s = time.monotonic()
+        station.until("HEARTBEAT")
+        station.until("HEARTBEAT")
+        passed_s = time.monotonic() - begin_s
+        is_over = True
+        assert steps == pytest.approx(passed_s / (work_s * (1 + REST)), rel=0.1)
         assert daemon.orders == []
 
 
-def test_signed(tmp_path: Path) -> None:
+def test_signed(time: VirtualHost, tmp_path: Path) -> None:
     (tmp_path / "key").write_bytes(KEY)
     signing = Signing(tmp_path / "key")
-    with (
-        linked("udpin:0.0.0.0:0", signing=signing, obeys_unsigned=False) as (daemon, link),
-        peer(_port(link)) as stranger,
-        peer(_port(link), key=KEY) as station,
-    ):
+    with linked(time, signing=signing, obeys_unsigned=False) as (daemon, _):
+        stranger, station = Peer(time), Peer(time, key=KEY)
         stranger.send(stranger.station.heartbeat())
         station.station.codec.signing.timestamp = signing.begin().timestamp()
         station.send(station.station.heartbeat())
-        beat = station.until("HEARTBEAT")
-        assert beat.get_signed()
+        assert station.until("HEARTBEAT").get_signed()
         daemon.answers[Command.START] = ""
         station.send(station.station.command(400, 1.0))
         assert station.until("COMMAND_ACK").result == 0
-        assert stranger.station.heard == []
+        assert stranger.receive() == []
 
 
-def test_who_sends_our_own_packets_back_takes_nobodys_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(link_module, "STATION_LIMIT_S", 0.1)
+def test_who_sends_our_own_packets_back_takes_nobodys_place(time: VirtualHost, tmp_path: Path) -> None:
     (tmp_path / "key").write_bytes(KEY)
     signing = Signing(tmp_path / "key")
-    with (
-        linked("udpin:127.0.0.1:0", signing=signing, obeys_unsigned=False) as (daemon, link),
-        peer(_port(link)) as thief,
-        peer(_port(link), key=KEY) as station,
-    ):
+    with linked(time, signing=signing, obeys_unsigned=False) as (daemon, _):
+        thief, station = Peer(time), Peer(time, key=KEY)
         station.station.codec.signing.timestamp = signing.begin().timestamp()
         station.send(station.station.heartbeat())
-        station.socket.settimeout(3.0)
         for _ in range(3):
             # Overheard, while the station is silent for longer than its place is kept.
-            packets = station.socket.recv(65535)
-            time.sleep(0.15)
+            packets = station.line.read(2.0)
+            assert packets
+            time.sleep(STATION_LIMIT_S + 1.0)
             thief.send(packets)
         assert thief.receive() == []
         daemon.answers[Command.START] = ""
@@ -227,89 +224,124 @@ def test_who_sends_our_own_packets_back_takes_nobodys_place(tmp_path: Path, monk
         assert thief.station.heard == []
 
 
-def test_a_server_that_goes_and_comes_again_is_found() -> None:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        port = server.getsockname()[1]
-        with linked(f"tcp:127.0.0.1:{port}"):
-            for _ in range(2):
-                server.settimeout(10.0)
-                connection, _ = server.accept()
-                with connection:
-                    connection.settimeout(5.0)
-                    station = Station()
-                    connection.sendall(station.command(410))
-                    while not of_type("COMMAND_ACK", station.heard):
-                        station.hear(connection.recv(4096))
+def accepted(connection: NetworkPort | None) -> NetworkPort:
+    assert connection is not None
+    return connection
 
 
-def test_nobody_there_is_told_once(caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch) -> None:
-    tries: list[str] = []
+def test_a_server_that_goes_and_comes_again_is_found(time: VirtualHost) -> None:
+    server = time.serve(5760)
+    with linked(time, "tcp:127.0.0.1:5760"):
+        for _ in range(2):
+            connection = accepted(server.accept(10.0))
+            station = Station()
+            connection.write(station.command(410))
+            while not of_type("COMMAND_ACK", station.heard):
+                station.hear(connection.read(5.0))
+            connection.close()
 
-    def counted(address: str, baud: int) -> Line:
-        tries.append(address)
-        return open_line(address, baud)
 
-    monkeypatch.setattr(link_module, "open_line", counted)
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        port = server.getsockname()[1]
-    with linked(f"tcp:127.0.0.1:{port}"):
-        # With the third begun, two have failed.
-        wait_until(lambda: len(tries) > 2, 20.0)
+def test_nobody_there_is_told_once_and_tried_ever_more_seldom(
+    time: VirtualHost, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tries_s: list[float] = []
+    opened = time.open_network
+
+    def counted(address: str) -> NetworkPort:
+        tries_s.append(time.monotonic())
+        return opened(address)
+
+    monkeypatch.setattr(time, "open_network", counted)
+    with linked(time, "tcp:127.0.0.1:1"):
+        time.sleep(600.0)
+        pauses_s = [after_s - before_s for before_s, after_s in itertools.pairwise(tries_s)]
+        assert len(pauses_s) == 153
+        assert pauses_s == pytest.approx([0.25, 0.5, 1.0, 2.0] + [4.0] * (len(pauses_s) - 4))
     assert caplog.text.count("nobody serves there") == 1
 
 
-def test_a_serial_line() -> None:
-    ours, theirs = os.openpty()
-    tty.setraw(theirs)
-    try:
-        with linked(os.ttyname(theirs), baud=57600) as (daemon, _):
-            station = Station()
-            # What comes before the line is open is dropped: it is with the first heartbeat.
-            station.hear(os.read(ours, 4096))
-            os.write(ours, b"noise\xfd" + station.command(410) + station.command(400, 0.0))
-            end_s = time.monotonic() + 5.0
-            while len(of_type("COMMAND_ACK", station.heard)) < 2:
-                assert time.monotonic() < end_s
-                station.hear(os.read(ours, 4096))
-            assert daemon.commands == [Command.STANDBY]
-    finally:
-        os.close(ours)
-        os.close(theirs)
+def test_a_problem_is_told_again_after_a_line_that_has_lasted(
+    time: VirtualHost, caplog: pytest.LogCaptureFixture
+) -> None:
+    server = time.serve(5760)
+    with linked(time, "tcp:127.0.0.1:5760"):
+        for lasted_s in (LASTING_S - 1.0, LASTING_S + 1.0, 0.0):
+            connection = accepted(server.accept(60.0))
+            time.sleep(lasted_s)
+            connection.close()
+            time.sleep(0.1)
+        assert caplog.text.count("the other end has closed the connection") == 2
 
 
-def test_a_lost_line_ends_driving_at_once() -> None:
+def test_a_serial_line(time: VirtualHost) -> None:
+    end = time.new_end(None)
+    with linked(time, end.path, baud=57600) as (daemon, _):
+        assert end.host_baud() == 57600
+        station = Station()
+        end.write(b"noise\xfd" + station.command(410) + station.command(400, 0.0))
+        time.sleep(TURN_S)
+        station.hear(bytes(end.read()))
+        assert len(of_type("COMMAND_ACK", station.heard)) == 2
+        assert daemon.commands == [Command.STANDBY]
+
+
+def test_a_lost_line_ends_driving_at_once(time: VirtualHost) -> None:
     daemon = PlayedDaemon(is_layer=True)
     daemon.show(state=State.RUNNING)
-    with socket.create_server(("127.0.0.1", 0)) as server, linked(f"tcp:127.0.0.1:{server.getsockname()[1]}", daemon):
-        connection, _ = server.accept()
+    server = time.serve(5760)
+    with linked(time, "tcp:127.0.0.1:5760", daemon):
+        connection = accepted(server.accept(1.0))
         station = Station()
-        with connection:
-            stick = station.codec.manual_control_encode(1, 500, 0, 0, 0, 0)
-            connection.sendall(station.pack(stick))
-            wait_until(lambda: len(daemon.told) == 2, 0.4)
-        wait_until(lambda: isinstance(daemon.told[-1], Detached), 0.4)
+        stick = station.codec.manual_control_encode(1, 500, 0, 0, 0, 0)
+        connection.write(station.pack(stick))
+        assert time.wait(lambda: len(daemon.told) == 2, TURN_S)
+        connection.close()
+        begin_s = time.monotonic()
+        assert time.wait(lambda: isinstance(daemon.told[-1], Detached), TURN_S)
+        assert time.monotonic() == begin_s
 
 
-def test_the_last_heartbeat_says_that_it_ends() -> None:
-    with peer() as station:
-        with linked(f"udpout:127.0.0.1:{station.port}") as (daemon, _):
-            station.until("HEARTBEAT")
-            daemon.show(state=State.OVER)
-        while station.receive():
-            pass
-        assert of_type("HEARTBEAT", station.station.heard)[-1].system_status == 7
+def test_the_last_heartbeat_says_that_it_ends(time: VirtualHost) -> None:
+    station = Peer(time, LISTENING)
+    with linked(time, CALLING) as (daemon, _):
+        station.until("HEARTBEAT")
+        daemon.show(state=State.OVER)
+    while station.receive():
+        pass
+    assert of_type("HEARTBEAT", station.station.heard)[-1].system_status == 7
 
 
-def test_an_error_inside_ends_nothing(caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch) -> None:
-    with peer() as station, linked(f"udpout:127.0.0.1:{station.port}") as (_, link):
+def test_an_error_inside_ends_nothing(
+    time: VirtualHost, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    station = Peer(time, LISTENING)
+    with linked(time, CALLING) as (_, link):
         station.until("HEARTBEAT")
         with monkeypatch.context() as patch:
             patch.setattr(link._session, "step", lambda *_, **__: 1 / 0)
-            wait_until(lambda: "ZeroDivisionError" in caplog.text, 5.0)
+            time.sleep(TURN_S)
+        assert "ZeroDivisionError" in caplog.text
         station.until("HEARTBEAT")
 
 
-def test_a_thread_that_ends_unexpectedly_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_may_be_stopped_at_any_time(time: VirtualHost) -> None:
+    link = GroundLink(PlayedDaemon().operations, GroundSettings(LISTENING, FASTEST), time)
+    link.stop()
+    for passed_s in (0.0, 0.01, 1.0, 100.0):
+        # Also between two attempts to find somebody.
+        link = GroundLink(PlayedDaemon().operations, GroundSettings("tcp:127.0.0.1:1", FASTEST), time)
+        assert not link.is_alive
+        link.start()
+        time.sleep(passed_s)
+        assert link.is_alive
+        began_s = time.monotonic()
+        link.stop()
+        assert not link.is_alive
+        link.stop()
+        assert time.monotonic() == began_s
+
+
+def test_a_thread_that_ends_unexpectedly_is_seen(time: VirtualHost, monkeypatch: pytest.MonkeyPatch) -> None:
     class Over(BaseException):
         pass
 
@@ -318,9 +350,10 @@ def test_a_thread_that_ends_unexpectedly_is_seen(monkeypatch: pytest.MonkeyPatch
 
     ended: list[Any] = []
     monkeypatch.setattr(threading, "excepthook", ended.append)
-    link = GroundLink(PlayedDaemon().operations, GroundSettings("udpin:127.0.0.1:0", FASTEST))
+    link = GroundLink(PlayedDaemon().operations, GroundSettings(LISTENING, FASTEST), time)
     monkeypatch.setattr(link._session, "step", end)
     link.start()
-    wait_until(lambda: not link.is_alive, 5.0)
-    assert ended[0].exc_type is Over
+    assert time.wait(lambda: not link.is_alive, 2 * TURN_S)
     link.stop()
+    time.close()
+    assert ended[0].exc_type is Over

@@ -15,8 +15,6 @@ from robosc_bridge.terminal.teleop import LAPSE_S
 from support.remote import PATIENCE_S, FakeDaemon, eventually, served
 from support.terminals import Terminal
 
-pytestmark = pytest.mark.real_time
-
 
 @pytest.fixture
 def daemon() -> Any:
@@ -40,6 +38,7 @@ def wishes(daemon: FakeDaemon) -> list[tuple[str, float, float]]:
     return [(item.identifier, item.data["linear"]["x"], item.data["angular"]["z"]) for item in found]
 
 
+@pytest.mark.real_time
 def test_without_a_key_it_halts_by_itself(daemon: FakeDaemon) -> None:
     with driving(daemon) as terminal:
         terminal.type("www")

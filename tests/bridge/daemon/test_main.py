@@ -170,3 +170,29 @@ def test_a_file_is_not_overwritten(bridge: Bridge, tmp_path: Path) -> None:
     again = bridge("init", "--model", str(MODEL), "-o", str(file))
     assert again.returncode == 2
     assert "File exists" in again.stderr
+
+
+@pytest.mark.parametrize(
+    ("key", "address", "commands", "why"),
+    [
+        (
+            "mavlink_url",
+            "udpbcast:10.0.0.255:14550",
+            ("check", "run"),
+            "remote.mavlink_url: 'udpbcast:10.0.0.255:14550' cannot be used; it is udpin:HOST:PORT",
+        ),
+        ("grpc_address", "0.0.0.0:0", ("run",), "can be reached from other machines"),
+    ],
+)
+def test_an_address_that_cannot_be_used_is_one_line(
+    key: str, address: str, commands: tuple[str, ...], why: str, bridge: Bridge, tmp_path: Path
+) -> None:
+    file = configured(bridge, tmp_path)
+    text, count = re.subn(rf"^  {key}: .*$", f"  {key}: '{address}'", file.read_text(), flags=re.MULTILINE)
+    assert count == 1
+    file.write_text(text)
+    for command in commands:
+        done = bridge(command, "--model", str(MODEL), "--config", str(file))
+        assert done.returncode == 2
+        assert why in done.stderr
+        assert "Traceback" not in done.stderr

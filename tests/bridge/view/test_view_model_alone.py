@@ -9,16 +9,17 @@ from typing import Any
 
 import pytest
 
+from robosc.cli.arguments import Parser
 from robosc.supervisor import Supervisor, encode
 from robosc_bridge.daemon.states import Command
-from robosc_bridge.view import model_alone
+from robosc_bridge.view import command, model_alone
 from robosc_bridge.view.facts import SourceKind
 from robosc_bridge.view.model_alone import ModelAlone, NoSupervisorError, file_digest, read, synthesized
 from robosc_bridge.view.sources import Pause, RefusedError
 from support.live import large_model, supervisor_without_synthesis
 from support.models import EXAMPLES
 from support.pages_open import opened
-from support.view_servers import served, view_process
+from support.view_servers import served
 
 MODEL = EXAMPLES / "line_follower" / "line_follower.rscd"
 FIRST, SECOND = (supervisor_without_synthesis(large_model(count)) for count in (2, 3))
@@ -221,7 +222,8 @@ def test_a_supervisors_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".rscd", ".rsup"])
-def test_the_program_follows_its_file(tmp_path: Path, suffix: str) -> None:
+def test_the_command_follows_its_file(tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(model_alone, "LOOK_S", 0.01)
     file = tmp_path / f"robot{suffix}"
 
     def write(supervisor: Supervisor, count: int) -> None:
@@ -231,8 +233,9 @@ def test_the_program_follows_its_file(tmp_path: Path, suffix: str) -> None:
 
     write(FIRST, 2)
 
-    async def look(url: str) -> None:
-        async with opened(url) as page:
+    async def look() -> None:
+        make, is_shared, robot = command._source(arguments)
+        async with served(make, is_shared=is_shared, robot=robot) as server, opened(server.url) as page:
             before = components(await page.told("update"))
             write(SECOND, 3)
             await page.until(lambda told: told["type"] == "update" and components(told) > before)
@@ -243,5 +246,7 @@ def test_the_program_follows_its_file(tmp_path: Path, suffix: str) -> None:
                 lambda told: told["type"] == "update" and components(told) == before and not told["warnings"]
             )
 
-    with view_process("--model", file) as (_, url):
-        asyncio.run(look(url))
+    parser: Parser = Parser(prog="robosc")
+    command.add_parser(parser.add_subparsers())
+    arguments = parser.parse_args(["view", "--model", str(file)])
+    asyncio.run(look())

@@ -9,6 +9,7 @@ import pytest
 
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.remote import RemoteSettings, serve
+from robosc_bridge.terminal import client
 from robosc_bridge.view import remote_bridge
 from support.live import LiveRobot, large_model, supervisor_without_synthesis
 from support.pages_open import LIMIT_S, OpenPage, opened
@@ -149,7 +150,13 @@ def test_a_stop_that_is_wanted_while_one_is_under_way_follows_it(
     asyncio.run(look())
 
 
-def test_a_stop_that_hangs_holds_up_the_next_one_only_shortly(robot: LiveRobot, address: str) -> None:
+def test_a_stop_that_hangs_holds_up_the_next_one_only_shortly(
+    robot: LiveRobot, address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(remote_bridge, "FOLLOW_S", 0.01)
+    # Long beside what is pressed meanwhile.
+    monkeypatch.setattr(client, "STOP_LIMIT_S", 1.0)
+
     async def look() -> None:
         async with (
             Gate(address).standing() as gate,

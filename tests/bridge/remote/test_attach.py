@@ -18,6 +18,7 @@ from robosc_api.v1 import bridge_pb2 as pb
 from robosc_bridge.daemon import programs
 from robosc_bridge.remote import RemoteFace, RemoteSettings, service, session
 from robosc_bridge.remote import face as face_module
+from robosc_bridge.remote import pace as pace_module
 from robosc_bridge.remote.data import MAXIMUM_DEPTH, value_of
 from robosc_bridge.remote.pace import FLOOD_S, MESSAGES_A_S, FloodError, OperatorPace
 from support.remote import PATIENCE_S, Attachment, FakeDaemon, connected, eventually, served
@@ -213,7 +214,10 @@ class TestOperator:
         assert eventually(lambda: daemon.of(programs.Requested))
         program.end()
 
-    def test_one_that_sends_as_fast_as_it_can_is_ended(self, daemon: FakeDaemon, stub: Any) -> None:
+    def test_one_that_sends_as_fast_as_it_can_is_ended(
+        self, daemon: FakeDaemon, stub: Any, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(pace_module, "FLOOD_S", 1)
         program = attached(stub, is_operator=True)
         end = threading.Event()
 

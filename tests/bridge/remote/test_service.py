@@ -16,6 +16,7 @@ from robosc_api.v1 import bridge_pb2 as pb
 from robosc_bridge.configuration import parse
 from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.remote import RemoteError, RemoteFace, RemoteSettings, serve, service, settings_of
+from robosc_bridge.remote import face as face_module
 from robosc_bridge.remote.face import MAXIMUM_CONNECTIONS, MAXIMUM_REQUEST_BYTES
 from robosc_bridge.remote.watchers import MAXIMUM_EVENTS
 from support.remote import PATIENCE_S, READING, FakeDaemon, connected, eventually, model, scan, served
@@ -249,7 +250,14 @@ class TestStop:
             for channel in channels:
                 channel.__exit__(None, None, None)
 
-    def test_callers_that_say_nothing_do_not_keep_it_out_for_long(self, daemon: FakeDaemon, face: RemoteFace) -> None:
+    def test_callers_that_say_nothing_do_not_keep_it_out_for_long(
+        self, daemon: FakeDaemon, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(face_module, "_HANDSHAKE_LIMIT_S", 0.5)
+        with served(daemon) as face:
+            self._come_in(daemon, face)
+
+    def _come_in(self, daemon: FakeDaemon, face: RemoteFace) -> None:
         host, _, port = face.address.rpartition(":")
         silent = [socket.create_connection((host, int(port))) for _ in range(MAXIMUM_CONNECTIONS + 20)]
 
@@ -262,7 +270,7 @@ class TestStop:
             return True
 
         try:
-            eventually(stopped, limit_s=15.0)
+            eventually(stopped)
         finally:
             for line in silent:
                 line.close()

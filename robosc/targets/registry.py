@@ -156,6 +156,9 @@ def require_target(name: str) -> None:
     Raises:
         UnknownTargetError: There is none; the message says what there is.
     """
+    if name in _BUILT_IN or name in _registered:
+        # Looking through all installed packages for plug-ins takes longer than generating many a target.
+        return
     names = [info.name for info in available_targets()]
     if name in names:
         return

@@ -27,7 +27,7 @@ CALLING = LISTENING.replace("udpin", "udpout")
 
 
 @pytest.fixture
-def time() -> Iterator[VirtualHost]:
+def host() -> Iterator[VirtualHost]:
     with VirtualHost() as found:
         yield found
 
@@ -36,16 +36,16 @@ class Peer:
     """A station at an end of a line of the virtual host.
 
     Args:
-        time: The host.
+        host: The virtual one.
         address: That it calls, or listens at.
         key: Of signing.
         system: Its own number.
     """
 
-    def __init__(self, time: VirtualHost, address: str = CALLING, key: bytes | None = None, system: int = 255) -> None:
+    def __init__(self, host: VirtualHost, address: str = CALLING, key: bytes | None = None, system: int = 255) -> None:
         self.station = Station(key, system)
-        self.line = time.open_network(address)
-        self._time = time
+        self.line = host.open_network(address)
+        self._host = host
 
     def send(self, data: bytes) -> None:
         self.line.write(data)
@@ -57,8 +57,8 @@ class Peer:
 
     def until(self, name: str, limit_s: float = 2.0, is_so: Callable[[Any], bool] = lambda _: True) -> Any:
         """The next message of a kind."""
-        end_s = self._time.monotonic() + limit_s
-        while (left_s := end_s - self._time.monotonic()) > 0:
+        end_s = self._host.monotonic() + limit_s
+        while (left_s := end_s - self._host.monotonic()) > 0:
             for item in of_type(name, self.receive(left_s)):
                 if is_so(item):
                     return item
@@ -67,21 +67,21 @@ class Peer:
 
 @contextmanager
 def linked(
-    time: VirtualHost, address: str = LISTENING, daemon: PlayedDaemon | None = None, **values: Any
+    host: VirtualHost, address: str = LISTENING, daemon: PlayedDaemon | None = None, **values: Any
 ) -> Iterator[tuple[PlayedDaemon, GroundLink]]:
     daemon = daemon or PlayedDaemon()
-    link = GroundLink(daemon.operations, GroundSettings(address, FASTEST, **{"obeys_unsigned": True, **values}), time)
+    link = GroundLink(daemon.operations, GroundSettings(address, FASTEST, **{"obeys_unsigned": True, **values}), host)
     is_over = False
 
     def turn() -> None:
         while not is_over:
             daemon.show()
-            time.sleep(0.02)
+            host.sleep(0.02)
 
     link.start()
-    time.thread(turn, "loop").start()
+    host.thread(turn, "loop").start()
     # Both have begun.
-    time.sleep(0.0)
+    host.sleep(0.0)
     try:
         yield daemon, link
     finally:
@@ -91,9 +91,9 @@ def linked(
         assert not daemon.feed.is_watched
 
 
-def test_a_station_that_is_called_sees_the_robot_and_arms_it(time: VirtualHost) -> None:
-    station = Peer(time, LISTENING)
-    with linked(time, CALLING) as (daemon, _):
+def test_a_station_that_is_called_sees_the_robot_and_arms_it(host: VirtualHost) -> None:
+    station = Peer(host, LISTENING)
+    with linked(host, CALLING) as (daemon, _):
         beat = station.until("HEARTBEAT", 0.1)
         assert (beat.type, beat.get_srcSystem(), beat.get_srcComponent()) == (10, 1, 1)
         daemon.answers[Command.START] = ""
@@ -106,20 +106,20 @@ def test_a_station_that_is_called_sees_the_robot_and_arms_it(time: VirtualHost) 
         assert station.until("HEARTBEAT", 1.1, lambda beat: bool(beat.base_mode & 128)).custom_mode == 10
 
 
-def test_heartbeats_come_once_a_second(time: VirtualHost) -> None:
-    station = Peer(time, LISTENING)
-    with linked(time, CALLING):
+def test_heartbeats_come_once_a_second(host: VirtualHost) -> None:
+    station = Peer(host, LISTENING)
+    with linked(host, CALLING):
         for _ in range(60):
             station.until("HEARTBEAT", 1.0 + TURN_S)
-        begin_s = time.monotonic()
+        begin_s = host.monotonic()
         for _ in range(60):
             station.until("HEARTBEAT", 1.0 + TURN_S)
-        assert time.monotonic() - begin_s == pytest.approx(60.0, abs=TURN_S)
+        assert host.monotonic() - begin_s == pytest.approx(60.0, abs=TURN_S)
 
 
-def test_one_station_is_answered_and_another_may_stop(time: VirtualHost) -> None:
-    with linked(time) as (daemon, _):
-        first, second = Peer(time), Peer(time, system=254)
+def test_one_station_is_answered_and_another_may_stop(host: VirtualHost) -> None:
+    with linked(host) as (daemon, _):
+        first, second = Peer(host), Peer(host, system=254)
         first.send(first.station.heartbeat())
         first.until("HEARTBEAT")
         second.send(second.station.command(400, 1.0))
@@ -130,23 +130,23 @@ def test_one_station_is_answered_and_another_may_stop(time: VirtualHost) -> None
         first.until("HEARTBEAT")
 
 
-def test_when_a_station_is_gone_another_takes_its_place_after_its_time(time: VirtualHost) -> None:
-    with linked(time):
-        first, second = Peer(time), Peer(time)
+def test_when_a_station_is_gone_another_takes_its_place_after_its_time(host: VirtualHost) -> None:
+    with linked(host):
+        first, second = Peer(host), Peer(host)
         first.send(first.station.heartbeat())
         first.until("HEARTBEAT")
         first.send(first.station.heartbeat())
-        begin_s = time.monotonic()
+        begin_s = host.monotonic()
         while not second.station.heard:
             second.send(second.station.heartbeat())
             second.receive(0.1)
         # Its first heartbeat comes within a second.
-        assert STATION_LIMIT_S < time.monotonic() - begin_s < STATION_LIMIT_S + 1.0 + 0.1 + TURN_S
+        assert STATION_LIMIT_S < host.monotonic() - begin_s < STATION_LIMIT_S + 1.0 + 0.1 + TURN_S
 
 
-def test_garbage_takes_nobodys_place(time: VirtualHost) -> None:
-    with linked(time):
-        station, other = Peer(time), Peer(time)
+def test_garbage_takes_nobodys_place(host: VirtualHost) -> None:
+    with linked(host):
+        station, other = Peer(host), Peer(host)
         for size in (1, 12, 300, 9000, 60_000):
             other.send(b"\xfd" * size)
             other.send(os.urandom(size))
@@ -155,11 +155,11 @@ def test_garbage_takes_nobodys_place(time: VirtualHost) -> None:
         assert other.receive() == []
 
 
-def test_a_flood_of_datagrams_leaves_two_thirds_of_the_time(time: VirtualHost, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_flood_of_datagrams_leaves_two_thirds_of_the_time(host: VirtualHost, monkeypatch: pytest.MonkeyPatch) -> None:
     work_s = 0.001
     steps = 0
-    with linked(time) as (daemon, link):
-        station = Peer(time)
+    with linked(host) as (daemon, link):
+        station = Peer(host)
         station.send(station.station.heartbeat())
         station.until("HEARTBEAT")
         evil = b"".join(station.station.command(410) for _ in range(100))
@@ -168,32 +168,32 @@ def test_a_flood_of_datagrams_leaves_two_thirds_of_the_time(time: VirtualHost, m
         def flood() -> None:
             while not is_over:
                 station.send(evil)
-                time.sleep(work_s / 2)
+                host.sleep(work_s / 2)
 
         real = link._session.step
 
         def slow(*arguments: Any, **values: Any) -> bytes:
             nonlocal steps
             steps += 1
-            time.sleep(work_s)
+            host.sleep(work_s)
             return real(*arguments, **values)
 
         monkeypatch.setattr(link._session, "step", slow)
-        time.thread(flood, "flood").start()
-        begin_s = time.monotonic()
+        host.thread(flood, "flood").start()
+        begin_s = host.monotonic()
         station.until("HEARTBEAT")
         station.until("HEARTBEAT")
-        passed_s = time.monotonic() - begin_s
+        passed_s = host.monotonic() - begin_s
         is_over = True
         assert steps == pytest.approx(passed_s / (work_s * (1 + REST)), rel=0.1)
         assert daemon.orders == []
 
 
-def test_signed(time: VirtualHost, tmp_path: Path) -> None:
+def test_signed(host: VirtualHost, tmp_path: Path) -> None:
     (tmp_path / "key").write_bytes(KEY)
     signing = Signing(tmp_path / "key")
-    with linked(time, signing=signing, obeys_unsigned=False) as (daemon, _):
-        stranger, station = Peer(time), Peer(time, key=KEY)
+    with linked(host, signing=signing, obeys_unsigned=False) as (daemon, _):
+        stranger, station = Peer(host), Peer(host, key=KEY)
         stranger.send(stranger.station.heartbeat())
         station.station.codec.signing.timestamp = signing.begin().timestamp()
         station.send(station.station.heartbeat())
@@ -204,18 +204,18 @@ def test_signed(time: VirtualHost, tmp_path: Path) -> None:
         assert stranger.receive() == []
 
 
-def test_who_sends_our_own_packets_back_takes_nobodys_place(time: VirtualHost, tmp_path: Path) -> None:
+def test_who_sends_our_own_packets_back_takes_nobodys_place(host: VirtualHost, tmp_path: Path) -> None:
     (tmp_path / "key").write_bytes(KEY)
     signing = Signing(tmp_path / "key")
-    with linked(time, signing=signing, obeys_unsigned=False) as (daemon, _):
-        thief, station = Peer(time), Peer(time, key=KEY)
+    with linked(host, signing=signing, obeys_unsigned=False) as (daemon, _):
+        thief, station = Peer(host), Peer(host, key=KEY)
         station.station.codec.signing.timestamp = signing.begin().timestamp()
         station.send(station.station.heartbeat())
         for _ in range(3):
             # Overheard, while the station is silent for longer than its place is kept.
             packets = station.line.read(2.0)
             assert packets
-            time.sleep(STATION_LIMIT_S + 1.0)
+            host.sleep(STATION_LIMIT_S + 1.0)
             thief.send(packets)
         assert thief.receive() == []
         daemon.answers[Command.START] = ""
@@ -229,9 +229,9 @@ def accepted(connection: NetworkPort | None) -> NetworkPort:
     return connection
 
 
-def test_a_server_that_goes_and_comes_again_is_found(time: VirtualHost) -> None:
-    server = time.serve(5760)
-    with linked(time, "tcp:127.0.0.1:5760"):
+def test_a_server_that_goes_and_comes_again_is_found(host: VirtualHost) -> None:
+    server = host.serve(5760)
+    with linked(host, "tcp:127.0.0.1:5760"):
         for _ in range(2):
             connection = accepted(server.accept(10.0))
             station = Station()
@@ -242,18 +242,18 @@ def test_a_server_that_goes_and_comes_again_is_found(time: VirtualHost) -> None:
 
 
 def test_nobody_there_is_told_once_and_tried_ever_more_seldom(
-    time: VirtualHost, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+    host: VirtualHost, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tries_s: list[float] = []
-    opened = time.open_network
+    opened = host.open_network
 
     def counted(address: str) -> NetworkPort:
-        tries_s.append(time.monotonic())
+        tries_s.append(host.monotonic())
         return opened(address)
 
-    monkeypatch.setattr(time, "open_network", counted)
-    with linked(time, "tcp:127.0.0.1:1"):
-        time.sleep(600.0)
+    monkeypatch.setattr(host, "open_network", counted)
+    with linked(host, "tcp:127.0.0.1:1"):
+        host.sleep(600.0)
         pauses_s = [after_s - before_s for before_s, after_s in itertools.pairwise(tries_s)]
         assert len(pauses_s) == 153
         assert pauses_s == pytest.approx([0.25, 0.5, 1.0, 2.0] + [4.0] * (len(pauses_s) - 4))
@@ -261,49 +261,49 @@ def test_nobody_there_is_told_once_and_tried_ever_more_seldom(
 
 
 def test_a_problem_is_told_again_after_a_line_that_has_lasted(
-    time: VirtualHost, caplog: pytest.LogCaptureFixture
+    host: VirtualHost, caplog: pytest.LogCaptureFixture
 ) -> None:
-    server = time.serve(5760)
-    with linked(time, "tcp:127.0.0.1:5760"):
+    server = host.serve(5760)
+    with linked(host, "tcp:127.0.0.1:5760"):
         for lasted_s in (LASTING_S - 1.0, LASTING_S + 1.0, 0.0):
             connection = accepted(server.accept(60.0))
-            time.sleep(lasted_s)
+            host.sleep(lasted_s)
             connection.close()
-            time.sleep(0.1)
+            host.sleep(0.1)
         assert caplog.text.count("the other end has closed the connection") == 2
 
 
-def test_a_serial_line(time: VirtualHost) -> None:
-    end = time.new_end(None)
-    with linked(time, end.path, baud=57600) as (daemon, _):
+def test_a_serial_line(host: VirtualHost) -> None:
+    end = host.new_end(None)
+    with linked(host, end.path, baud=57600) as (daemon, _):
         assert end.host_baud() == 57600
         station = Station()
         end.write(b"noise\xfd" + station.command(410) + station.command(400, 0.0))
-        time.sleep(TURN_S)
+        host.sleep(TURN_S)
         station.hear(bytes(end.read()))
         assert len(of_type("COMMAND_ACK", station.heard)) == 2
         assert daemon.commands == [Command.STANDBY]
 
 
-def test_a_lost_line_ends_driving_at_once(time: VirtualHost) -> None:
+def test_a_lost_line_ends_driving_at_once(host: VirtualHost) -> None:
     daemon = PlayedDaemon(is_layer=True)
     daemon.show(state=State.RUNNING)
-    server = time.serve(5760)
-    with linked(time, "tcp:127.0.0.1:5760", daemon):
+    server = host.serve(5760)
+    with linked(host, "tcp:127.0.0.1:5760", daemon):
         connection = accepted(server.accept(1.0))
         station = Station()
         stick = station.codec.manual_control_encode(1, 500, 0, 0, 0, 0)
         connection.write(station.pack(stick))
-        assert time.wait(lambda: len(daemon.told) == 2, TURN_S)
+        assert host.wait(lambda: len(daemon.told) == 2, TURN_S)
         connection.close()
-        begin_s = time.monotonic()
-        assert time.wait(lambda: isinstance(daemon.told[-1], Detached), TURN_S)
-        assert time.monotonic() == begin_s
+        begin_s = host.monotonic()
+        assert host.wait(lambda: isinstance(daemon.told[-1], Detached), TURN_S)
+        assert host.monotonic() == begin_s
 
 
-def test_the_last_heartbeat_says_that_it_ends(time: VirtualHost) -> None:
-    station = Peer(time, LISTENING)
-    with linked(time, CALLING) as (daemon, _):
+def test_the_last_heartbeat_says_that_it_ends(host: VirtualHost) -> None:
+    station = Peer(host, LISTENING)
+    with linked(host, CALLING) as (daemon, _):
         station.until("HEARTBEAT")
         daemon.show(state=State.OVER)
     while station.receive():
@@ -312,36 +312,36 @@ def test_the_last_heartbeat_says_that_it_ends(time: VirtualHost) -> None:
 
 
 def test_an_error_inside_ends_nothing(
-    time: VirtualHost, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+    host: VirtualHost, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    station = Peer(time, LISTENING)
-    with linked(time, CALLING) as (_, link):
+    station = Peer(host, LISTENING)
+    with linked(host, CALLING) as (_, link):
         station.until("HEARTBEAT")
         with monkeypatch.context() as patch:
             patch.setattr(link._session, "step", lambda *_, **__: 1 / 0)
-            time.sleep(TURN_S)
+            host.sleep(TURN_S)
         assert "ZeroDivisionError" in caplog.text
         station.until("HEARTBEAT")
 
 
-def test_it_may_be_stopped_at_any_time(time: VirtualHost) -> None:
-    link = GroundLink(PlayedDaemon().operations, GroundSettings(LISTENING, FASTEST), time)
+def test_it_may_be_stopped_at_any_time(host: VirtualHost) -> None:
+    link = GroundLink(PlayedDaemon().operations, GroundSettings(LISTENING, FASTEST), host)
     link.stop()
     for passed_s in (0.0, 0.01, 1.0, 100.0):
         # Also between two attempts to find somebody.
-        link = GroundLink(PlayedDaemon().operations, GroundSettings("tcp:127.0.0.1:1", FASTEST), time)
+        link = GroundLink(PlayedDaemon().operations, GroundSettings("tcp:127.0.0.1:1", FASTEST), host)
         assert not link.is_alive
         link.start()
-        time.sleep(passed_s)
+        host.sleep(passed_s)
         assert link.is_alive
-        began_s = time.monotonic()
+        began_s = host.monotonic()
         link.stop()
         assert not link.is_alive
         link.stop()
-        assert time.monotonic() == began_s
+        assert host.monotonic() == began_s
 
 
-def test_a_thread_that_ends_unexpectedly_is_seen(time: VirtualHost, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_thread_that_ends_unexpectedly_is_seen(host: VirtualHost, monkeypatch: pytest.MonkeyPatch) -> None:
     class Over(BaseException):
         pass
 
@@ -350,10 +350,10 @@ def test_a_thread_that_ends_unexpectedly_is_seen(time: VirtualHost, monkeypatch:
 
     ended: list[Any] = []
     monkeypatch.setattr(threading, "excepthook", ended.append)
-    link = GroundLink(PlayedDaemon().operations, GroundSettings(LISTENING, FASTEST), time)
+    link = GroundLink(PlayedDaemon().operations, GroundSettings(LISTENING, FASTEST), host)
     monkeypatch.setattr(link._session, "step", end)
     link.start()
-    assert time.wait(lambda: not link.is_alive, 2 * TURN_S)
+    assert host.wait(lambda: not link.is_alive, 2 * TURN_S)
     link.stop()
-    time.close()
+    host.close()
     assert ended[0].exc_type is Over

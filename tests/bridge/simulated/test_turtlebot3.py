@@ -16,9 +16,9 @@ from support.wire import Host, sdk_port
 @pytest.mark.parametrize("lidar", LIDARS)
 def test_every_robot_can_be_put_together(robot: str, base: str, lidar: str) -> None:
     with (
-        VirtualHost() as time,
-        SimulatedTurtleBot3(robot, base, lidar, clock=time) as simulated,
-        Host(simulated.base_path, time=time) as host,
+        VirtualHost() as virtual,
+        SimulatedTurtleBot3(robot, base, lidar, clock=virtual) as simulated,
+        Host(simulated.base_path, time=virtual) as host,
     ):
         if base == "mavlink-rover":
             # Its heartbeat comes by itself.
@@ -72,43 +72,43 @@ def write(robot: SimulatedTurtleBot3, servo: Servo, *packets: tuple[int, bytes])
 @pytest.mark.parametrize("factor", [1.0, 5.0])
 def test_it_drives_by_its_hosts_clock(factor: float) -> None:
     with (
-        VirtualHost() as time,
-        SimulatedTurtleBot3(base="dynamixel", walls=Walls(()), factor=factor, clock=time) as robot,
+        VirtualHost() as virtual,
+        SimulatedTurtleBot3(base="dynamixel", walls=Walls(()), factor=factor, clock=virtual) as robot,
     ):
         for servo in (robot.left, robot.right):
             write(robot, servo, (64, b"\x01"), (104, b"\x64\0\0\0"))
-        time.sleep(1.0)
+        virtual.sleep(1.0)
         x_m = robot.world.pose[0]
-        time.sleep(1.0)
+        virtual.sleep(1.0)
         robot.world.catch_up()
         assert robot.world.pose[0] - x_m == pytest.approx(100 * 7.913672e-4 * factor, rel=0.01)
 
 
 def test_a_watchdog_trips_by_its_hosts_clock_however_fast_the_world_is() -> None:
     with (
-        VirtualHost() as time,
-        SimulatedTurtleBot3(base="dynamixel", walls=Walls(()), factor=10.0, clock=time) as robot,
-        Host(robot.base_path, time=time) as host,
+        VirtualHost() as virtual,
+        SimulatedTurtleBot3(base="dynamixel", walls=Walls(()), factor=10.0, clock=virtual) as robot,
+        Host(robot.base_path, time=virtual) as host,
     ):
         write(robot, robot.left, (64, b"\x01"), (104, b"\x64\0\0\0"), (98, b"\x0a"))
         # It is heard, and its own thread must wake for the end.
         host.ask("ff ff fd 00 01 03 00 01 19 4e")
-        began_s = time.monotonic()
-        assert time.wait(lambda: robot.left.table["bus watchdog"] == 0xFF, 1.0)
-        assert time.monotonic() - began_s == pytest.approx(0.2, abs=0.003)
+        began_s = virtual.monotonic()
+        assert virtual.wait(lambda: robot.left.table["bus watchdog"] == 0xFF, 1.0)
+        assert virtual.monotonic() - began_s == pytest.approx(0.2, abs=0.003)
 
 
 def test_opencr_counts_as_left_after_half_a_second() -> None:
     with (
-        VirtualHost() as time,
-        SimulatedTurtleBot3(walls=Walls(()), clock=time) as robot,
-        Host(robot.base_path, time=time) as host,
+        VirtualHost() as virtual,
+        SimulatedTurtleBot3(walls=Walls(()), clock=virtual) as robot,
+        Host(robot.base_path, time=virtual) as host,
     ):
         opencr = robot.opencr
         assert opencr is not None
-        began_s = time.monotonic()
+        began_s = virtual.monotonic()
         host.ask("ff ff fd 00 c8 06 00 03 13 00 01 37 a7")
         assert opencr.is_connected
-        assert time.wait(lambda: not opencr.is_connected, 1.0)
+        assert virtual.wait(lambda: not opencr.is_connected, 1.0)
         # It looks every 50 ms at most.
-        assert 0.5 <= time.monotonic() - began_s <= 0.55
+        assert 0.5 <= virtual.monotonic() - began_s <= 0.55

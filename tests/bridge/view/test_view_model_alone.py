@@ -1,5 +1,6 @@
 """A model that nothing executes: its initial state, made anew when its files change."""
 
+import argparse
 import asyncio
 import contextlib
 import os
@@ -246,7 +247,7 @@ def test_the_command_follows_its_file(tmp_path: Path, suffix: str, monkeypatch: 
                 lambda told: told["type"] == "update" and components(told) == before and not told["warnings"]
             )
 
-    parser: Parser = Parser(prog="robosc")
+    parser: argparse.ArgumentParser = Parser(prog="robosc")
     command.add_parser(parser.add_subparsers())
     arguments = parser.parse_args(["view", "--model", str(file)])
     asyncio.run(look())

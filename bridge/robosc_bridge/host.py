@@ -1,9 +1,10 @@
-"""What the bridge has of its computer: clocks, waiting, threads and serial ports, as one value.
+"""What the bridge has of its computer: clocks, waiting, threads, serial ports and network, as one value.
 
 Whatever waits or measures time does so through a `Host`, so that a test can put the whole bridge on a clock of its own:
 `robosc_bridge.simulated.virtual_host`. The real one is `robosc_bridge.transport.system_host`. Readings are in seconds.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Protocol
@@ -109,6 +110,52 @@ class Port(Protocol):
         """Give it back."""
 
 
+class NetworkPort(ABC):
+    """An open line over a network: `NetworkLine` says what each of these does.
+
+    Attributes:
+        path: The address.
+        is_datagram: Whether a read is one whole datagram.
+    """
+
+    path: str
+    is_datagram: bool
+
+    @property
+    @abstractmethod
+    def port(self) -> int:
+        """Of its own end."""
+
+    @property
+    @abstractmethod
+    def is_stranger(self) -> bool:
+        """Whether the last datagram came from elsewhere than where what is written goes."""
+
+    @abstractmethod
+    def read(self, limit_s: float) -> bytes:
+        """Return what has come, waiting for the first of it."""
+
+    @abstractmethod
+    def reply(self, data: bytes) -> None:
+        """Send one datagram to where the last one came from."""
+
+    @abstractmethod
+    def answer_sender(self) -> None:
+        """From now on, what is written goes to where the last datagram came from."""
+
+    @abstractmethod
+    def write(self, data: bytes, limit_s: float = 0.1) -> None:
+        """Send all of it."""
+
+    @abstractmethod
+    def wake(self) -> None:
+        """Let a `read` that waits in another thread return."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Give it back."""
+
+
 class Host(Clock, Protocol):
     """A computer, as far as the bridge and its devices need it."""
 
@@ -126,6 +173,13 @@ class Host(Clock, Protocol):
 
     def open_port(self, path: str, baud: int) -> Port:
         """Open a serial port.
+
+        Raises:
+            LineError: It cannot be used.
+        """
+
+    def open_network(self, address: str) -> NetworkPort:
+        """Open a line over a network; `transport.network_line` says how addresses are written.
 
         Raises:
             LineError: It cannot be used.

@@ -1,11 +1,9 @@
-"""A device that answers as a test says, on a real pseudo-terminal."""
+"""A device that answers as a test says, on a virtual host or a real pseudo-terminal."""
 
 import contextlib
-import fcntl
+import math
 import os
 import select
-import sys
-import termios
 import threading
 import time
 import tty
@@ -13,12 +11,65 @@ from collections.abc import Callable, Iterable
 from types import TracebackType
 from typing import Self
 
+from robosc_bridge.simulated.virtual_host import VirtualHost
+
 Answers = Iterable[bytes | float]
 """What to send, in order; a number is a pause in seconds."""
 
 
+class VirtualPeer:
+    """The far end of a line on a virtual host, served by one of its threads until it is closed; the host ends with it.
+
+    Args:
+        answer: Called with every whole request of protocol 2.0.
+
+    Attributes:
+        time: The virtual host.
+        path: Of the near end.
+        requests: That have come.
+    """
+
+    def __init__(self, answer: Callable[[bytes], Answers]) -> None:
+        self.requests: list[bytes] = []
+        self.time = VirtualHost()
+        self._answer = answer
+        self._end = self.time.new_end(None)
+        self.path = self._end.path
+        self.time.thread(self._serve, "peer").start()
+
+    def _serve(self) -> None:
+        heard = b""
+        while True:
+            self._end.wait(math.inf)
+            heard += self._end.read()
+            while len(heard) >= 7 and len(heard) >= (length := 7 + int.from_bytes(heard[5:7], "little")):
+                request, heard = heard[:length], heard[length:]
+                self.requests.append(request)
+                for sending in self._answer(request):
+                    if isinstance(sending, bytes):
+                        self.send(sending)
+                    else:
+                        self.time.sleep(sending)
+
+    def send(self, data: bytes) -> None:
+        """Send something."""
+        self._end.write(data)
+
+    def unplug(self) -> None:
+        """Hang up."""
+        self._end.disconnect()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.time.close()
+
+
 class Peer:
-    """The far end of a line, served by a thread until it is closed.
+    """The far end of a real line, served by a thread until it is closed.
 
     Args:
         answer: Called with every whole request of protocol 2.0.
@@ -60,11 +111,6 @@ class Peer:
         """Send something; what does not fit into the buffer of the line is lost."""
         with contextlib.suppress(BlockingIOError):
             os.write(self._master, data)
-
-    @property
-    def unread(self) -> int:
-        """Bytes that have arrived at the near end, and that nobody there has read."""
-        return int.from_bytes(fcntl.ioctl(self._slave, termios.FIONREAD, bytes(4)), sys.byteorder)
 
     def close(self) -> None:
         os.write(self._waker, b"\0")

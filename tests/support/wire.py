@@ -1,13 +1,59 @@
-"""The host's end of a simulated serial line, with pyserial and nothing of the drivers."""
+"""The host's end of a simulated serial line, with pyserial or virtual ports and nothing of the drivers."""
 
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import serial
 from dynamixel_sdk import PortHandler
 
 from robosc_bridge.simulated import SimulatedLine
+from robosc_bridge.simulated.virtual_host import VirtualHost
 from support.waiting import PATIENCE_S, wait_until
+
+
+class VirtualSerial:
+    """A port of a virtual host, in the words of pyserial.
+
+    Args:
+        time: The virtual host.
+        path: Of the port.
+        baud: Its speed.
+
+    Attributes:
+        timeout: How long a read waits for all that it wants.
+    """
+
+    def __init__(self, time: VirtualHost, path: str, baud: int) -> None:
+        self.timeout = PATIENCE_S
+        self._time = time
+        self._port = time.open_port(path, baud)
+        self._found = b""
+        # The device at the other end has begun to wait.
+        time.sleep(0.0)
+
+    @property
+    def in_waiting(self) -> int:
+        self._found += self._port.read(0.0)
+        return len(self._found)
+
+    def read(self, count: int) -> bytes:
+        end_s = self._time.monotonic() + self.timeout
+        while self.in_waiting < count and (left_s := end_s - self._time.monotonic()) > 0:
+            self._found += self._port.read(left_s)
+        found, self._found = self._found[:count], self._found[count:]
+        return found
+
+    def write(self, data: bytes) -> None:
+        self._port.write(data)
+        # A device that has nothing else to do hears it at once.
+        self._time.sleep(0.0)
+
+    def reset_input_buffer(self) -> None:
+        self._found = b""
+        self._port.discard_input()
+
+    def close(self) -> None:
+        self._port.close()
 
 
 class Host:
@@ -16,10 +62,13 @@ class Host:
     Args:
         path: Of the port.
         baud: Its speed.
+        time: The virtual host whose port it is; None: it is one of this computer.
     """
 
-    def __init__(self, path: str, baud: int = 1_000_000) -> None:
-        self.port = serial.Serial(path, baud, timeout=PATIENCE_S)
+    def __init__(self, path: str, baud: int = 1_000_000, time: VirtualHost | None = None) -> None:
+        self.port: Any = (
+            serial.Serial(path, baud, timeout=PATIENCE_S) if time is None else VirtualSerial(time, path, baud)
+        )
 
     def send(self, hexes: str | bytes) -> None:
         self.port.write(bytes.fromhex(hexes) if isinstance(hexes, str) else hexes)

@@ -11,9 +11,3 @@ from support.rovers import Bench, rig
 def any_bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
     with rig(request.param) as found:
         yield found
-
-
-@pytest.fixture
-def bench() -> Iterator[Bench]:
-    with rig("pty") as found:
-        yield found

@@ -238,16 +238,3 @@ def test_set_points_move_the_wheels_as_far_as_the_layer_lets_them(tmp_path: Path
         _, errors = process.communicate(timeout=LIMIT_S)
         assert process.returncode == 0, errors
         assert "Traceback" not in errors
-
-
-def test_an_address_that_cannot_be_is_told_by_check_and_run(tmp_path: Path) -> None:
-    with SimulatedTurtleBot3("burger", "opencr", "lds01") as robot:
-        file = _configured(tmp_path, robot, "udpbcast:10.0.0.255:14550")
-    for command in ("check", "run"):
-        arguments = [command, "--model", str(MODEL), "--config", str(file)]
-        done = subprocess.run(
-            [sys.executable, "-m", "robosc_bridge.main", *arguments], capture_output=True, text=True, check=False
-        )
-        assert done.returncode == 2
-        assert "remote.mavlink_url: 'udpbcast:10.0.0.255:14550' cannot be used; it is udpin:HOST:PORT" in done.stderr
-        assert "Traceback" not in done.stderr

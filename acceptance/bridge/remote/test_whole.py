@@ -217,18 +217,6 @@ def test_a_stop_reaches_the_motors_at_once(
             assert "no bridge answers at" in watcher.stderr.read()
 
 
-def test_an_address_that_cannot_be_used_is_one_line(robot: SimulatedTurtleBot3, tmp_path: Path) -> None:
-    file = configured(tmp_path, robot, RUNNER)
-    file.write_text(file.read_text().replace("127.0.0.1:0", "0.0.0.0:0"))
-    bridge = Running(file)
-    try:
-        assert bridge.process.wait(START_LIMIT_S) == 2
-        wait_until(lambda: "can be reached from other machines" in bridge.written)
-        assert "Traceback" not in bridge.written
-    finally:
-        bridge.end()
-
-
 def held(terminal: Terminal) -> bool:
     """A key that is held comes again and again."""
     terminal.type("w")

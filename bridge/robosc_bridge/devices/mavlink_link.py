@@ -13,7 +13,7 @@ from typing import Any
 
 from robosc_bridge.devices.mavlink_state import Told, VehicleState
 from robosc_bridge.errors import LineBusyError, LineError, LineLostError
-from robosc_bridge.host import Host
+from robosc_bridge.host import Host, NetworkPort
 from robosc_bridge.protocol.framing import FrameCounts
 from robosc_bridge.protocol.mavlink import Codec, Decoder
 from robosc_bridge.protocol.mavlink_messages import (
@@ -28,7 +28,6 @@ from robosc_bridge.protocol.mavlink_messages import (
 )
 from robosc_bridge.protocol.mavlink_signing import Signing
 from robosc_bridge.transport.lines import open_line
-from robosc_bridge.transport.network_line import NetworkLine
 from robosc_bridge.transport.system_host import SYSTEM_HOST
 
 BAUD = 57_600
@@ -219,7 +218,7 @@ class VehicleLink:
             messages = self._decoder.feed(data)
             for message in messages:
                 self._sort(message, time_s)
-            if isinstance(self._line, NetworkLine) and self._line.is_datagram:
+            if isinstance(self._line, NetworkPort) and self._line.is_datagram:
                 # A packet does not go on in the next datagram.
                 self._decoder.forget()
             if messages:
@@ -229,7 +228,7 @@ class VehicleLink:
         own = (self.settings.own_system, self.settings.own_component)
         before = self._state
         self._state = before.after(message, time_s, own)
-        if self._state.heartbeat is not before.heartbeat and isinstance(self._line, NetworkLine):
+        if self._state.heartbeat is not before.heartbeat and isinstance(self._line, NetworkPort):
             self._line.answer_sender()
         # A companion computer of the vehicle may be what sees.
         if isinstance(message.content, (ObstacleRing, SectorDistance)) and message.system == self._state.system:

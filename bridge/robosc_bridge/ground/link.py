@@ -3,16 +3,15 @@
 import contextlib
 import logging
 import threading
-import time
-from collections.abc import Callable
 
 from robosc_bridge.daemon.backoff import Backoff
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.ground.session import STATION_LIMIT_S, Session
 from robosc_bridge.ground.settings import GroundSettings
+from robosc_bridge.host import Host, NetworkPort
 from robosc_bridge.transport.lines import Line, open_line
-from robosc_bridge.transport.network_line import NetworkLine
+from robosc_bridge.transport.system_host import SYSTEM_HOST
 
 _log = logging.getLogger(__name__)
 
@@ -39,36 +38,33 @@ class GroundLink:
     Args:
         operations: The daemon.
         settings: How the station is reached.
-        clock: The time, by the clock that readings and scans have theirs from.
+        host: What it has of its computer; readings and scans have their times from its clock, too.
 
     Raises:
         SigningError: There is no key, or its time cannot be kept.
     """
 
-    def __init__(
-        self, operations: Operations, settings: GroundSettings, clock: Callable[[], float] = time.monotonic
-    ) -> None:
+    def __init__(self, operations: Operations, settings: GroundSettings, host: Host = SYSTEM_HOST) -> None:
         self._settings = settings
-        self._clock = clock
-        self._session = Session(operations, settings, clock())
+        self._host = host
+        self._clock = host.monotonic
+        self._session = Session(operations, settings, self._clock())
         self._backoff = Backoff()
         self._guard = threading.Lock()
         self._line: Line | None = None
-        self._over = threading.Event()
+        self._is_over = False
+        self._ending = host.condition()
         self._peer_s = -STATION_LIMIT_S
         self._problem = ""
-        self._thread = threading.Thread(target=self._run, name="ground station", daemon=True)
+        self._thread = host.thread(self._run, self.name)
+
+    name = "ground station"
 
     @property
     def port(self) -> int | None:
         """Of its own end, where there is a network and the line is open."""
         with self._guard:
-            return self._line.port if isinstance(self._line, NetworkLine) else None
-
-    @property
-    def name(self) -> str:
-        """For the log."""
-        return self._thread.name
+            return self._line.port if isinstance(self._line, NetworkPort) else None
 
     @property
     def is_alive(self) -> bool:
@@ -81,7 +77,9 @@ class GroundLink:
 
     def stop(self) -> None:
         """End, with a last heartbeat; may be called again, and before `start`."""
-        self._over.set()
+        with self._ending:
+            self._is_over = True
+            self._ending.notify_all()
         with self._guard:
             if self._line is not None:
                 self._line.wake()
@@ -90,7 +88,7 @@ class GroundLink:
 
     def _run(self) -> None:
         try:
-            while not self._over.is_set():
+            while not self._is_over:
                 try:
                     self._talk(self._opened())
                 except BridgeError as error:
@@ -108,7 +106,7 @@ class GroundLink:
             self._session.lost()
 
     def _opened(self) -> Line:
-        line = open_line(self._settings.address, self._settings.baud)
+        line = open_line(self._settings.address, self._settings.baud, self._host)
         with self._guard:
             self._line = line
         self._peer_s = -STATION_LIMIT_S
@@ -116,11 +114,11 @@ class GroundLink:
 
     def _talk(self, line: Line) -> None:
         opened_s = self._clock()
-        while not self._over.is_set():
+        while not self._is_over:
             asked_s = self._clock()
             data = line.read(TURN_S)
             now_s = self._clock()
-            if isinstance(line, NetworkLine) and line.is_datagram:
+            if isinstance(line, NetworkPort) and line.is_datagram:
                 self._datagram(line, data[:LONGEST_DATAGRAM], now_s)
             else:
                 line.write(self._session.step(now_s, data))
@@ -129,12 +127,13 @@ class GroundLink:
                 self._backoff.succeeded()
                 self._problem = ""
             if now_s - asked_s < done_s - now_s:
-                self._over.wait(min((done_s - now_s) * REST, _LONGEST_REST_S))
+                self._pause(min((done_s - now_s) * REST, _LONGEST_REST_S))
 
-    def _datagram(self, line: NetworkLine, data: bytes, now_s: float) -> None:
+    def _datagram(self, line: NetworkPort, data: bytes, now_s: float) -> None:
         if data and line.is_stranger and now_s - self._peer_s < STATION_LIMIT_S:
             # One station at a time; another may stop the robot.
-            line.reply(self._session.overheard(now_s, data))
+            if answers := self._session.overheard(now_s, data):
+                line.reply(answers)
             data = b""
         is_stranger = line.is_stranger
         accepted, claims = self._session.accepted, self._session.claims
@@ -153,7 +152,12 @@ class GroundLink:
         self._problem = problem
         self._close()
         self._session.lost()
-        self._over.wait(self._backoff.failed())
+        self._pause(self._backoff.failed())
+
+    def _pause(self, limit_s: float) -> None:
+        """Do nothing for a time, or until the end."""
+        with self._ending:
+            self._ending.wait_for(lambda: self._is_over, limit_s)
 
     def _close(self) -> None:
         with self._guard:

@@ -6,7 +6,7 @@ time-outs) goes by the clock, as with all simulated devices. Sources: ArduPilot 
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from robosc_bridge.simulated.line import Sending
@@ -27,6 +27,7 @@ _VELOCITY_AND_TURN_RATE = 0x05E7
 _CHUNK = 50
 _UNKNOWN_CM = 65535
 _SECTORS = 72
+_RAYS = 9  # In each of them.
 _LEAST_CM, _MOST_CM = 5, 800
 _LOCAL_FRD, _BODY_FRD = 20, 12
 _HEARTBEAT, _SYS_STATUS = 0, 1
@@ -349,11 +350,14 @@ class Rover:
             estimator=1,
         )
 
-    def _distance_cm(self, middle_deg: float, width_deg: float) -> int:
-        """The nearest in a sector, clockwise from the front; most + 1: nothing."""
-        angles_rad = [math.radians(-(middle_deg + (part / 8 - 0.5) * width_deg)) for part in range(9)]
-        nearest_m = min(self._world.ranges(angles_rad))
-        return min(round(nearest_m * 100), _MOST_CM + 1) if math.isfinite(nearest_m) else _MOST_CM + 1
+    def _distances_cm(self, middles_deg: Sequence[float], width_deg: float) -> list[int]:
+        """The nearest in each sector, clockwise from the front; most + 1: nothing."""
+        parts_deg = [(part / (_RAYS - 1) - 0.5) * width_deg for part in range(_RAYS)]
+        ranges_m = self._world.ranges([math.radians(-(middle + part)) for middle in middles_deg for part in parts_deg])
+        nearest_m = [min(ranges_m[first : first + _RAYS]) for first in range(0, len(ranges_m), _RAYS)]
+        return [
+            min(round(range_m * 100), _MOST_CM + 1) if math.isfinite(range_m) else _MOST_CM + 1 for range_m in nearest_m
+        ]
 
     def _ring(self, boot_s: float) -> bytes:
         increment_deg = 360 // _SECTORS
@@ -362,7 +366,7 @@ class Rover:
         return self._encoder.encode(
             "OBSTACLE_DISTANCE",
             time_us=int(boot_s * 1e6),
-            distances=[self._distance_cm(first_deg + k * increment_deg, increment_deg) for k in range(_SECTORS)],
+            distances=self._distances_cm([first_deg + k * increment_deg for k in range(_SECTORS)], increment_deg),
             min=_LEAST_CM,
             max=_MOST_CM,
             increment=increment_deg,
@@ -376,12 +380,12 @@ class Rover:
                 time_ms=int(boot_s * 1000),
                 min=_LEAST_CM,
                 max=_MOST_CM,
-                current=self._distance_cm(eighth * 45.0, 45.0),
+                current=distance_cm,
                 id=eighth,
                 orientation=eighth,
                 covariance=255,
             )
-            for eighth in range(8)
+            for eighth, distance_cm in enumerate(self._distances_cm([eighth * 45.0 for eighth in range(8)], 45.0))
         ]
 
     def _texts(self, severity: int, text: str) -> list[bytes]:

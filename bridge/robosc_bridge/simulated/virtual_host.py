@@ -5,7 +5,7 @@ began to wait. Where nobody's is, time jumps to the moment at which the first on
 whatever else the computer does. This is what `trio.testing.MockClock` with its `autojump_threshold` of 0 does for
 tasks (N. J. Smith, trio), here for threads.
 
-Its serial ports are memory: what one end writes, the other end can read at once.
+Its serial ports and its network are memory: what one end writes, the other end can read at once.
 """
 
 import math
@@ -18,6 +18,8 @@ from types import TracebackType
 from typing import Any, Self
 
 from robosc_bridge.errors import LineBusyError, LineLostError, LineMissingError
+from robosc_bridge.host import NetworkPort
+from robosc_bridge.simulated.virtual_network import VirtualNetwork, VirtualServer
 
 _END_S = 10.0
 """A thread that does not end within so long by the computer's clock waits for something that is not of this host."""
@@ -39,7 +41,9 @@ class _Turn:
     """A thread's place among those that take turns."""
 
     def __init__(self) -> None:
-        self.given = threading.Semaphore(0)
+        # Taken by whoever waits for its turn, released by whoever gives it: of all that waits in turn, the fastest.
+        self.given = threading.Lock()
+        self.given.acquire()
         self.end_s = math.inf
         self.is_ready: Callable[[], bool] = lambda: False
         self.is_over = False
@@ -63,6 +67,7 @@ class VirtualHost:
         self._threads: list[threading.Thread] = []
         self._is_closed = False
         self.ports: dict[str, _End] = {}
+        self._network = VirtualNetwork(self.wait)
 
     def monotonic(self) -> float:
         """Return the time in seconds."""
@@ -130,11 +135,28 @@ class VirtualHost:
             raise FileExistsError(path)
         return _End(self, path)
 
+    def open_network(self, address: str) -> NetworkPort:
+        """Open a line over its network, which reaches this host alone, whatever an address says.
+
+        Raises:
+            LineMissingError: Nobody serves there.
+            LineBusyError: That port is in use.
+        """
+        return self._network.open(address)
+
+    def serve(self, port: int = 0) -> VirtualServer:
+        """Return a server that takes connections on a port of its network; 0: any.
+
+        Raises:
+            LineBusyError: That port is in use.
+        """
+        return self._network.serve(port)
+
     def close(self) -> None:
         """End all threads that still wait."""
         self._is_closed = True
-        for turn in tuple(self._waiting):
-            turn.given.release()
+        while self._waiting:
+            self._waiting.popleft().given.release()
         for thread in self._threads:
             thread.join(_END_S)
 
@@ -161,7 +183,8 @@ class VirtualHost:
 
     def _next(self) -> _Turn:
         for turn in self._waiting:
-            if turn.is_ready():
+            # Nobody is left waiting whose time is over, so that it can be stated of any run that it ends.
+            if turn.end_s <= self._now_s or turn.is_ready():
                 break
         else:
             turn = min(self._waiting, key=lambda turn: turn.end_s)

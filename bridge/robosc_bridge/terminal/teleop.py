@@ -13,9 +13,9 @@ import termios
 import threading
 import time
 import tty
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import Any
+from typing import Any, Protocol
 
 from robosc_bridge.terminal.client import BridgeClient, DriveTopic, Operator, RefusedError, UnreachableError, Wish
 from robosc_bridge.terminal.shown import printable
@@ -53,6 +53,29 @@ _ZEROS = 3
 _BLOCKED_S = 1.0
 _ANSWER_S = 0.1
 _SIGNALS = (signal.SIGTERM, signal.SIGHUP)
+
+
+class Running(Protocol):
+    """Something that was started, and goes on beside the keys."""
+
+    def is_alive(self) -> bool:
+        """Whether it has not ended."""
+
+
+class Terminal(Protocol):
+    """Where somebody types, and the time that passes there."""
+
+    def monotonic(self) -> float:
+        """Return the time in seconds."""
+
+    def read(self, limit_s: float) -> list[str]:
+        """Return keys that come within a time; the end of the input is a `q`."""
+
+    def write(self, text: str) -> None:
+        """Show something."""
+
+    def start(self, run: Callable[[], None]) -> Running:
+        """Let something go on beside the keys."""
 
 
 class Wished:
@@ -119,31 +142,36 @@ def teleop(client: BridgeClient) -> int:
     if not os.isatty(sys.stdin.fileno()):
         raise UnreachableError("keys are typed in a terminal, and there is none")
     topic = client.drive_topic()
-    teller = _Teller()
-    operator = client.operate(f"teleop of {os.environ.get('USER', 'somebody')}"[:100], teller.told)
     with _raw_keys() as number:
-        try:
-            sys.stdout.write(f"{HELP}\r\n")
-            _drive(number, client, operator, topic, teller)
-        finally:
-            # However it ends, also by a signal: nothing is wished any more.
-            with suppress(RefusedError, UnreachableError):
-                operator.drive(topic, 0.0, 0.0)
-            operator.close()
-            # What the terminal has still to answer is not for the shell.
-            _read(number, _ANSWER_S)
-            with suppress(OSError):
-                sys.stdout.write("\r\n")
+        drive(_ThisTerminal(number), client, topic)
     return 0
 
 
-def _drive(number: int, client: BridgeClient, operator: Operator, topic: DriveTopic, teller: "_Teller") -> None:
+def drive(terminal: Terminal, client: BridgeClient, topic: DriveTopic) -> None:
+    """Drive from a terminal until `q`; raises as `teleop`."""
+    teller = _Teller(terminal)
+    operator = client.operate(f"teleop of {os.environ.get('USER', 'somebody')}"[:100], teller.told)
+    try:
+        terminal.write(f"{HELP}\r\n")
+        _drive(terminal, client, operator, topic, teller)
+    finally:
+        # However it ends, also by a signal: nothing is wished any more.
+        with suppress(RefusedError, UnreachableError):
+            operator.drive(topic, 0.0, 0.0)
+        operator.close()
+        # What the terminal has still to answer is not for the shell.
+        terminal.read(_ANSWER_S)
+        with suppress(OSError):
+            terminal.write("\r\n")
+
+
+def _drive(terminal: Terminal, client: BridgeClient, operator: Operator, topic: DriveTopic, teller: "_Teller") -> None:
     """Until a key or the end of the input ends it; raises as `teleop`."""
-    wished, zeros_left, next_s, ask_s = Wished(), 0, time.monotonic(), 0.0
-    heard_s, resuming = next_s, _Resuming(client, teller)
+    wished, zeros_left, next_s, ask_s = Wished(), 0, terminal.monotonic(), 0.0
+    heard_s, resuming = next_s, _Resuming(terminal, client, teller)
     while True:
-        keys = _read(number, max(next_s - time.monotonic(), 0.0))
-        now_s = time.monotonic()
+        keys = terminal.read(max(next_s - terminal.monotonic(), 0.0))
+        now_s = terminal.monotonic()
         if keys:
             heard_s = now_s
         for key in keys:
@@ -156,7 +184,7 @@ def _drive(number: int, client: BridgeClient, operator: Operator, topic: DriveTo
             next_s, zeros_left = now_s, _ZEROS
             _obey(client, key, teller, resuming)
         resuming.look()
-        now_s = time.monotonic()
+        now_s = terminal.monotonic()
         if now_s < next_s:
             continue
         wished.lapse(now_s)
@@ -188,17 +216,17 @@ def _obey(client: BridgeClient, key: str, teller: "_Teller", resuming: "_Resumin
 class _Resuming:
     """Lets the robot go on, in a thread: until the bridge has answered, a stop must be typed as ever."""
 
-    def __init__(self, client: BridgeClient, teller: "_Teller") -> None:
+    def __init__(self, terminal: Terminal, client: BridgeClient, teller: "_Teller") -> None:
+        self._terminal = terminal
         self._client = client
         self._teller = teller
-        self._thread: threading.Thread | None = None
+        self._running: Running | None = None
         self._failure: UnreachableError | None = None
 
     def begin(self) -> None:
         """Ask for it; once more while it is asked for changes nothing."""
-        if self._thread is None or not self._thread.is_alive():
-            self._thread = threading.Thread(target=self._ask, name="resume", daemon=True)
-            self._thread.start()
+        if self._running is None or not self._running.is_alive():
+            self._running = self._terminal.start(self._ask)
 
     def look(self) -> None:
         """Whether the bridge could be asked.
@@ -226,8 +254,9 @@ class _Teller:
         note: What was said last.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, terminal: Terminal) -> None:
         self.note = ""
+        self._terminal = terminal
         self._lock = threading.Lock()
         self._blocked = ("", 0.0)
 
@@ -235,7 +264,7 @@ class _Teller:
         """From the thread that listens: something was blocked or refused."""
         with self._lock:
             if what == "blocked":
-                self._blocked = (text, time.monotonic())
+                self._blocked = (text, self._terminal.monotonic())
             else:
                 self.note = text
 
@@ -243,10 +272,9 @@ class _Teller:
         """Write it again, and ask the terminal whether it is there."""
         with self._lock:
             name, time_s = self._blocked
-        blocked = f"   BLOCKED {name}" if name and time.monotonic() - time_s < _BLOCKED_S else ""
+        blocked = f"   BLOCKED {name}" if name and self._terminal.monotonic() - time_s < _BLOCKED_S else ""
         text = f"{wished.linear_m_s:+.2f} m/s {wished.angular_rad_s:+.1f} rad/s{blocked}   {self.note}"
-        sys.stdout.write(f"\r\x1b[K{printable(text)}{_ASK if asks else ''}")
-        sys.stdout.flush()
+        self._terminal.write(f"\r\x1b[K{printable(text)}{_ASK if asks else ''}")
 
 
 @contextmanager
@@ -272,16 +300,39 @@ def _leave(number: int, frame: Any) -> None:
     sys.exit(128 + number)
 
 
-def _read(number: int, limit_s: float) -> list[str]:
-    """Keys that come within a time; the end of the input is a `q`."""
-    ready, _, _ = select.select([number], [], [], limit_s)
-    if not ready:
-        return []
-    try:
-        data = os.read(number, 256)
-    except OSError:
-        data = b""
-    return keys_of(data.decode("utf-8", "replace")) if data else ["q"]
+class _ThisTerminal:
+    """The terminal of this process, key by key.
+
+    Args:
+        number: Of its file.
+    """
+
+    monotonic = staticmethod(time.monotonic)
+
+    def __init__(self, number: int) -> None:
+        self._number = number
+
+    def read(self, limit_s: float) -> list[str]:
+        """Return keys that come within a time; the end of the input is a `q`."""
+        ready, _, _ = select.select([self._number], [], [], limit_s)
+        if not ready:
+            return []
+        try:
+            data = os.read(self._number, 256)
+        except OSError:
+            data = b""
+        return keys_of(data.decode("utf-8", "replace")) if data else ["q"]
+
+    def write(self, text: str) -> None:
+        """Show something."""
+        sys.stdout.write(text)
+        sys.stdout.flush()
+
+    def start(self, run: Callable[[], None]) -> threading.Thread:
+        """Let something go on beside the keys."""
+        thread = threading.Thread(target=run, name="resume", daemon=True)
+        thread.start()
+        return thread
 
 
-__all__ = ["HELP", "RefusedError", "UnreachableError", "Wished", "keys_of", "teleop"]
+__all__ = ["HELP", "RefusedError", "Terminal", "UnreachableError", "Wished", "drive", "keys_of", "teleop"]

@@ -16,6 +16,7 @@ import threading
 import time
 
 from robosc_bridge.errors import LineBusyError, LineDeniedError, LineError, LineLostError, LineMissingError
+from robosc_bridge.host import NetworkPort
 
 SCHEMES = ("udpin", "udpout", "tcp")
 _CONNECT_LIMIT_S = 1.0
@@ -27,7 +28,7 @@ def is_network_address(address: str) -> bool:
     return address.partition(":")[0] in SCHEMES
 
 
-class NetworkLine:
+class NetworkLine(NetworkPort):
     """An open socket.
 
     Args:

@@ -1,4 +1,4 @@
-"""This computer as a host: its clocks, threads and serial ports."""
+"""This computer as a host: its clocks, threads, serial ports and network."""
 
 import queue
 import threading
@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from robosc.execution.clock import SystemClock
+from robosc_bridge.transport.network_line import NetworkLine
 from robosc_bridge.transport.serial_line import SerialLine
 
 
@@ -34,6 +35,14 @@ class SystemHost(SystemClock):
             LineError: It cannot be used.
         """
         return SerialLine(path, baud)
+
+    def open_network(self, address: str) -> NetworkLine:
+        """Open a line over a network.
+
+        Raises:
+            LineError: It cannot be used.
+        """
+        return NetworkLine(address)
 
 
 SYSTEM_HOST = SystemHost()

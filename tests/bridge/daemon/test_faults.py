@@ -67,6 +67,25 @@ def test_a_base_that_is_silent_counts_as_lost_after_three_answers_that_do_not_co
         assert bridge.host.monotonic() - begin_s == pytest.approx(trials * 0.3, abs=0.05)
 
 
+@pytest.mark.parametrize(
+    ("base", "limit_s"),
+    [
+        ("opencr", 0.36),  # Three exchanges of 120 ms.
+        ("dynamixel", 0.48),  # The same, and a last word to both motors.
+        ("mavlink-rover", 2.0),  # Its last estimate holds for a second, and for another one it is told to disarm.
+    ],
+)
+def test_a_run_ends_so_soon_after_the_last_answer(base: str, limit_s: float) -> None:
+    """After three exchanges in a row without an answer: noise alone does not end it, and nothing waits for longer."""
+    with driven(base, options="{}") as bridge:
+        bridge.steady()
+        begin_s = bridge.host.monotonic()
+        bridge.robot.base_faults.drop_share = 1.0
+        assert "the drive base is lost" in bridge.ended()
+        # Up to a cycle passes before it is asked again.
+        assert bridge.host.monotonic() - begin_s == pytest.approx(limit_s, abs=0.06)
+
+
 def test_which_fault_a_motor_tells_is_told() -> None:
     with driven("dynamixel") as bridge:
         bridge.steady()

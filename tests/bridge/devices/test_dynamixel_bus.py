@@ -1,8 +1,6 @@
-"""Requests and answers over a real pseudo-terminal, and every way in which an answer can be wrong."""
+"""Requests and answers in virtual time, and every way in which an answer can be wrong."""
 
-import resource
-import threading
-import time
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -10,19 +8,17 @@ import pytest
 
 from robosc_bridge.devices.dynamixel_bus import DynamixelBus, RefusedError
 from robosc_bridge.errors import DeviceSilentError, LineLostError
-from robosc_bridge.transport.serial_line import SerialLine
-from support.peer import Answers, Peer, asked, packet, status
-from support.waiting import wait_until
+from support.peer import Answers, VirtualPeer, asked, packet, status
 
 LIMIT_S = 0.1
 
 
 @contextmanager
-def _bus(peer: Peer, limit_s: float = LIMIT_S) -> Iterator[DynamixelBus]:
-    with SerialLine(peer.path, 1_000_000) as line:
-        bus = DynamixelBus(line, lambda device: f"device {device}", limit_s)
-        bus.begin(10.0)
-        yield bus
+def _bus(peer: VirtualPeer, limit_s: float = LIMIT_S) -> Iterator[DynamixelBus]:
+    line = peer.time.open_port(peer.path, 1_000_000)
+    bus = DynamixelBus(line, lambda device: f"device {device}", limit_s, peer.time)
+    bus.begin(10.0)
+    yield bus
 
 
 def _memory(request: bytes) -> bytes:
@@ -48,7 +44,7 @@ class _Scripted:
 
 
 def test_ping_read_write_and_reboot_are_as_worked() -> None:
-    with Peer(lambda request: [_memory(request)]) as peer, _bus(peer) as bus:
+    with VirtualPeer(lambda request: [_memory(request)]) as peer, _bus(peer) as bus:
         assert bus.ping(1) == (1060, 45)
         assert bus.read(1, 132, 4).data == bytes((132, 133, 134, 135))
         bus.write(1, 64, b"\1")
@@ -71,7 +67,7 @@ def test_a_synchronised_read_keeps_what_each_device_told() -> None:
     def both(request: bytes) -> Answers:
         return [status(1, b"a" * 21), status(2, b"b" * 21, 0x80)]
 
-    with Peer(both) as peer, _bus(peer) as bus:
+    with VirtualPeer(both) as peer, _bus(peer) as bus:
         found = bus.sync_read(126, 21, (1, 2))
     assert peer.requests[0].hex(" ") == "ff ff fd 00 fe 09 00 82 7e 00 15 00 01 02 3e 1e"
     assert (found[1].data, found[1].is_alert) == (b"a" * 21, False)
@@ -82,7 +78,7 @@ def test_a_missing_device_does_not_hide_what_comes_behind_it() -> None:
     def second(request: bytes) -> Answers:
         return [status(2, b"b", 0x80)] if request[7] == 0x82 else [_memory(request)]
 
-    with Peer(second) as peer, _bus(peer) as bus:
+    with VirtualPeer(second) as peer, _bus(peer) as bus:
         found = bus.sync_read(64, 1, (1, 2))
         assert set(found) == {2}
         assert found[2].is_alert
@@ -103,7 +99,7 @@ def test_a_missing_device_does_not_hide_what_comes_behind_it() -> None:
     ids=["garbage", "half a header", "0xff", "echo", "another device", "too long", "too short"],
 )
 def test_what_comes_before_the_answer_is_passed_over(noise: bytes) -> None:
-    with Peer(_Scripted([noise, status(1, b"good")])) as peer, _bus(peer) as bus:
+    with VirtualPeer(_Scripted([noise, status(1, b"good")])) as peer, _bus(peer) as bus:
         assert bus.read(1, 132, 4).data == b"good"
         assert bus.counters.repeated == 0
     assert len(peer.requests) == 1
@@ -113,7 +109,7 @@ def test_an_answer_in_single_bytes_is_put_together() -> None:
     pieces: list[bytes | float] = []
     for byte in status(1, b"good"):
         pieces += [bytes((byte,)), 0.001]
-    with Peer(_Scripted(pieces)) as peer, _bus(peer) as bus:
+    with VirtualPeer(_Scripted(pieces)) as peer, _bus(peer) as bus:
         assert bus.read(1, 132, 4).data == b"good"
 
 
@@ -129,7 +125,7 @@ def test_an_answer_in_single_bytes_is_put_together() -> None:
     ids=["silence", "wrong checksum", "half a packet", "another id", "request came damaged"],
 )
 def test_a_request_is_made_again_once(first: Answers, is_damaged: bool) -> None:
-    with Peer(_Scripted(first)) as peer, _bus(peer) as bus:
+    with VirtualPeer(_Scripted(first)) as peer, _bus(peer) as bus:
         assert bus.read(1, 132, 4).data == bytes((132, 133, 134, 135))
         assert bus.counters.repeated == 1
         assert (bus.counters.damaged > 0) == is_damaged
@@ -141,26 +137,62 @@ def test_a_synchronised_read_that_came_damaged_is_made_again() -> None:
     def answer(request: bytes) -> Answers:
         return [next(reads)] if request[7] == 0x82 else [_memory(request)]
 
-    with Peer(answer) as peer, _bus(peer) as bus:
+    with VirtualPeer(answer) as peer, _bus(peer) as bus:
         found = bus.sync_read(64, 1, (1, 2))
         assert [found[device].data for device in (1, 2)] == [b"a", b"b"]
         assert bus.counters.repeated == 1
 
 
-def test_waiting_costs_nothing() -> None:
-    with Peer(lambda request: []) as peer, _bus(peer, 0.5) as bus:
-        bus.begin(0.5, repeats=0)
-        begin = resource.getrusage(resource.RUSAGE_THREAD)
+def test_silence_is_told_in_time_and_names_who_answers_instead() -> None:
+    with VirtualPeer(lambda request: [status(7, b"1234")]) as peer, _bus(peer) as bus:
+        begin_s = peer.time.monotonic()
+        with pytest.raises(DeviceSilentError, match="device 1 does not answer, but device 7 does"):
+            bus.read(1, 132, 4)
+        # It was made again once; the bytes of an answer take their time, too.
+        assert peer.time.monotonic() - begin_s == pytest.approx(2 * LIMIT_S, abs=0.001)
+        # The next device is not held up: the port is not busy, and nothing waits.
+        begin_s = peer.time.monotonic()
+        assert bus.read(7, 132, 4).data == b"1234"
+        assert peer.time.monotonic() == begin_s
+
+
+def test_all_requests_of_a_cycle_end_with_it() -> None:
+    with VirtualPeer(lambda request: []) as peer, _bus(peer) as bus:
+        begin_s = peer.time.monotonic()
+        bus.begin(1.5 * LIMIT_S, repeats=5)
+        with pytest.raises(DeviceSilentError):
+            bus.read(1, 132, 4)
+        with pytest.raises(DeviceSilentError, match="no time is left"):
+            bus.write(1, 64, b"\1")
+        assert peer.time.monotonic() - begin_s == pytest.approx(1.5 * LIMIT_S)
+
+
+def test_a_clock_that_a_person_may_set_is_not_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    with VirtualPeer(lambda request: []) as peer, _bus(peer) as bus:
+        monkeypatch.setattr(peer.time, "wall", lambda: pytest.fail("it was asked"))
         with pytest.raises(DeviceSilentError):
             bus.ping(1)
-        end = resource.getrusage(resource.RUSAGE_THREAD)
-    assert end.ru_utime + end.ru_stime - begin.ru_utime - begin.ru_stime < 0.05
+
+
+def test_an_endless_stream_of_foreign_bytes_ends_the_wait_all_the_same() -> None:
+    def babble(request: bytes) -> Answers:
+        while True:
+            yield status(7, b"1234")
+            yield b"\xff\xff\xfd\x00" * 50
+            yield 0.001
+
+    with VirtualPeer(babble) as peer, _bus(peer) as bus:
+        bus.begin(1.0, repeats=0)
+        begin_s = peer.time.monotonic()
+        with pytest.raises(DeviceSilentError):
+            bus.ping(1)
+        assert peer.time.monotonic() - begin_s == pytest.approx(LIMIT_S, abs=0.002)
 
 
 def test_a_late_answer_is_not_taken_for_that_to_the_next_request() -> None:
     # Of the same shape, and so late that the next request is out already.
     late: Answers = [1.5 * LIMIT_S, status(1, b"late")]
-    with Peer(_Scripted(late)) as peer, _bus(peer) as bus:
+    with VirtualPeer(_Scripted(late)) as peer, _bus(peer) as bus:
         bus.begin(10.0, repeats=0)
         with pytest.raises(DeviceSilentError):
             bus.read(1, 132, 4)
@@ -169,16 +201,15 @@ def test_a_late_answer_is_not_taken_for_that_to_the_next_request() -> None:
 
 
 def test_an_answer_that_comes_twice_is_not_taken_for_that_to_the_next_request() -> None:
-    with Peer(_Scripted([status(1, b"good"), 0.01, status(1, b"good")])) as peer, _bus(peer) as bus:
+    with VirtualPeer(_Scripted([status(1, b"good"), 0.01, status(1, b"good")])) as peer, _bus(peer) as bus:
         assert bus.read(1, 132, 4).data == b"good"
-        # The second one is there, whether it came with the first or after it.
-        wait_until(lambda: peer.unread + len(bus._port._found) == len(status(1, b"good")))
+        peer.time.sleep(0.02)
         assert bus.read(1, 132, 4).data == bytes((132, 133, 134, 135))
 
 
 def test_a_late_answer_to_a_write_confirms_no_other_write() -> None:
     late: Answers = [1.5 * LIMIT_S, status(1)]
-    with Peer(_Scripted(late, [])) as peer, _bus(peer) as bus:
+    with VirtualPeer(_Scripted(late, [])) as peer, _bus(peer) as bus:
         bus.begin(10.0, repeats=0)
         with pytest.raises(DeviceSilentError):
             bus.write(1, 64, b"\1")
@@ -189,7 +220,7 @@ def test_a_late_answer_to_a_write_confirms_no_other_write() -> None:
 
 def test_a_late_refusal_refuses_no_other_request() -> None:
     late: Answers = [1.5 * LIMIT_S, status(1, b"", 7)]
-    with Peer(_Scripted(late)) as peer, _bus(peer) as bus:
+    with VirtualPeer(_Scripted(late)) as peer, _bus(peer) as bus:
         bus.begin(10.0, repeats=0)
         with pytest.raises(DeviceSilentError):
             bus.read(1, 132, 4)
@@ -199,30 +230,26 @@ def test_a_late_refusal_refuses_no_other_request() -> None:
 def test_a_line_that_is_always_late_never_seems_to_answer() -> None:
     # It answers everything, in order, half a second late.
     delayed: list[tuple[float, bytes]] = []
-    ended = threading.Event()
 
     def send() -> None:
-        while not ended.wait(0.002):
-            while delayed and delayed[0][0] <= time.monotonic():
-                peer.send(delayed.pop(0)[1])
+        while True:
+            peer.time.wait(lambda: bool(delayed), math.inf)
+            due_s, answer = delayed.pop(0)
+            peer.time.sleep(due_s - peer.time.monotonic())
+            peer.send(answer)
 
     def keep(request: bytes) -> Answers:
-        delayed.append((time.monotonic() + 0.5, _memory(request)))
+        delayed.append((peer.time.monotonic() + 0.5, _memory(request)))
         return []
 
-    with Peer(keep) as peer, _bus(peer, 0.03) as bus:
-        thread = threading.Thread(target=send)
-        thread.start()
-        try:
-            end_s = time.monotonic() + 1.5
-            while time.monotonic() < end_s:
-                bus.begin(0.1)
-                with pytest.raises(DeviceSilentError):
-                    bus.read(1, 132, 4)
-        finally:
-            ended.set()
-            thread.join()
-        assert bus.counters.foreign > 5
+    with VirtualPeer(keep) as peer, _bus(peer, 0.03) as bus:
+        peer.time.thread(send, "line").start()
+        end_s = peer.time.monotonic() + 60.0
+        while peer.time.monotonic() < end_s:
+            bus.begin(0.1)
+            with pytest.raises(DeviceSilentError):
+                bus.read(1, 132, 4)
+        assert bus.counters.foreign > 500
 
 
 def test_late_answers_of_a_synchronised_read_are_not_taken_for_the_next() -> None:
@@ -238,7 +265,7 @@ def test_late_answers_of_a_synchronised_read_are_not_taken_for_the_next() -> Non
             self.count += 1
             return [1.5 * LIMIT_S, both(b"late")] if self.count == 1 else [both(b"good")]
 
-    with Peer(Late()) as peer, _bus(peer) as bus:
+    with VirtualPeer(Late()) as peer, _bus(peer) as bus:
         bus.begin(10.0, repeats=0)
         assert bus.sync_read(132, 4, (1, 2)) == {}
         found = bus.sync_read(132, 4, (1, 2))
@@ -247,7 +274,7 @@ def test_late_answers_of_a_synchronised_read_are_not_taken_for_the_next() -> Non
 
 @pytest.mark.parametrize("length", [1, 2, 4])
 def test_a_refused_read_is_an_error_and_no_value(length: int) -> None:
-    with Peer(lambda request: [status(1, b"", 0x87)]) as peer, _bus(peer) as bus:
+    with VirtualPeer(lambda request: [status(1, b"", 0x87)]) as peer, _bus(peer) as bus:
         with pytest.raises(RefusedError, match=r"device 1 does not let \d bytes at 200 be read: no access") as caught:
             bus.read(1, 200, length)
         assert caught.value.number == 7
@@ -256,7 +283,7 @@ def test_a_refused_read_is_an_error_and_no_value(length: int) -> None:
 
 def test_a_refused_write_is_an_error() -> None:
     with (
-        Peer(lambda request: [status(1, b"", 6)]) as peer,
+        VirtualPeer(lambda request: [status(1, b"", 6)]) as peer,
         _bus(peer) as bus,
         pytest.raises(RefusedError, match="value beyond a limit"),
     ):
@@ -264,31 +291,32 @@ def test_a_refused_write_is_an_error() -> None:
 
 
 def test_a_write_may_have_a_limit_of_its_own() -> None:
-    with Peer(_Scripted([2.5 * LIMIT_S, status(200)])) as peer, _bus(peer) as bus:
+    with VirtualPeer(_Scripted([2.5 * LIMIT_S, status(200)])) as peer, _bus(peer) as bus:
         bus.write(200, 59, b"\1", 5.0)
         assert bus.counters.repeated == 0
 
 
 def test_a_line_that_is_gone_is_told_as_such_and_leaves_nothing_busy() -> None:
-    peer = Peer(lambda request: [_memory(request)])
-    with _bus(peer) as bus:
+    with VirtualPeer(lambda request: [_memory(request)]) as peer, _bus(peer) as bus:
         bus.ping(1)
-        peer.close()
+        peer.unplug()
         for _ in range(2):
             with pytest.raises(LineLostError, match=peer.path):
                 bus.ping(1)
 
 
 def test_a_line_that_is_lost_while_waiting_is_told_as_such() -> None:
-    peer = Peer(lambda request: [])
-    with _bus(peer, 5.0) as bus:
-        timer = threading.Timer(0.05, peer.close)
-        timer.start()
+    def hang_up(request: bytes) -> Answers:
+        yield 0.05
+        peer.unplug()
+
+    with VirtualPeer(hang_up) as peer, _bus(peer, 5.0) as bus:
+        begin_s = peer.time.monotonic()
         with pytest.raises(LineLostError):
             bus.ping(1)
-        timer.join()
+        assert peer.time.monotonic() - begin_s == pytest.approx(0.05)
 
 
 def test_a_packet_that_the_sdk_does_not_take_is_our_mistake() -> None:
-    with Peer(lambda request: []) as peer, _bus(peer) as bus, pytest.raises(ValueError, match="does not send"):
+    with VirtualPeer(lambda request: []) as peer, _bus(peer) as bus, pytest.raises(ValueError, match="does not send"):
         bus.write(1, 0, bytes(1100))

@@ -7,6 +7,7 @@ from robosc_bridge.devices.interface import (
     DriveBase,
     Velocity,
 )
+from robosc_bridge.devices.mavlink_odometry import estimate
 from robosc_bridge.devices.registry import make_drive_base
 from robosc_bridge.errors import (
     DeviceError,
@@ -55,17 +56,6 @@ def test_targets_are_repeated_and_new_ones_go_at_once(bench: Bench) -> None:
     assert len(bench.rover.targets) - before < 15
 
 
-def test_our_heartbeat_goes_on_while_it_is_driven_and_never_without(bench: Bench) -> None:
-    bench.base.open()
-    before = len(bench.rover.heartbeats)
-    bench.drive(FORWARD, 10.5)
-    assert len(bench.rover.heartbeats) - before == 10
-    assert set(bench.rover.heartbeats) == {(255, 190)}
-    # The reader of the line lives on, and yet keeps nothing alive.
-    bench.host.sleep(10.0)
-    assert len(bench.rover.heartbeats) - before == 10
-
-
 def test_a_vehicle_that_does_not_tell_its_motion_is_stopped_and_told_after_1_s(bench: Bench) -> None:
     bench.start()
     last_s = bench.drive(FORWARD, 0.2).time_s
@@ -86,6 +76,31 @@ def test_a_driver_that_dies_stops_the_vehicle(bench: Bench) -> None:
     begin_s = bench.host.monotonic()
     bench.until(lambda: bench.speed_m_s == 0.0, 4.0)
     assert bench.host.monotonic() - begin_s == pytest.approx(3.0, abs=0.3)
+
+
+def test_our_heartbeat_goes_on_while_it_is_driven_and_never_without(bench: Bench) -> None:
+    bench.base.open()
+    # It was told when the vehicle was looked for; the next ones come once a second.
+    assert bench.rover.heartbeats == [(255, 190)]
+    bench.drive(FORWARD, 60.0)
+    assert bench.rover.heartbeats == [(255, 190)] * 60
+    bench.host.sleep(60.0)
+    assert len(bench.rover.heartbeats) == 60
+
+
+def test_silence_stops_it_and_is_told_when_its_last_estimate_has_grown_old(bench: Bench) -> None:
+    bench.start()
+    bench.drive(FORWARD, 0.2)
+    told = bench.base._link and estimate(bench.base._link.state)
+    assert told
+    bench.rover.is_silent = True
+    with pytest.raises(DeviceSilentError, match="has not told its motion for 1 s"):
+        bench.drive(FORWARD, 3.0)
+    # It is looked at every 10 ms.
+    assert bench.host.monotonic() - told.time_s == pytest.approx(1.01, abs=1e-6)
+    bench.host.sleep(0.0)
+    assert bench.rover.targets[-1]["vx"] == 0.0
+    assert bench.speed_m_s == 0.0
 
 
 def test_torque_off_is_after_a_stop_and_on_again_without_motion(bench: Bench) -> None:

@@ -16,7 +16,7 @@ from robosc_bridge.errors import (
     LineMissingError,
 )
 from robosc_bridge.protocol.mavlink_signing import Signing
-from robosc_bridge.simulated import SimulatedLine
+from robosc_bridge.simulated import SimulatedLine, VirtualHost
 from support.rovers import BODY, FORWARD, KEY, Bench, rig
 
 
@@ -63,6 +63,27 @@ def test_an_unplugged_line_is_told_at_once_and_can_be_plugged_in_again(bench: Be
     bench.base.open()
     assert not bench.drive(FORWARD, 0.1).is_torque_on
     assert not bench.rover.is_armed
+
+
+def test_nobody_at_the_other_end_of_udp_is_silence() -> None:
+    with VirtualHost() as host:
+        base = make_drive_base("mavlink-rover", path="udpout:127.0.0.1:9", robot=BODY, host=host)
+        begin_s = host.monotonic()
+        with pytest.raises(DeviceSilentError, match=r"no heartbeat of a rover within 3\.5 s"):
+            base.open()
+        assert host.monotonic() - begin_s == pytest.approx(3.5)
+
+
+@pytest.mark.parametrize("fault", ["corrupt_share", "drop_share"])
+def test_a_disturbed_line_is_driven_on(bench: Bench, fault: str) -> None:
+    bench.start()
+    setattr(bench.line.faults, fault, 0.2)
+    for _ in range(5):
+        reading = bench.drive(FORWARD, 1.0)
+        assert reading.is_torque_on
+        assert reading.velocity.linear_m_s == pytest.approx(0.2, abs=0.001)
+    assert bench.base._link is not None
+    assert (bench.base._link.counts.bad_frames > 0) == (fault == "corrupt_share")
 
 
 def test_noise_before_every_packet_is_dropped(bench: Bench) -> None:

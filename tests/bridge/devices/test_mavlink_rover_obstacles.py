@@ -1,5 +1,7 @@
 """A MAVLink rover as a source of obstacles, on a virtual host."""
 
+import math
+
 import pytest
 
 from robosc_bridge.devices.interface import (
@@ -10,8 +12,9 @@ from robosc_bridge.devices.interface import (
 from robosc_bridge.devices.registry import make_range_scanner
 from robosc_bridge.errors import (
     LineError,
+    LineLostError,
 )
-from robosc_bridge.simulated import SimulatedLine
+from robosc_bridge.simulated import SimulatedLine, Walls
 from support.rovers import FORWARD, Bench
 
 
@@ -19,6 +22,46 @@ def _next(scanner: RangeScanner, limit_s: float = 3.0) -> Scan:
     scan = scanner.receive(limit_s)
     assert scan is not None
     return scan
+
+
+def _check(bench: Bench, scan: Scan, width_deg: float) -> None:
+    """Every bin is as near as the nearest in its sector: not nearer than anything there, not farther than the wall."""
+    assert len(scan.ranges_m) == 360
+    for k, range_m in enumerate(scan.ranges_m):
+        around = [math.radians(k + part * width_deg / 20) for part in range(-20, 21)]
+        assert min(bench.world.ranges(around)) - 0.02 <= range_m <= max(bench.world.ranges(around)) + 0.02, k
+
+
+@pytest.mark.parametrize("obstacles", ["ring", "north ring", "sensors"])
+def test_obstacles_are_where_they_are(bench: Bench, obstacles: str) -> None:
+    bench.rover.obstacles = obstacles
+    bench.rover._interval_s[30] = 0.1  # Attitude: which way is north.
+    bench.rover._due_s[30] = 0.0
+    scanner = make_range_scanner("mavlink-rover", path=bench.path, host=bench.host)
+    scanner.open()
+    try:
+        scan = _next(scanner)
+        _check(bench, scan, 45.0 if obstacles == "sensors" else 6.0)
+        assert scan.time_s == bench.host.monotonic()
+        assert scanner.counters.scans >= 1
+        # Alone on the line, it is who is there.
+        before, end_s = len(bench.rover.heartbeats), bench.host.monotonic() + 20.0
+        while bench.host.monotonic() < end_s:
+            scanner.receive(0.1)
+        assert set(bench.rover.heartbeats) == {(255, 190)}
+        assert len(bench.rover.heartbeats) - before == pytest.approx(20, abs=1)
+    finally:
+        scanner.close()
+    with pytest.raises(LineLostError, match="not open"):
+        scanner.receive(0.0)
+
+
+def test_walls_that_are_too_far_are_none(bench: Bench) -> None:
+    bench.world.walls = Walls(())
+    scanner = make_range_scanner("mavlink-rover", path=bench.path, host=bench.host)
+    scanner.open()
+    assert all(map(math.isnan, _next(scanner).ranges_m))
+    scanner.close()
 
 
 def test_drive_base_and_scanner_share_a_line_and_outlive_each_other(bench: Bench) -> None:

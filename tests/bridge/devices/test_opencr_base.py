@@ -12,7 +12,7 @@ from robosc_bridge.devices.robots import BURGER, WAFFLE
 from robosc_bridge.errors import DeviceError, DeviceFaultError, DeviceSilentError, WrongDeviceError
 from robosc_bridge.simulated import OpenCr
 from support.drive import PATIENT_S, Rig, rig
-from support.peer import Answers, Peer, asked, status
+from support.peer import Answers, VirtualPeer, asked, status
 
 PING = "ff ff fd 00 c8 03 00 01 3b fa"
 
@@ -208,8 +208,8 @@ def _answers(model: int, firmware: int, registers: dict[int, bytes]) -> object:
 def test_what_is_no_sound_turtlebot_is_refused(
     model: int, firmware: int, registers: dict[int, bytes], problem: str
 ) -> None:
-    with Peer(_answers(model, firmware, registers)) as peer:  # type: ignore[arg-type]
-        base = OpenCrBase(peer.path, BURGER, answer_limit_s=PATIENT_S)
+    with VirtualPeer(_answers(model, firmware, registers)) as peer:  # type: ignore[arg-type]
+        base = OpenCrBase(peer.path, BURGER, answer_limit_s=PATIENT_S, host=peer.time)
         with pytest.raises(DeviceError, match=problem):
             base.open()
         assert all(request[7] in (1, 2) for request in peer.requests)
@@ -225,8 +225,8 @@ def test_answers_to_an_earlier_session_are_not_taken_for_what_the_board_is() -> 
         # Behind the answer to the ping, what was asked before: a Burger.
         return [*([status(200, b"\1\0\0\0")] if count == 2 else []), *answer(request)]  # type: ignore[operator]
 
-    with Peer(late) as peer:
-        base = OpenCrBase(peer.path, BURGER, answer_limit_s=PATIENT_S)
+    with VirtualPeer(late) as peer:
+        base = OpenCrBase(peer.path, BURGER, answer_limit_s=PATIENT_S, host=peer.time)
         with pytest.raises(WrongDeviceError, match="another robot"):
             base.open()
 

@@ -3,6 +3,7 @@
 import argparse
 import json
 import sys
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -15,6 +16,9 @@ from robosc_bridge.experiments import evaluate
 from robosc_bridge.experiments.scenario import Outcome, ScenarioError
 from support.models import EXAMPLES
 from support.recorded_runs import recorded
+
+# What is generated of a model to be counted is the same each time.
+_sizes = cache(evaluate._sizes)
 
 
 @pytest.fixture
@@ -34,6 +38,7 @@ def asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ..
         module = ModuleType(f"robosc_bridge.experiments.{name}")
         vars(module).update(run_maze=function, run_line=function, MODEL=EXAMPLES / "maze_solver" / "maze_solver.rscd")
         monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.setattr(evaluate, "_sizes", _sizes)
     monkeypatch.chdir(tmp_path)
     return found
 

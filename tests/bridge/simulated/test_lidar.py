@@ -1,14 +1,15 @@
-"""LiDARs: worked frames, and what a tiny, obvious decoder makes of their bytes, over real pseudo-terminals."""
+"""LiDARs: worked frames, and what a tiny, obvious decoder makes of their bytes, in virtual time."""
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
 
 import pytest
 
-from robosc.execution.clock import ManualClock
-from robosc_bridge.simulated import SimulatedTurtleBot3, room
+from robosc_bridge.errors import LineLostError
+from robosc_bridge.simulated import SimulatedTurtleBot3, VirtualHost, room
 from robosc_bridge.simulated.lidar_frames import crc8, lds01_frame, lds02_frame, lds03_frame, lds03_identity
-from support.waiting import wait_until
 from support.wire import Host
 
 BAUDS = {"lds01": 230_400, "lds02": 115_200, "lds03": 230_400}
@@ -104,34 +105,55 @@ DECODERS: dict[str, Callable[[bytes], Points]] = {
 }
 
 
-def heard(robot: SimulatedTurtleBot3, host: Host, seconds: float) -> bytes:
-    """What comes while time passes; read in between, as a full line loses bytes."""
-    found = b""
-    host.port.timeout = 0.01
-    for _ in range(round(seconds / 0.05)):
-        robot.advance(0.05)
-        # The kernel passes bytes on a little after they were written.
-        while piece := host.port.read(max(host.port.in_waiting, 1)):
-            found += piece
-    return found
+class Scene:
+    """A simulated LiDAR, and the host's end of its line.
+
+    Attributes:
+        time: On which both live.
+        robot: That has it.
+        host: Its line.
+    """
+
+    def __init__(self, time: VirtualHost, robot: SimulatedTurtleBot3, lidar: str, baud: int | None) -> None:
+        self.time = time
+        self.robot = robot
+        self.lidar = lidar
+        self._baud = BAUDS[lidar] if baud is None else baud
+        self.open()
+
+    def open(self) -> None:
+        self.host = Host(self.robot.scanner_path, self._baud, self.time)
+
+    def start(self) -> None:
+        if self.lidar == "lds03":
+            self.host.send(START_03)
+            assert self.robot.scanner.is_spinning
+
+    def heard(self, seconds: float) -> bytes:
+        """What comes while time passes; read in between, as a full line loses bytes."""
+        found = b""
+        for _ in range(round(seconds / 0.05)):
+            self.time.sleep(0.05)
+            found += self.host.port.read(self.host.port.in_waiting)
+        return found
+
+    def points(self, seconds: float) -> list[tuple[float, float]]:
+        return list(DECODERS[self.lidar](self.heard(seconds)))
 
 
-def started(lidar: str, robot: SimulatedTurtleBot3, host: Host) -> None:
-    if lidar == "lds03":
-        host.send(START_03)
-        wait_until(lambda: robot.scanner.is_spinning)
+@contextmanager
+def scene(lidar: str, baud: int | None = None, **arguments: Any) -> Iterator[Scene]:
+    with VirtualHost() as time, SimulatedTurtleBot3(lidar=lidar, clock=time, **arguments) as robot:
+        yield Scene(time, robot, lidar, baud)
 
 
 @pytest.mark.parametrize("lidar", DECODERS)
 def test_a_turn_shows_the_walls_where_they_are(lidar: str) -> None:
-    with (
-        SimulatedTurtleBot3(lidar=lidar, walls=room(3.0, 2.0), pose=(0.3, 0.2, 0.7), clock=ManualClock()) as robot,
-        Host(robot.scanner_path, BAUDS[lidar]) as host,
-    ):
-        started(lidar, robot, host)
-        points = list(DECODERS[lidar](heard(robot, host, 0.5)))
+    with scene(lidar, walls=room(3.0, 2.0), pose=(0.3, 0.2, 0.7)) as seen:
+        seen.start()
+        points = seen.points(0.5)
         assert len({round(degrees) % 360 for degrees, _ in points}) == 360
-        expected = robot.world.ranges([math.radians(degrees) for degrees, _ in points])
+        expected = seen.robot.world.ranges([math.radians(degrees) for degrees, _ in points])
         for (degrees, range_m), true_m in zip(points, expected, strict=True):
             # Half a millimetre of rounding, twice that through the correction of LDS-02, and a glancing wall.
             assert range_m == pytest.approx(true_m, abs=0.0025), f"at {degrees} degrees"
@@ -139,20 +161,20 @@ def test_a_turn_shows_the_walls_where_they_are(lidar: str) -> None:
 
 @pytest.mark.parametrize(("lidar", "rate"), [("lds01", 300 * 42), ("lds02", 191.67 * 47), ("lds03", 4000 * 3)])
 def test_frames_are_paced_in_time(lidar: str, rate: float) -> None:
-    with SimulatedTurtleBot3(lidar=lidar, clock=ManualClock()) as robot, Host(robot.scanner_path, BAUDS[lidar]) as host:
-        started(lidar, robot, host)
-        came = len(heard(robot, host, 2.0))
+    with scene(lidar) as seen:
+        seen.start()
+        came = len(seen.heard(2.0))
         # LDS-03 has ten bytes more per frame, seventeen frames a turn.
         more = 10 * 17 * 10 if lidar == "lds03" else 0
-        assert came == pytest.approx(2.0 * (rate + more), rel=0.03)
+        assert came == pytest.approx(2.0 * (rate + more), rel=0.01)
 
 
 @pytest.mark.parametrize("lidar", DECODERS)
 def test_a_slow_motor_takes_longer_for_a_turn_and_tells_it(lidar: str) -> None:
-    with SimulatedTurtleBot3(lidar=lidar, clock=ManualClock()) as robot, Host(robot.scanner_path, BAUDS[lidar]) as host:
-        robot.scanner.turn_at(0.5)
-        started(lidar, robot, host)
-        data = heard(robot, host, 1.0)
+    with scene(lidar) as seen:
+        seen.robot.scanner.turn_at(0.5)
+        seen.start()
+        data = seen.heard(1.0)
         turned = {round(degrees) % 360 for degrees, _ in DECODERS[lidar](data[: len(data) // 6])}
         assert len(turned) < 360
         speed = {"lds01": b"\xdc\x05", "lds02": (1076).to_bytes(2, "little"), "lds03": bytes((50 << 1 | 1,))}[lidar]
@@ -162,92 +184,90 @@ def test_a_slow_motor_takes_longer_for_a_turn_and_tells_it(lidar: str) -> None:
 
 @pytest.mark.parametrize("lidar", DECODERS)
 def test_a_covered_one_measures_nothing(lidar: str) -> None:
-    with SimulatedTurtleBot3(lidar=lidar, clock=ManualClock()) as robot, Host(robot.scanner_path, BAUDS[lidar]) as host:
-        robot.scanner.is_covered = True
-        started(lidar, robot, host)
-        points = list(DECODERS[lidar](heard(robot, host, 0.5)))
+    with scene(lidar) as seen:
+        seen.robot.scanner.is_covered = True
+        seen.start()
+        points = seen.points(0.5)
         assert points
         assert {range_m for _, range_m in points} == {0.0}
 
 
 @pytest.mark.parametrize("lidar", DECODERS)
 def test_a_stalled_one_is_silent(lidar: str) -> None:
-    with SimulatedTurtleBot3(lidar=lidar, clock=ManualClock()) as robot, Host(robot.scanner_path, BAUDS[lidar]) as host:
-        started(lidar, robot, host)
-        assert heard(robot, host, 0.2)
-        robot.scanner.is_stalled = True
-        assert not heard(robot, host, 0.5)
-        robot.scanner.is_stalled = False
-        assert heard(robot, host, 0.2)
+    with scene(lidar) as seen:
+        seen.start()
+        assert seen.heard(0.2)
+        seen.robot.scanner.is_stalled = True
+        assert not seen.heard(0.5)
+        seen.robot.scanner.is_stalled = False
+        assert seen.heard(0.2)
 
 
 def test_lds01_stops_and_starts_as_told() -> None:
-    with SimulatedTurtleBot3(lidar="lds01", clock=ManualClock()) as robot, Host(robot.scanner_path, 230_400) as host:
-        assert heard(robot, host, 0.1)
-        host.send(b"e")
-        wait_until(lambda: not robot.scanner.is_spinning)
-        host.port.reset_input_buffer()
-        assert not heard(robot, host, 0.5)
-        host.send(b"b")
-        wait_until(lambda: robot.scanner.is_spinning)
-        data = heard(robot, host, 0.3)
+    with scene("lds01") as seen:
+        assert seen.heard(0.1)
+        seen.host.send(b"e")
+        assert not seen.robot.scanner.is_spinning
+        seen.host.port.reset_input_buffer()
+        assert not seen.heard(0.5)
+        seen.host.send(b"b")
+        assert seen.robot.scanner.is_spinning
+        data = seen.heard(0.3)
         # The first frame is cut somewhere; from the second on all are whole.
         assert data[0] != 0xFA or data[1] < 0xA0
         assert len(list(decode_lds01(data))) >= 6 * 88
 
 
 def test_lds03_is_idle_until_started_and_tells_what_it_is() -> None:
-    with SimulatedTurtleBot3(lidar="lds03", clock=ManualClock()) as robot, Host(robot.scanner_path, 230_400) as host:
-        assert not heard(robot, host, 0.5)
-        host.send("00 aa aa 55 f0")
-        host.send("0f")
-        wait_until(lambda: robot.scanner.is_spinning)
-        robot.advance(0.05)
-        host.port.timeout = 5.0
-        greeting = host.receive(2 + 29 + 7)
+    with scene("lds03") as seen:
+        assert not seen.heard(0.5)
+        seen.host.send("00 aa aa 55 f0")
+        seen.host.send("0f")
+        assert seen.robot.scanner.is_spinning
+        seen.time.sleep(0.05)
+        greeting = seen.host.receive(2 + 29 + 7)
         assert greeting == b"\xa5\x5a" + lds03_identity() + hexed("a5 5a 00 00 80 01 81")
-        host.send(STOP_03)
-        wait_until(lambda: not robot.scanner.is_spinning)
-        host.port.reset_input_buffer()
-        assert not heard(robot, host, 0.5)
+        seen.host.send(STOP_03)
+        assert not seen.robot.scanner.is_spinning
+        seen.host.port.reset_input_buffer()
+        assert not seen.heard(0.5)
 
 
 @pytest.mark.parametrize("lidar", DECODERS)
 def test_another_baud_rate_hears_noise(lidar: str) -> None:
-    with SimulatedTurtleBot3(lidar=lidar, clock=ManualClock()) as robot, Host(robot.scanner_path, 9600) as host:
+    with scene(lidar, 9600) as seen:
         if lidar == "lds03":
-            host.send(START_03)
-            assert host.hears_nothing()
-            assert not robot.scanner.is_spinning
+            seen.host.send(START_03)
+            assert seen.host.hears_nothing()
+            assert not seen.robot.scanner.is_spinning
         else:
-            data = heard(robot, host, 0.5)
+            data = seen.heard(0.5)
             assert data
             assert not list(DECODERS[lidar](data))
 
 
 def test_wire_faults_spoil_frames() -> None:
-    with SimulatedTurtleBot3(lidar="lds01", clock=ManualClock()) as robot, Host(robot.scanner_path, 230_400) as host:
-        whole = len(list(decode_lds01(heard(robot, host, 1.0))))
-        robot.scanner_faults.corrupt_share = 0.5
-        corrupted = len(list(decode_lds01(heard(robot, host, 1.0))))
-        robot.scanner_faults.clear()
-        robot.scanner_faults.lose_bytes_share = 0.01
-        shortened = len(list(decode_lds01(heard(robot, host, 1.0))))
-        robot.scanner_faults.clear()
-        robot.scanner_faults.drop_share = 0.5
-        dropped = len(heard(robot, host, 1.0))
-        assert whole >= 6 * 299
+    with scene("lds01") as seen:
+        whole = len(seen.points(1.0))
+        seen.robot.scanner_faults.corrupt_share = 0.5
+        corrupted = len(seen.points(1.0))
+        seen.robot.scanner_faults.clear()
+        seen.robot.scanner_faults.lose_bytes_share = 0.01
+        shortened = len(seen.points(1.0))
+        seen.robot.scanner_faults.clear()
+        seen.robot.scanner_faults.drop_share = 0.5
+        dropped = len(seen.heard(1.0))
+        assert whole >= 6 * 298
         assert 0.35 * whole < corrupted < 0.65 * whole
         assert 0.5 * whole < shortened < 0.8 * whole
         assert 0.35 * 300 * 42 < dropped < 0.65 * 300 * 42
 
 
 def test_an_unplugged_one_begins_anew() -> None:
-    with SimulatedTurtleBot3(lidar="lds01", clock=ManualClock()) as robot:
-        with Host(robot.scanner_path, 230_400) as host:
-            robot.scanner_line.disconnect()
-            with pytest.raises(OSError):
-                host.port.read(1)
-        robot.scanner_line.reconnect()
-        with Host(robot.scanner_path, 230_400) as host:
-            assert heard(robot, host, 0.2)
+    with scene("lds01") as seen:
+        seen.robot.scanner_line.disconnect()
+        with pytest.raises(LineLostError):
+            seen.host.port.read(1)
+        seen.robot.scanner_line.reconnect()
+        seen.open()
+        assert seen.heard(0.2)

@@ -9,7 +9,7 @@ import pytest
 import serial
 
 from robosc.execution.clock import ManualClock
-from robosc_bridge.simulated import SimulatedTurtleBot3
+from robosc_bridge.simulated import SimulatedTurtleBot3, VirtualHost
 from support.descriptors import open_descriptors
 from support.waiting import wait_until
 from support.wire import Host
@@ -40,6 +40,20 @@ def test_a_late_answer_keeps_its_turn(robot: SimulatedTurtleBot3, host: Host) ->
     robot.base_faults.clear()
     host.send("ff ff fd 00 fe 03 00 01 31 42")
     assert [host.packet()[4] for _ in range(3)] == [1, 1, 2]
+
+
+def test_an_answer_can_be_late() -> None:
+    with (
+        VirtualHost() as passing,
+        SimulatedTurtleBot3(base="dynamixel", clock=passing) as robot,
+        Host(robot.base_path, time=passing) as host,
+    ):
+        began_s = passing.monotonic()
+        assert host.ask(PING) == PONG
+        prompt_s = passing.monotonic() - began_s
+        robot.base_faults.delay_s = 0.15
+        assert host.ask(PING) == PONG
+        assert passing.monotonic() - began_s == pytest.approx(0.15 + 2 * prompt_s)
 
 
 def test_answers_can_be_lost(robot: SimulatedTurtleBot3, host: Host) -> None:

@@ -116,6 +116,39 @@ def test_whoever_waits_in_vain_while_others_live_on_is_told() -> None:
         assert host.monotonic() == pytest.approx(86_400.0 + 3600.0, abs=60.0)
 
 
+def test_it_is_told_to_whoever_made_the_host_whoever_was_the_last_to_wait() -> None:
+    with VirtualHost(0.0) as host:
+
+        def wait() -> None:
+            host.sleep(1.0)
+            host.sleep(math.inf)
+
+        host.thread(wait, "waits").start()
+        with pytest.raises(VirtualTimeError, match="everybody waits for ever"):
+            host.sleep(math.inf)
+        # The host lives on.
+        host.sleep(1.0)
+        assert host.monotonic() == 2.0
+
+
+def test_whoever_has_waited_its_time_goes_before_those_who_wait_anew() -> None:
+    turns: list[tuple[str, int]] = []
+    with VirtualHost(0.0) as host:
+
+        def impatient(name: str) -> None:
+            for number in range(3):
+                host.sleep(0.0)
+                turns.append((name, number))
+
+        for name in ("one", "other"):
+            host.thread(partial(impatient, name), name).start()
+        host.sleep(0.0)
+        turns.append(("maker", 0))
+        host.sleep(1.0)
+    assert turns[:3] == [("maker", 0), ("one", 0), ("other", 0)]
+    assert turns[3:] == [("one", 1), ("other", 1), ("one", 2), ("other", 2)]
+
+
 def test_threads_that_still_wait_end_with_the_host() -> None:
     ended: list[str] = []
     with VirtualHost() as host:

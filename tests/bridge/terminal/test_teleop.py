@@ -1,8 +1,26 @@
-"""Driving by keys: the command as a program on a real pseudo-terminal."""
+"""Driving by keys: what they mean, and a terminal in virtual time with a bridge that a test plays."""
+
+import itertools
+import math
+from collections.abc import Callable, Iterator
 
 import pytest
 
-from robosc_bridge.terminal.teleop import ANGULAR_RAD_S, LAPSE_S, LINEAR_M_S, PRESENT, Wished, keys_of
+from robosc_bridge.host import Thread
+from robosc_bridge.simulated import VirtualHost
+from robosc_bridge.terminal.client import DriveTopic, RefusedError, UnreachableError, Wish
+from robosc_bridge.terminal.teleop import (
+    ANGULAR_RAD_S,
+    KEEP_ALIVE_S,
+    LAPSE_S,
+    LINEAR_M_S,
+    PERIOD_S,
+    PRESENT,
+    PRESENT_S,
+    Wished,
+    drive,
+    keys_of,
+)
 
 
 class TestKeys:
@@ -73,3 +91,212 @@ class TestKeys:
 
     def test_arrows_are_letters(self) -> None:
         assert keys_of("\x1b[Aa\x1b[B\x1b[C\x1b[Dx\x1b") == ["w", "a", "s", "d", "a", "x", "\x1b"]
+
+
+TOPIC = DriveTopic("/cmd_vel", False)
+
+
+class Bridge:
+    """A bridge with an operator's stream, as the client of it has them.
+
+    Attributes:
+        wishes: When what was asked for: forward, and counter-clockwise.
+        signs_s: When the operator was said to be there without a wish.
+        heard: Stops, and wishes of other kinds.
+        told: How something is told to the operator; set when the stream is begun.
+        refusal: Of a resume; None: it is never answered.
+        failure: Of whatever is sent next.
+        is_closed: Whether the stream has ended in order.
+    """
+
+    def __init__(self, time: VirtualHost) -> None:
+        self.wishes: list[tuple[float, float, float]] = []
+        self.signs_s: list[float] = []
+        self.heard: list[Wish | str] = []
+        self.told: Callable[[str, str], None] = lambda what, text: None
+        self.refusal: str | None = ""
+        self.failure: Exception | None = None
+        self.is_closed = False
+        self._time = time
+
+    def operate(self, name: str, told: Callable[[str, str], None]) -> "Bridge":
+        self.told = told
+        return self
+
+    def drive(self, topic: DriveTopic, linear_m_s: float, angular_rad_s: float) -> None:
+        assert topic == TOPIC
+        if self.failure is not None:
+            raise self.failure
+        self.wishes.append((self._time.monotonic(), linear_m_s, angular_rad_s))
+
+    def keep_alive(self) -> None:
+        if self.failure is not None:
+            raise self.failure
+        self.signs_s.append(self._time.monotonic())
+
+    def close(self) -> None:
+        self.is_closed = True
+
+    def stop(self) -> None:
+        self.heard.append("stop")
+
+    def want(self, wish: Wish) -> None:
+        self.heard.append(wish)
+        if self.refusal is None:
+            self._time.sleep(math.inf)
+        if self.refusal:
+            raise RefusedError(self.refusal)
+
+
+class Typed:
+    """A terminal whose keys a test types, and the program in it.
+
+    Attributes:
+        seen: All that it was told to show.
+        answers: Whether it tells that it is there when it is asked.
+        asked: How often it was.
+        error: What has ended the program; None: it goes on, or has ended in order.
+    """
+
+    def __init__(self, time: VirtualHost) -> None:
+        self.time = time
+        self.bridge = Bridge(time)
+        self.seen = ""
+        self.answers = True
+        self.asked = 0
+        self.error: Exception | None = None
+        self._keys = ""
+        self.program = time.thread(self._run, "teleop")
+        self.program.start()
+        time.sleep(0.0)
+
+    def type(self, keys: str) -> None:
+        """Type, and let the program take it."""
+        self._keys += keys
+        self.time.sleep(0.0)
+
+    def monotonic(self) -> float:
+        return self.time.monotonic()
+
+    def read(self, limit_s: float) -> list[str]:
+        self.time.wait(lambda: bool(self._keys), limit_s)
+        keys, self._keys = self._keys, ""
+        return keys_of(keys)
+
+    def write(self, text: str) -> None:
+        self.seen += text
+        if "\x1b[5n" in text:
+            self.asked += 1
+            if self.answers:
+                self._keys += "\x1b[0n"
+
+    def start(self, run: Callable[[], None]) -> Thread:
+        thread = self.time.thread(run, "resume")
+        thread.start()
+        return thread
+
+    def _run(self) -> None:
+        try:
+            drive(self, self.bridge, TOPIC)  # type: ignore[arg-type]
+        except (RefusedError, UnreachableError) as error:
+            self.error = error
+
+
+@pytest.fixture
+def typed() -> Iterator[Typed]:
+    with VirtualHost(0.0) as time:
+        yield Typed(time)
+
+
+class TestDriving:
+    def test_a_key_drives_at_once_and_it_is_said_again_while_wished(self, typed: Typed) -> None:
+        typed.time.sleep(10.2)
+        assert typed.bridge.wishes == []
+        typed.type("w\x1b[D")
+        for _ in range(20):
+            typed.time.sleep(0.5)
+            typed.type("k")
+        times_s = [time_s for time_s, *_ in typed.bridge.wishes]
+        assert {wish[1:] for wish in typed.bridge.wishes} == {(0.02, 0.2)}
+        assert times_s[0] == pytest.approx(10.2)
+        # Every tenth of a second, and with each key.
+        assert max(after_s - before_s for before_s, after_s in itertools.pairwise(times_s)) <= PERIOD_S + 1e-9
+        assert len(times_s) == pytest.approx(10.0 / PERIOD_S + 20, abs=21)
+
+    def test_without_a_key_it_halts_after_its_time_and_says_so_three_times(self, typed: Typed) -> None:
+        typed.type("www")
+        begin_s = typed.time.monotonic()
+        typed.time.sleep(60.0)
+        driven = [time_s for time_s, *wish in typed.bridge.wishes if wish == [0.06, 0.0]]
+        halted = [time_s for time_s, *wish in typed.bridge.wishes if wish == [0.0, 0.0]]
+        assert driven[-1] - begin_s == pytest.approx(LAPSE_S - PERIOD_S)
+        assert [time_s - begin_s for time_s in halted] == pytest.approx([LAPSE_S + k * PERIOD_S for k in range(3)])
+        # The operator is there, and wishes nothing.
+        assert len(typed.bridge.signs_s) == pytest.approx(60.0 / KEEP_ALIVE_S, abs=2)
+        assert not typed.bridge.is_closed
+
+    def test_without_a_terminal_that_answers_there_is_soon_no_sign_of_life(self, typed: Typed) -> None:
+        typed.time.sleep(10.0)
+        typed.answers = False
+        begin_s, asked = typed.time.monotonic(), typed.asked
+        typed.time.sleep(60.0)
+        assert typed.asked - asked == pytest.approx(60.0 / KEEP_ALIVE_S, abs=1)
+        assert begin_s + PRESENT_S - 2 * KEEP_ALIVE_S <= typed.bridge.signs_s[-1] < begin_s + PRESENT_S
+        # A key is one: nothing is wished with it.
+        assert typed.bridge.wishes == []
+        typed.type("?")
+        assert typed.bridge.wishes == [(typed.time.monotonic(), 0.0, 0.0)]
+        typed.time.sleep(1.0)
+        assert typed.bridge.signs_s[-1] > 70.0
+
+    def test_what_was_wished_ends_with_zeros_and_the_link_stays(self, typed: Typed) -> None:
+        typed.type("wx")
+        typed.time.sleep(10.0)
+        assert [wish[1:] for wish in typed.bridge.wishes] == [(0.0, 0.0)] * 3
+        assert not typed.bridge.is_closed
+
+    def test_q_ends_with_a_stop_of_the_motion(self, typed: Typed) -> None:
+        typed.type("www")
+        typed.type("q")
+        typed.program.join()
+        assert [wish[1:] for wish in typed.bridge.wishes] == [(0.06, 0.0), (0.0, 0.0)]
+        assert typed.bridge.is_closed
+        assert typed.error is None
+
+    def test_the_space_bar_stops_the_robot_and_r_lets_it_go_on(self, typed: Typed) -> None:
+        typed.type("w ")
+        assert typed.bridge.heard == ["stop"]
+        assert typed.bridge.wishes[-1][1:] == (0.0, 0.0)
+        assert "stopped: r lets it go on" in typed.seen
+        typed.bridge.refusal = "a button that stops is pressed"
+        typed.type("r")
+        typed.time.sleep(KEEP_ALIVE_S)
+        assert typed.bridge.heard == ["stop", Wish.RESUME]
+        assert "a button that stops is pressed" in typed.seen
+
+    def test_a_resume_without_an_answer_does_not_keep_a_stop_from_being_typed(self, typed: Typed) -> None:
+        typed.bridge.refusal = None
+        typed.type("r")
+        typed.time.sleep(1.0)
+        typed.type("r ")
+        assert typed.bridge.heard == [Wish.RESUME, "stop"]
+        typed.type("q")
+        typed.program.join()
+        assert typed.error is None
+
+    def test_what_is_blocked_and_refused_is_shown(self, typed: Typed) -> None:
+        typed.type("w")
+        typed.bridge.told("blocked", "/cmd_vel")
+        typed.time.sleep(1.5 * PERIOD_S)
+        assert "BLOCKED /cmd_vel" in typed.seen
+        typed.bridge.told("refused", "who are you?\x1b[2J")
+        typed.time.sleep(1.5 * PERIOD_S)
+        assert "who are you?" in typed.seen
+        assert "\x1b[2J" not in typed.seen
+
+    def test_the_end_of_the_bridge_ends_it(self, typed: Typed) -> None:
+        typed.bridge.failure = UnreachableError("the bridge has ended the stream")
+        typed.program.join()
+        assert typed.time.monotonic() <= KEEP_ALIVE_S
+        assert str(typed.error) == "the bridge has ended the stream"
+        assert typed.bridge.is_closed

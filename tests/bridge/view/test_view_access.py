@@ -14,6 +14,7 @@ import pytest
 from robosc_api.security import ServerSecurity
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.view import ViewError, ViewFace, ViewSettings
+from robosc_bridge.view import hub as hub_module
 from robosc_bridge.view import server as server_module
 from robosc_bridge.view.access import Access
 from robosc_bridge.view.page_files import FOLDER, TOKEN_PLACE, read_page
@@ -199,7 +200,11 @@ WRONG: list[Any] = [
 ]
 
 
-def test_what_makes_no_sense_is_refused_and_nothing_more(face: ViewFace, robot: LiveRobot) -> None:
+def test_what_makes_no_sense_is_refused_and_nothing_more(
+    face: ViewFace, robot: LiveRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(hub_module, "SIGN_OF_LIFE_S", 0.02)
+
     async def look() -> None:
         async with opened(face.url) as page:
             for text in WRONG:

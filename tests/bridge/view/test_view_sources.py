@@ -122,7 +122,10 @@ def test_both_ways_to_a_bridge_define_and_tell_the_same(robot: LiveRobot) -> Non
     assert isinstance(told, pb.GetDefinitionResponse)
 
 
-def test_at_rest_there_is_a_sign_of_life_and_nothing_is_executed(robot: LiveRobot) -> None:
+def test_at_rest_there_is_a_sign_of_life_and_nothing_is_executed(
+    robot: LiveRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(hub_module, "SIGN_OF_LIFE_S", 0.02)
     robot.state = State.STANDBY
     robot.show()
 

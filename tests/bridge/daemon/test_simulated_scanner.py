@@ -5,53 +5,52 @@ from dataclasses import replace
 
 import pytest
 
-from robosc.execution.clock import ManualClock
 from robosc_bridge.daemon.backoff import Backoff
 from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report
 from robosc_bridge.daemon.workers import RESTART_LIMIT, ScannerWorker
 from robosc_bridge.devices.interface import STANDSTILL, Velocity
 from robosc_bridge.devices.lidar import make_lds01
 from robosc_bridge.safety import Caution, Reason, SafetyLayer
-from robosc_bridge.simulated import SimulatedTurtleBot3, Walls, room
-from support.pty_end import SkippingClock
+from robosc_bridge.simulated import SimulatedTurtleBot3, VirtualHost, Walls, room
 from support.safety import LIMITS, reading
-from support.waiting import wait_until
-
-pytestmark = pytest.mark.real_time
 
 RESTART_S, SILENT_S = 3.0, 0.6
 
 
 class Scene:
-    """A LiDAR, its driver and worker, and the safety layer; the world's time passes when the test says so."""
+    """A LiDAR, its driver and worker, and the safety layer, on a virtual host."""
 
-    def __init__(self, robot: SimulatedTurtleBot3) -> None:
+    def __init__(self, robot: SimulatedTurtleBot3, time: VirtualHost) -> None:
         self.robot = robot
-        self.clock = SkippingClock()
+        self.time = time
+        self._due_s = 0.0
         self.safety = SafetyLayer(replace(LIMITS, scan_timeout_s=None))
         self.reports: list[Report] = []
         self.worker = ScannerWorker(
-            make_lds01(robot.scanner_path, host=self.clock),
+            make_lds01(robot.scanner_path, host=self.time),
             self.safety,
             self.reports.append,
             SILENT_S,
             RESTART_S,
-            self.clock,
+            self.time.monotonic,
             Backoff(first_s=0.5),
         )
 
     def live(self, seconds: float) -> None:
-        """Let the LiDAR turn for so long, and be heard."""
-        for _ in range(round(seconds / 0.05)):
-            self.robot.advance(0.05)
-            self.worker.step(self.clock())
+        """Let the worker do what its thread does for so long."""
+        end_s = self.time.monotonic() + seconds
+        while (now_s := self.time.monotonic()) < end_s:
+            if now_s >= self._due_s:
+                self._due_s = self.worker.step(now_s)
+            self.time.sleep(max(min(self._due_s, end_s) - self.time.monotonic(), 0.0))
 
-    def until(self, condition: Callable[[], bool]) -> None:
-        for _ in range(100):
-            if condition():
-                return
-            self.live(0.2)
-        raise AssertionError("in vain")
+    def until(self, condition: Callable[[], bool], limit_s: float = 10.0) -> float:
+        """Let it work until something is so; how long that takes."""
+        begin_s = self.time.monotonic()
+        while not condition():
+            assert self.time.monotonic() - begin_s < limit_s, f"not within {limit_s} s; told: {self.reports}"
+            self.live(0.05)
+        return self.time.monotonic() - begin_s
 
     def downs(self) -> list[DeviceDown]:
         return [item for item in self.reports if isinstance(item, DeviceDown)]
@@ -59,21 +58,23 @@ class Scene:
     def output(self, speed_m_s: float) -> tuple[Velocity, tuple[Reason, ...], tuple[Caution, ...]]:
         """What the safety layer lets through of a speed, with a drive base that does as it is told."""
         for _ in range(20):
-            now_s = self.clock()
+            now_s = self.time.monotonic()
             self.safety.loop_turned(now_s)
             self.safety.operator_seen(now_s)
             self.safety.command(Velocity(speed_m_s), now_s)
             found = self.safety.output(now_s)
-            self.clock.skip(0.002)
+            self.time.sleep(0.002)
             v = found.velocity.linear_m_s
-            self.safety.saw_drive(reading(self.clock(), wheels_m_s=(v, v), is_torque_on=found.is_torque_wanted))
+            self.safety.saw_drive(
+                reading(self.time.monotonic(), wheels_m_s=(v, v), is_torque_on=found.is_torque_wanted)
+            )
         return found.velocity, found.reasons, found.warnings
 
 
 @pytest.fixture
 def scene() -> Iterator[Scene]:
-    with SimulatedTurtleBot3(lidar="lds01", walls=room(3.0, 2.0), clock=ManualClock()) as robot:
-        made = Scene(robot)
+    with VirtualHost() as time, SimulatedTurtleBot3(lidar="lds01", walls=room(3.0, 2.0), clock=time) as robot:
+        made = Scene(robot, time)
         yield made
         made.worker.close()
 
@@ -82,23 +83,21 @@ def test_one_that_stays_silent_is_restarted_so_often_and_then_opened_anew(scene:
     scene.until(lambda: DeviceUp(Device.SCANNER) in scene.reports)
     scene.robot.scanner.is_stalled = True
     before = scene.robot.scanner_line.received
-    for _ in range(RESTART_LIMIT):
-        scene.clock.skip(RESTART_S)
-        scene.worker.step(scene.clock())
-    wait_until(lambda: scene.robot.scanner_line.received == before + RESTART_LIMIT)
+    assert scene.until(lambda: bool(scene.downs())) == pytest.approx(SILENT_S, abs=0.3)
     assert [item.problem for item in scene.downs()] == ["no full turn with valid ranges for 0.6 s"]
-    scene.clock.skip(RESTART_S)
-    scene.worker.step(scene.clock())
+    passed_s = SILENT_S + scene.until(lambda: len(scene.downs()) == 2, 20.0)
+    # A last time of silence follows the last restart.
+    assert passed_s == pytest.approx((RESTART_LIMIT + 1) * RESTART_S, abs=0.3)
     silent = f"no full turn, also after its motor was started anew {RESTART_LIMIT} times"
-    assert scene.downs()[1:] == [DeviceDown(Device.SCANNER, silent, 0.5, is_first=True)]
-    # It was closed, which stops its motor.
-    wait_until(lambda: not scene.robot.scanner.is_spinning)
+    assert scene.downs()[1] == DeviceDown(Device.SCANNER, silent, 0.5, is_first=True)
+    # Each restart is one byte, and so is its end: it was closed, which stops its motor.
+    assert scene.robot.scanner_line.received == before + RESTART_LIMIT + 1
+    assert not scene.robot.scanner.is_spinning
     # As soon as it speaks again, it is there again.
     scene.robot.scanner.is_stalled = False
     scene.reports.clear()
-    scene.worker.step(scene.clock())
-    wait_until(lambda: scene.robot.scanner.is_spinning)
-    scene.until(lambda: DeviceUp(Device.SCANNER) in scene.reports)
+    assert scene.until(lambda: DeviceUp(Device.SCANNER) in scene.reports) == pytest.approx(0.5 + 0.4, abs=0.2)
+    assert scene.robot.scanner.is_spinning
     assert scene.downs() == []
 
 
@@ -118,8 +117,8 @@ def test_damaged_frames_are_warned_of_until_they_are_sound(scene: Scene, caplog:
 def test_one_that_sees_nothing_ahead_is_warned_of() -> None:
     """Of two walls at its sides, it sees nothing within 30 degrees of its way."""
     far = Walls(((-9.0, 2.0, 9.0, 2.0), (-9.0, -2.0, 9.0, -2.0)))
-    with SimulatedTurtleBot3(lidar="lds01", walls=far, clock=ManualClock()) as robot:
-        scene = Scene(robot)
+    with VirtualHost() as time, SimulatedTurtleBot3(lidar="lds01", walls=far, clock=time) as robot:
+        scene = Scene(robot, time)
         scene.until(lambda: DeviceUp(Device.SCANNER) in scene.reports)
         scene.safety.enable()
         velocity, reasons, warnings = scene.output(0.1)

@@ -1,4 +1,4 @@
-"""How long it takes to see that a request would take long to parse."""
+"""Time that the server needs to see that a request would take long to parse."""
 
 import time
 from typing import Any

@@ -1,4 +1,4 @@
-"""What the bridge has of its computer: clocks, waiting, threads, serial ports and network, as one value.
+"""The bridge's computer: clocks, waiting, threads, serial ports and network, as one value.
 
 Whatever waits or measures time does so through a `Host`, so that a test can put the whole bridge on a clock of its own:
 `robosc_bridge.simulated.virtual_host`. The real one is `robosc_bridge.transport.system_host`. Readings are in seconds.
@@ -124,12 +124,12 @@ class NetworkPort(ABC):
     @property
     @abstractmethod
     def port(self) -> int:
-        """Of its own end."""
+        """Address of its own end."""
 
     @property
     @abstractmethod
     def is_stranger(self) -> bool:
-        """Whether the last datagram came from elsewhere than where what is written goes."""
+        """Return whether the last datagram came from elsewhere than where what is written goes."""
 
     @abstractmethod
     def read(self, limit_s: float) -> bytes:

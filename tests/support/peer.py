@@ -17,6 +17,19 @@ Answers = Iterable[bytes | float]
 """What to send, in order; a number is a pause in seconds."""
 
 
+def _obey(peer: "VirtualPeer | Peer", heard: bytes, sleep: Callable[[float], object]) -> bytes:
+    """Have a peer answer all whole requests; return the bytes behind them."""
+    while len(heard) >= 7 and len(heard) >= (length := 7 + int.from_bytes(heard[5:7], "little")):
+        request, heard = heard[:length], heard[length:]
+        peer.requests.append(request)
+        for sending in peer._answer(request):
+            if isinstance(sending, bytes):
+                peer.send(sending)
+            else:
+                sleep(sending)
+    return heard
+
+
 class VirtualPeer:
     """The far end of a line on a virtual host, served by one of its threads until it is closed; the host ends with it.
 
@@ -42,14 +55,7 @@ class VirtualPeer:
         while True:
             self._end.wait(math.inf)
             heard += self._end.read()
-            while len(heard) >= 7 and len(heard) >= (length := 7 + int.from_bytes(heard[5:7], "little")):
-                request, heard = heard[:length], heard[length:]
-                self.requests.append(request)
-                for sending in self._answer(request):
-                    if isinstance(sending, bytes):
-                        self.send(sending)
-                    else:
-                        self.time.sleep(sending)
+            heard = _obey(self, heard, self.time.sleep)
 
     def send(self, data: bytes) -> None:
         """Send something."""
@@ -98,14 +104,7 @@ class Peer:
                 return
             with contextlib.suppress(OSError):
                 heard += os.read(self._master, 4096)
-            while len(heard) >= 7 and len(heard) >= (length := 7 + int.from_bytes(heard[5:7], "little")):
-                request, heard = heard[:length], heard[length:]
-                self.requests.append(request)
-                for sending in self._answer(request):
-                    if isinstance(sending, bytes):
-                        self.send(sending)
-                    else:
-                        time.sleep(sending)
+            heard = _obey(self, heard, time.sleep)
 
     def send(self, data: bytes) -> None:
         """Send something; what does not fit into the buffer of the line is lost."""

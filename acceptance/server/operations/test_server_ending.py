@@ -12,7 +12,7 @@ import pytest
 
 from support.waiting import PATIENCE_S
 
-# How long the end may take is cut short, and what it begins with never returns.
+# The bound of the end is cut short, and its first step never returns.
 _HANGING = """
 import asyncio, sys, time
 import robosc_server.application as application

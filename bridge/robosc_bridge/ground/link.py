@@ -62,7 +62,7 @@ class GroundLink:
 
     @property
     def port(self) -> int | None:
-        """Of its own end, where there is a network and the line is open."""
+        """Address of its own end, where there is a network and the line is open."""
         with self._guard:
             return self._line.port if isinstance(self._line, NetworkPort) else None
 

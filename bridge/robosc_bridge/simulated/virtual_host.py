@@ -26,7 +26,7 @@ _END_S = 10.0
 
 
 _VAIN_S = 3600.0
-"""Whoever waits without a limit while others go on for so long waits in vain."""
+"""Time after which a wait without a limit is in vain, though others go on."""
 
 
 class VirtualTimeError(Exception):

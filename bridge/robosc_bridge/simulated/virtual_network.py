@@ -84,12 +84,12 @@ class _Datagrams(NetworkPort):
 
     @property
     def port(self) -> int:
-        """Of its own end."""
+        """Address of its own end."""
         return self._port
 
     @property
     def is_stranger(self) -> bool:
-        """Whether the last datagram came from elsewhere than where what is written goes; only for who listens."""
+        """Return whether the last datagram came from elsewhere than where writing goes; only for who listens."""
         return self._is_listening and self._peer is not None and self._sender != self._peer
 
     def read(self, limit_s: float) -> bytes:

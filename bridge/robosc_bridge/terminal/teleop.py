@@ -59,7 +59,7 @@ class Running(Protocol):
     """Something that was started, and goes on beside the keys."""
 
     def is_alive(self) -> bool:
-        """Whether it has not ended."""
+        """Return whether it has not ended."""
 
 
 class Terminal(Protocol):

@@ -17,6 +17,8 @@ from support.live import LiveRobot, supervisor_without_synthesis
 from support.models import EXAMPLES
 from support.node import EXTENSION_FOLDER
 from support.remote import FakeDaemon, served
+from support.ros2 import Peer, environment, own_domain
+from support.view_nodes import Node
 from support.vscode import VsCode, packaged, programs_in, vscode
 
 MODEL = (EXAMPLES / "line_follower" / "line_follower.rscd").read_text()
@@ -228,6 +230,32 @@ def test_visualize_a_bridge(editor: VsCode) -> None:
         frame.get_by_role("button", name="Stop").first.click()
         editor.until(lambda: daemon.orders, "the robot was not stopped")
         editor.close(face.address)
+
+
+@pytest.mark.ros2
+def test_visualize_a_node(editor: VsCode, tmp_path: Path) -> None:
+    pytest.importorskip("rclpy", reason="ROS 2 (rclpy) is not installed")
+    from std_msgs.msg import String
+
+    node = Node(supervisor_without_synthesis(MODEL), tmp_path / "package")
+    with own_domain() as domain, Peer(domain, environment(domain, tmp_path / "ros")) as peer:
+        programs = programs_in(tmp_path / "environment")
+        exports = [f"export {name}='{value}'" for name, value in environment(domain, tmp_path / "ros").items()]
+        robosc = programs / "robosc"
+        robosc.write_text("\n".join(["#!/bin/sh", *exports, robosc.read_text()]))
+        editor.do("set", name="robosc.programs", value=str(programs))
+        try:
+            assert editor.command("visualize", {"source": "ros2", "namespace": "/robot1"}) is True
+            frame = editor.live_view()
+
+            def is_shown() -> bool:
+                peer.publish(String(data=node.system.report()), "/robot1/state")
+                return frame.locator("#robot:text-is('LineFollower')").count() == 1
+
+            editor.until(is_shown, "the node is not shown")
+            editor.close("/robot1/state")
+        finally:
+            editor.do("set", name="robosc.programs", value=None)
 
 
 def test_what_cannot_be_shown_is_told(editor: VsCode) -> None:

@@ -61,7 +61,7 @@ from support.answers import (
 from support.both_clients import KINDS, client_of
 from support.certificates import Authority
 from support.models import bundle_of
-from support.scripted_service import Refusal, held, scripted
+from support.scripted_service import Refusal, held, kept_port, scripted
 from support.waiting import PATIENCE_S, eventually
 
 NOWHERE = "127.0.0.1:1"
@@ -459,13 +459,13 @@ class TestWatch:
             assert [item.after_revision for item in script.of("WatchJob")] == [0, 0, 4, 5, 5, 5]
 
     def test_resumed_with_a_server_that_was_started_anew(self, connect: Any) -> None:
-        with ExitStack() as first:
-            address, _ = first.enter_context(scripted(WatchJob=[[*watched(job(1)), held]]))
+        with kept_port() as port, ExitStack() as first:
+            address, _ = first.enter_context(scripted(port=port, WatchJob=[[*watched(job(1)), held]]))
             with connect(address, retries=RetryPolicy(first_s=0.05, watch_attempts=50)) as client:
                 items = iter(client.watch("job-1"))
                 assert next(items).revision == 1
                 first.close()
-                with scripted(port=int(address.rpartition(":")[2]), WatchJob=[self.states(2)]) as (_, script):
+                with scripted(port=port, WatchJob=[self.states(2)]) as (_, script):
                     assert [item.revision for item in items] == [2]
                     assert script.of("WatchJob")[0].after_revision == 1
 

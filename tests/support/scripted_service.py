@@ -1,5 +1,6 @@
 """A server that answers what a test has written, right or wrong, over real gRPC."""
 
+import socket
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -112,17 +113,27 @@ class Script:
 
 
 @contextmanager
+def kept_port() -> Iterator[int]:
+    """A port that nobody else is given, also while no server listens at it."""
+    with socket.socket() as keeper:
+        keeper.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+        keeper.bind(("127.0.0.1", 0))
+        yield keeper.getsockname()[1]
+
+
+@contextmanager
 def scripted(script: Script | None = None, /, *, port: Any = 0, **answers: Any) -> Iterator[Any]:
     """A server that answers as written; yields its address and its script.
 
     Args:
         script: What it answers.
-        port: Where it listens; 0: anywhere.
+        port: Where it listens, one of `kept_port`; 0: anywhere.
         answers: The same in short, for a new script.
     """
     chosen = script or Script(answers)
     with ThreadPoolExecutor(8) as threads:
-        server = grpc.server(threads, options=(("grpc.max_send_message_length", -1), ("grpc.so_reuseport", 0)))
+        options = (("grpc.max_send_message_length", -1), ("grpc.so_reuseport", int(port > 0)))
+        server = grpc.server(threads, options=options)
         server.add_generic_rpc_handlers([_handler(service, chosen) for service in _SERVICES])
         found = server.add_insecure_port(f"127.0.0.1:{port}")
         server.start()

@@ -63,6 +63,7 @@ def serve(master: Master, tmp_path: Path) -> Iterator[Callable[..., tuple[Proces
         yield start
 
 
+@pytest.mark.smoke
 def test_other_nodes_see_a_turtlebot(serve: Callable[..., tuple[Process, int]], peer: Peer, tmp_path: Path) -> None:
     motion = tmp_path / "motion.jsonl"
     twin, commands = serve("--scene", "line-oval", "--speed", "5", "--motion", str(motion))

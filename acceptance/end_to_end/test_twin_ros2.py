@@ -62,6 +62,7 @@ def serve(tmp_path: Path) -> Iterator[Callable[..., Served]]:
                 os.close(write)
 
 
+@pytest.mark.smoke
 def test_other_nodes_see_a_turtlebot(serve: Callable[..., Served], tmp_path: Path) -> None:
     from geometry_msgs.msg import Twist
     from nav_msgs.msg import Odometry as OdometryMessage
@@ -198,6 +199,7 @@ def blocked(outcome: Outcome) -> int:
     return sum('"kind":"blocked"' in line for line in outcome.event_log.read_text().splitlines())
 
 
+@pytest.mark.smoke
 def test_a_careless_line_follower_keeps_the_line_and_stands_when_it_must(
     alone: Path, record_property: Callable[[str, object], None]
 ) -> None:

@@ -6,8 +6,12 @@ import subprocess
 import sys
 import termios
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 
-from support.waiting import PATIENCE_S
+from robosc_bridge.daemon import programs
+from support.remote import FakeDaemon, served
+from support.waiting import PATIENCE_S, wait_until
 
 
 class Terminal:
@@ -61,3 +65,21 @@ class Terminal:
         self.process.wait()
         self._thread.join(PATIENCE_S)
         os.close(self._number)
+
+
+@contextmanager
+def driving(daemon: FakeDaemon) -> Iterator[Terminal]:
+    """The command, ready for keys, with a daemon to drive."""
+    with served(daemon) as face:
+        terminal = Terminal(face.address)
+        try:
+            wait_until(lambda: "w/s or up/down" in terminal.seen)
+            yield terminal
+        finally:
+            terminal.close()
+
+
+def wishes(daemon: FakeDaemon) -> list[tuple[str, float, float]]:
+    """The velocities that the operator has asked for: on which topic, ahead, to the left."""
+    found = daemon.of(programs.Requested)
+    return [(item.identifier, item.data["linear"]["x"], item.data["angular"]["z"]) for item in found]

@@ -25,6 +25,7 @@ def peer(tmp_path: Path) -> Iterator[Peer]:
         yield made
 
 
+@pytest.mark.smoke
 @pytest.mark.ros2
 def test_a_node_is_shown_over_dds(peer: Peer, tmp_path: Path) -> None:
     from std_msgs.msg import String

@@ -40,10 +40,10 @@ async def answer(request: bytes, context: Any) -> bytes:
     return REQUEST_ID.get().encode()
 
 
-def outcome(request: bytes, metrics: Metrics | None = None, **more: Any) -> Ended:
+def outcome(request: bytes, metrics: Metrics | None = None, unary: Any = answer, **more: Any) -> Ended:
     async def run() -> Ended:
         calls = CallInterceptor(metrics or Metrics("1"))
-        async with small_server(interceptors=[calls], unary=answer) as (channel, _):
+        async with small_server(interceptors=[calls], unary=unary) as (channel, _):
             ended = await call(channel, request, **more)
             await until(lambda: not calls.under_way())
             assert isinstance(ended, Ended)
@@ -123,10 +123,22 @@ def test_what_handlers_say_themselves_stays() -> None:
 
 
 def test_a_deadline_that_passes() -> None:
-    """Only the server has a timer: it is told a deadline that its caller has not set."""
-    with logged() as log:
-        ended = outcome(b"stuck", metadata=[("grpc-timeout", "1m")], timeout=None)
-    assert ended.code is grpc.StatusCode.DEADLINE_EXCEEDED
+    """Only the server has a timer: it is told a deadline that its caller has not set.
+
+    One that passes before the call has reached the handler says nothing: a longer one is given then.
+    """
+    entered: list[bytes] = []
+
+    async def stuck(request: bytes, context: Any) -> bytes:
+        entered.append(request)
+        return await answer(request, context)
+
+    for limit_ms in (2**number for number in range(20)):
+        with logged() as log:
+            ended = outcome(b"stuck", unary=stuck, metadata=[("grpc-timeout", f"{limit_ms}m")], timeout=None)
+        assert ended.code is grpc.StatusCode.DEADLINE_EXCEEDED
+        if entered:
+            break
     assert [line["code"] for line in log.lines("call")] == ["DEADLINE_EXCEEDED"]
 
 

@@ -17,6 +17,8 @@ from support.job_workers import messages_for, task_of
 from support.postgresql import Postgresql
 from support.waiting import until
 
+pytestmark = pytest.mark.smoke
+
 _NEVER = "until /nowhere/never"
 _LIMITS = JobLimits(look_s=0.02, lease_s=15.0, sweep_s=3600.0)
 
@@ -34,7 +36,6 @@ def fall_silent(made: Parts) -> None:
     made.manager._has_left = True
 
 
-@pytest.mark.smoke
 def test_a_job_is_seen_watched_and_read_at_each_server(database_url: str, tmp_path: Path) -> None:
     async def test() -> None:
         async with AsyncExitStack() as stack:

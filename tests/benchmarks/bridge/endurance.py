@@ -1,17 +1,21 @@
-"""Hours of driving in minutes: what grows, whether the schedule drifts, and whether the robot meets a wall.
+"""Hours of driving in minutes: growth of what is held, drift of the schedule, and collisions.
 
-A robot wanders through a simulated room in a time of its own (`virtual_robot.py` says what is real in it). *Drift*: by
-how much the schedule of the last decision is off the first one's and as many periods. *Memory* and what is behind it:
-what has grown since a tenth of the time had passed: resident memory, Python objects, what waits in the loop's inbox,
-open files. An hour takes some ten minutes.
+A robot wanders through a simulated room on virtual time (`robosc_bridge.simulated.VirtualHost`): the bridge and the
+simulated devices are the real ones. *Drift*: difference between the schedule of the last decision and that of the
+first one and as many periods. *Memory* and what is behind it: growth since a tenth of the time had passed, of resident
+memory, Python objects, items in the loop's inbox, open files.
 
 Usage: endurance.py [--hours H] [--base NAME] [--json]
 """
 
 import argparse
+import gc
 import json
+import math
+import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -21,21 +25,36 @@ sys.path[:0] = [str(Path(__file__).parent), str(ROOT / "tests" / "benchmarks")]
 from rig import WANDERER, WANDERER_CHANNELS, environment  # noqa: E402
 
 from figures import text_table  # noqa: E402  # found through the path above
+from robosc.execution.event_log import NullLog  # noqa: E402
+from robosc.execution.executor import Executor  # noqa: E402
+from robosc.model.structure import Deployment  # noqa: E402
+from robosc_bridge.configuration import parse, tie  # noqa: E402
+from robosc_bridge.daemon.assembly import Machine, assemble  # noqa: E402
+from robosc_bridge.daemon.states import State  # noqa: E402
+from robosc_bridge.daemon.supervisors import Source, obtain  # noqa: E402
+from robosc_bridge.safety import SafetyLayer  # noqa: E402
+from robosc_bridge.simulated import SimulatedTurtleBot3, VirtualHost  # noqa: E402
+from robosc_bridge.simulated.walls import room  # noqa: E402
 
 HOURS = 0.5
 CASES = {"dynamixel": 0.010, "opencr": 0.020}
 SCANNER = "lds03"
 WARM_UP = 0.1
 SAMPLES = 100
+END_S = 10.0
+LOOK_S = 0.1
+"""Time between two looks at the robot's place, from which its way is summed up."""
 
 HEADER = [
     "base, period", "hours", "took, s", "decisions", "exchanges", "scans", "drift, us", "late max, ms", "overruns",
     "driven, m", "collisions", "memory, kB", "objects", "inbox", "files",
 ]  # fmt: skip
 
+_PAGE_KB = os.sysconf("SC_PAGE_SIZE") // 1024
+
 
 def measured(base: str, hours: float) -> dict[str, Any]:
-    """Drive; in a process of its own, whose time is no longer the computer's."""
+    """Drive in a process of its own, which holds nothing else."""
     command = [sys.executable, str(Path(__file__)), "--hours", str(hours), "--base", base, "--json"]
     done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True, env=environment())
     found: dict[str, Any] = json.loads(done.stdout)
@@ -59,8 +78,74 @@ def _row(base: str, hours: float) -> list[str]:
 
 
 def table(hours: float = HOURS, bases: tuple[str, ...] = tuple(CASES)) -> str:
-    """One row for each base."""
+    """Return one row for each base."""
     return text_table("Endurance of the bridge, in virtual time", HEADER, [_row(base, hours) for base in bases])
+
+
+class Watch:
+    """Counts of what a bridge does.
+
+    Args:
+        machine: The bridge, which has not begun yet.
+        host: The host that it runs on.
+        period_s: Period of its decisions, in seconds.
+    """
+
+    def __init__(self, machine: Machine, host: VirtualHost, period_s: float) -> None:
+        self._daemon = machine.daemon
+        self._clock = host.monotonic
+        self._period_s = period_s
+        self._decisions = self._exchanges = self._scans = 0
+        self._first_due_s = self._last_due_s = math.nan
+        self._late_s = 0.0
+        watch = self
+        tick, saw_scan, step = Executor.tick, SafetyLayer.saw_scan, machine.drive._worker.step
+
+        def counted_tick(self: Executor) -> None:
+            watch._decided()
+            tick(self)
+
+        def counted_scan(self: SafetyLayer, *arguments: Any) -> None:
+            watch._scans += 1
+            saw_scan(self, *arguments)
+
+        def counted_step(now_s: float) -> float:
+            watch._exchanges += 1
+            return step(now_s)
+
+        Executor.tick = counted_tick  # type: ignore[method-assign]
+        SafetyLayer.saw_scan = counted_scan  # type: ignore[method-assign,assignment]
+        machine.drive._worker.step = counted_step  # type: ignore[method-assign]
+
+    def _decided(self) -> None:
+        # Only the loop knows its schedule.
+        self._last_due_s = self._daemon._execution.due_s
+        if not self._decisions:
+            self._first_due_s = self._last_due_s
+        self._decisions += 1
+        self._late_s = max(self._late_s, self._clock() - self._last_due_s)
+
+    def counted(self) -> dict[str, Any]:
+        """Return what was done so far."""
+        periods = self._decisions - 1 + self._daemon.overruns
+        return {
+            "decisions": self._decisions,
+            "exchanges": self._exchanges,
+            "scans": self._scans,
+            "drift_s": self._last_due_s - self._first_due_s - periods * self._period_s,
+            "late_s": self._late_s,
+            "overruns": self._daemon.overruns,
+        }
+
+    def held(self) -> dict[str, int]:
+        """Return what is held now."""
+        gc.collect()
+        return {
+            "memory_kb": int(Path("/proc/self/statm").read_text().split()[1]) * _PAGE_KB,
+            "objects": len(gc.get_objects()),
+            "inbox": self._daemon._inbox.qsize(),
+            "files": len(list(Path("/proc/self/fd").iterdir())),
+        }
 
 
 def drive(base: str, hours: float) -> dict[str, Any]:
@@ -69,37 +154,53 @@ def drive(base: str, hours: float) -> dict[str, Any]:
     Raises:
         RuntimeError: Something has stopped the robot.
     """
-    # Time is another one from here on.
-    from endurance_watch import Watch
-    from virtual_robot import CLOCK, VirtualRobot, real_monotonic
-
-    from robosc_bridge.daemon.states import State
-    from robosc_bridge.simulated.walls import room
-
-    begin_s = real_monotonic()
-    configuration = f"""
+    begin_s = time.monotonic()
+    with (
+        VirtualHost() as host,
+        SimulatedTurtleBot3("burger", base, SCANNER, walls=room(4.0, 3.0), clock=host) as robot,
+    ):
+        configuration = f"""
 robot: burger
-drive: {{driver: {base}, port: base}}
-scanner: {{driver: {SCANNER}, port: scanner}}
+drive: {{driver: {base}, port: {robot.base_path}}}
+scanner: {{driver: {SCANNER}, port: {robot.scanner_path}}}
 execution: {{period_s: {CASES[base]}, every: event}}
 channels:{WANDERER_CHANNELS}"""
-    robot = VirtualRobot(WANDERER, configuration, base, SCANNER, room(4.0, 3.0))
-    watch = Watch(robot)
-    start_s, length_s = CLOCK.now_s, hours * 3600
-    grown = watch.held()
-    for sample in range(1, SAMPLES + 1):
-        robot.live(start_s + length_s * sample / SAMPLES, watch.step)
-        if sample == round(SAMPLES * WARM_UP):
+        loaded = parse(configuration.encode(), "virtual.yaml")
+        supervisor = obtain(Source(WANDERER, Deployment.CONTROLLER, None, None), lambda text: None)
+        ties = tie(supervisor.model, loaded.configuration, loaded.document)
+        machine = assemble(loaded.configuration, ties, supervisor, NullLog(), starts_itself=True, host=host)
+        watch = Watch(machine, host, CASES[base])
+        # Its place is known at any time, only its distance has to be summed up.
+        start_s, place_m, driven_m = host.monotonic(), robot.world.pose[:2], 0.0
+        loop = host.thread(lambda: _run(machine), "loop")
+        loop.start()
+        try:
             grown = watch.held()
-        if robot.machine.daemon.state is not State.RUNNING:
-            raise RuntimeError(f"{robot.machine.daemon.state}: {robot.machine.daemon.problem}")
-    held = watch.held()
-    return {
-        "hours": (CLOCK.now_s - start_s) / 3600,
-        "took_s": real_monotonic() - begin_s,
-        **watch.counted(),
-        **{name: held[name] - grown[name] for name in held},
-    }
+            for sample in range(1, SAMPLES + 1):
+                end_s = start_s + hours * 3600 * sample / SAMPLES
+                while (left_s := end_s - host.monotonic()) > 0:
+                    host.sleep(min(left_s, LOOK_S))
+                    driven_m += math.dist(place_m, place_m := robot.world.pose[:2])
+                if sample == round(SAMPLES * WARM_UP):
+                    grown = watch.held()
+                if machine.daemon.state is not State.RUNNING:
+                    raise RuntimeError(f"{machine.daemon.state}: {machine.daemon.problem}")
+            held = watch.held()
+            return {
+                "hours": (host.monotonic() - start_s) / 3600,
+                "took_s": time.monotonic() - begin_s,
+                **watch.counted(),
+                "driven_m": driven_m,
+                "collisions": robot.world.collisions,
+                **{name: held[name] - grown[name] for name in held},
+            }
+        finally:
+            machine.quit()
+            loop.join(END_S)
+
+
+def _run(machine: Machine) -> None:
+    machine.run()
 
 
 def main() -> int:

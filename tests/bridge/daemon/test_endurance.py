@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-PROGRAM = Path(__file__).parents[3] / "tests" / "benchmarks" / "bridge" / "endurance.py"
-HOURS = 0.01
-SECONDS = 36
+PROGRAM = Path(__file__).parents[2] / "benchmarks" / "bridge" / "endurance.py"
+HOURS = 0.005
+SECONDS = 18
 
 
 @pytest.mark.parametrize(("base", "period_s"), [("dynamixel", 0.010), ("opencr", 0.020)])
@@ -30,7 +30,7 @@ def test_a_robot_wanders_on_and_on(base: str, period_s: float) -> None:
     assert 10 * SECONDS - 10 < found["scans"] <= 10 * SECONDS
     # As often as the period says, and a few that were hurried.
     assert 50 * SECONDS - 50 < found["exchanges"] < 60 * SECONDS
-    assert found["driven_m"] > 3.0
+    assert found["driven_m"] > 1.0
     assert found["collisions"] == 0
     assert found["inbox"] == found["files"] == 0
     assert found["objects"] < 100
